@@ -22,8 +22,8 @@ import numpy as np
 
 from gearfmu.body import ReducedBody, reduce_body
 from gearfmu.files import written_whole
-from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import assemble, loaded_te
 
 COUNTS = ("flank", "thickness", "root", "rim", "width")

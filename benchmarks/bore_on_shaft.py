@@ -28,8 +28,8 @@ from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.hex20 import assemble
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
-from gearfmu.spec.members import members
-from gearfmu.spec.proposal import new_from_numbers
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.proposals.numbers import new_from_numbers
 from gearfmu.spec.stage import load_stage
 
 SCALE = 0.35

@@ -29,7 +29,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.trace import write_columns
+from gearfmu.stage.run.trace import write_columns
 
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 SCHEMES = {"dg4": 0, "central": 4}

@@ -31,7 +31,7 @@ from gearfmu.cosim.source import Source
 from gearfmu.files import write_text, written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE, PICTURE = Path(__file__).with_suffix(".csv"), ROOT / "docs" / "pictures" / "coupling.svg"

@@ -27,8 +27,8 @@ from typing import Any
 from gearfmu.body import load_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel.build import build_library, source_hash, sources
-from gearfmu.spec.flanks import Eccentricity, ProfileSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
 

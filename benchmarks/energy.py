@@ -30,7 +30,7 @@ from gearfmu.body import load_bodies  # noqa: E402
 from gearfmu.errors import SimulationError  # noqa: E402
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
-from gearfmu.stage.trace import write_columns  # noqa: E402
+from gearfmu.stage.run.trace import write_columns  # noqa: E402
 
 STEPS = (5e-6, 7.5e-6, 10e-6)
 SLICES = (1, 5, 10)

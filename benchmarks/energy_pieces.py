@@ -29,7 +29,7 @@ from gearfmu.kernel import Kernel  # noqa: E402
 from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
 from gearfmu.stage import StageModel, Steady, assemble  # noqa: E402
-from gearfmu.stage.trace import write_columns  # noqa: E402
+from gearfmu.stage.run.trace import write_columns  # noqa: E402
 
 STEP, SETTLE, LOAD, SPEED, FAST = 60e-6, 0.01, 302.0, 2000 * math.pi / 30, 1
 ROWS_STILL = {r"p->roll = corner_roll\(n, p\);": "p->roll = 0.5 * (n->gear->s_form + n->gear->s_tip);"}

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import GeneralStage, RotorSpec
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import RotorSpec, Stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 
@@ -32,7 +32,7 @@ H, WARM, STEPS, RUNS = 50e-6, 10, 38, 5  # communication steps; 38 are one mesh 
 BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
 
 
-def copies(pair: GeneralStage, count: int) -> GeneralStage:
+def copies(pair: Stage, count: int) -> Stage:
     """The pair `count` times in one stage, a metre apart; names of copy i end with i."""
     parts = [_copy(pair, i) for i in range(count)]
     merged = {
@@ -43,7 +43,7 @@ def copies(pair: GeneralStage, count: int) -> GeneralStage:
     return pair.model_copy(update={"name": f"pairs{count}", **merged, **lists})
 
 
-def _copy(pair: GeneralStage, i: int) -> GeneralStage:
+def _copy(pair: Stage, i: int) -> Stage:
     mesh, rotors = pair.engagements[0], {}
     for name, rotor in pair.rotors.items():
         x, y = rotor.axis

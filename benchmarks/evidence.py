@@ -34,7 +34,7 @@ from typing import Any
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.files import write_text
 from gearfmu.kernel.build import BEHAVIOUR, library_path
-from gearfmu.stage.blob import rounded_hash
+from gearfmu.stage.build.blob import rounded_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = "tests/reference/golden_runs.json"

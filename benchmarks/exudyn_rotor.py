@@ -32,15 +32,15 @@ from gearfmu.fem import hex20
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import PairGeometry
 from gearfmu.modes.cyclic import unfolded
-from gearfmu.reduction.flank import Points, ToothFlank
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.spec.gear import MeshSpec
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.free import FreeBody
-from gearfmu.stage.groups import Layout, Support, mount
-from gearfmu.stage.spinning import gear_spinning, turn_rates
-from gearfmu.stage.whirls import whirl_rows
+from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stage.build.free import FreeBody
+from gearfmu.stage.build.groups import Layout, Support, mount
+from gearfmu.stage.build.spinning import gear_spinning, turn_rates
+from gearfmu.stage.build.whirls import whirl_rows
 
 COARSE = MeshSpec(flank=2, thickness=1, root=2, rim=1, width=2)
 MODES, SPEEDS, STEPS = 18, (300.0, 600.0, 1200.0), (1e-6, 5e-7, 2.5e-7)

@@ -10,9 +10,9 @@ same friction. A minute and a half.
 from __future__ import annotations
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.ports import FrictionSpec
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import FrictionSpec
 from gearfmu.stage import assemble
 from gearfmu.study.bench import Point, measure
 from gearfmu.study.norm import errors

@@ -17,11 +17,11 @@ import numpy as np
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import PairGeometry
-from gearfmu.reduction.flank import Points
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
-from gearfmu.spec.gear import MeshSpec
+from gearfmu.reduction.cyclic.flank import Points
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 NAMES = ("flank", "thickness", "root", "rim", "width")
 COUNTS = ((16, 4, 5, 3, 6), (20, 5, 6, 4, 6), (16, 4, 5, 3, 8), (16, 4, 5, 3, 10), (20, 5, 6, 4, 10))

@@ -28,12 +28,12 @@ from gearfmu.body.parts import kept_offsets, tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.report.style import panels, styled
-from gearfmu.spec.gear import GearSpec, MeshSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import GearSpec, MeshSpec
 from gearfmu.stage import assemble, loaded_te
 
 OVERLAPS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)

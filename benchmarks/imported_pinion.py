@@ -21,7 +21,7 @@ from gearfmu.fem import solids
 from gearfmu.femesh import FeMesh, gear_sector, write_vtu
 from gearfmu.femesh.deck import write_deck
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import assemble, loaded_te
 

@@ -21,7 +21,7 @@ from gearfmu.body import load_bodies
 from gearfmu.scenes.light_rattle import STEP, LightRattle, run, statistics
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.trace import write_columns
+from gearfmu.stage.run.trace import write_columns
 
 SCENES = {"one flank": LightRattle(), "both flanks": LightRattle(torque=9.0, swing=4e-3)}
 CONVERGED = STEP / 64

@@ -54,8 +54,8 @@ def measure(body: str, scale: float) -> dict[str, float | str | int]:
     from gearfmu.femesh import sector_mesh
     from gearfmu.geometry import GearGeometry
     from gearfmu.geometry.internal import InternalGearGeometry
-    from gearfmu.reduction.modal import elastic_modes
-    from gearfmu.reduction.sector import SectorBody
+    from gearfmu.reduction.cyclic.modal import elastic_modes
+    from gearfmu.reduction.cyclic.sector import SectorBody
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage("planetary54")

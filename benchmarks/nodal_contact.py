@@ -28,10 +28,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.report.style import panels, styled
-from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
-from gearfmu.stage.nodal import mesh_penalty
+from gearfmu.stage.build.nodal import mesh_penalty
 
 HERE = Path(__file__).parent
 TABLE, CHART = HERE / "nodal_contact.csv", HERE.parent / "docs" / "pictures" / "nodal.svg"

@@ -17,10 +17,10 @@ import numpy as np
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import sector_mesh
 from gearfmu.geometry import GearGeometry
-from gearfmu.reduction import modal
-from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.cyclic import modal
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.tables import ROLLS, blend, resampling
+from gearfmu.stage.build.tables import ROLLS, blend, resampling
 
 POINTS = 20  # of a flank in the kernel (gk_nodal.h)
 BANDS = (0, 20e3, 60e3, 120e3, 180e3, 300e3)  # Hz

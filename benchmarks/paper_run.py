@@ -28,7 +28,7 @@ from gearfmu.report.deformation import pictures
 from gearfmu.report.run import Run
 from gearfmu.report.style import styled
 from gearfmu.stage import Trace
-from gearfmu.stage.deformation import Deformation
+from gearfmu.stage.run.deformation import Deformation
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENE, RUNS, DRAWN = (

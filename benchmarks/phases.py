@@ -20,10 +20,10 @@ from pathlib import Path
 from gearfmu.body import load_body
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
-from gearfmu.spec.library import model_folder
+from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.blob import read_blob
+from gearfmu.stage.build.blob import read_blob
 
 STEP, BLOCK, DURATION, TORQUE, SPEED = 1e-4, 10, 0.05, 302.0, 2000 * math.pi / 30
 PAIRS = 2  # tooth pairs within reach, nearly always

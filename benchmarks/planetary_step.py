@@ -19,7 +19,7 @@ from functools import partial
 from gearfmu.body import load_bodies
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.build.model import StageModel
 
 LEVELS = {"rigid": 0.0, "fast": 1.0, "standard": 2.0}
 START = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}

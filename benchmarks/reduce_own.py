@@ -23,9 +23,9 @@ from gearfmu.api.models import load
 from gearfmu.body import reduce_body
 from gearfmu.body.toothed import gear_work
 from gearfmu.files import written_whole
-from gearfmu.spec.coarse import coarse_stage
-from gearfmu.spec.members import member_of
-from gearfmu.spec.proposal import new_from_numbers
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.proposals.coarse import coarse_stage
+from gearfmu.spec.proposals.numbers import new_from_numbers
 
 
 def reduced(stage: str, index: int) -> dict[str, Any]:

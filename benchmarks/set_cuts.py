@@ -16,9 +16,9 @@ from pathlib import Path
 from set_price import instructions
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.ports import LevelSpec
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import LevelSpec
 from gearfmu.stage import assemble
 from gearfmu.study.bench import Point, measure
 from gearfmu.study.norm import errors

@@ -18,7 +18,7 @@ from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.build.model import StageModel
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES = {"fast": (1.0, 1e-5), "standard": (2.0, 5e-6)}  # level, step s

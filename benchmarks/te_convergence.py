@@ -23,7 +23,7 @@ from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.files import written_whole
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import assemble, loaded_te
-from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.build.tables import ROLLS
 
 SLICES = (1, 2, 3, 5, 10)
 GRIDS = (16, 24, ROLLS, 2 * ROLLS, 4 * ROLLS)

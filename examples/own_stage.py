@@ -12,7 +12,7 @@ from pathlib import Path
 
 import gearfmu as gf
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.new import new_stage
+from gearfmu.spec.proposals.new import new_stage
 
 TORQUE = 302.0  # N·m on the pinion
 CHANGES = {

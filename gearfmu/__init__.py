@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from gearfmu.api.settings import Settings
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
-    from gearfmu.stage.model import StageModel
-    from gearfmu.stage.te import TeResult
-    from gearfmu.stage.trace import Channel, Trace
+    from gearfmu.stage.build.model import StageModel
+    from gearfmu.stage.run.te import TeResult
+    from gearfmu.stage.run.trace import Channel, Trace
     from gearfmu.sweeps.table import SweepTable
 
     __version__: str
@@ -70,9 +70,9 @@ _HOMES = {
     "api.settings": ("Settings",),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
-    "stage.model": ("StageModel",),
-    "stage.te": ("TeResult",),
-    "stage.trace": ("Channel", "Trace"),
+    "stage.build.model": ("StageModel",),
+    "stage.run.te": ("TeResult",),
+    "stage.run.trace": ("Channel", "Trace"),
     "sweeps.table": ("SweepTable",),
 }
 

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LIMITS = Path(__file__).with_suffix(".json")
 KINDS = (
-    r"isinstance\([\w.]+, \(?(?:PlanetarySpec|StageSpec|GeneralStage)\b"
+    r"isinstance\([\w.]+, \(?(?:PlanetarySpec|StageSpec|Stage)\b"
     r"|\.kind [!=]= \"(?:planetary_set|general|external_pair)\""
 )
 

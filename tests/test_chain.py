@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_WHEEL = 20e6  # bytes, with both kernels

@@ -19,7 +19,7 @@ import pytest
 
 from gearfmu import cli
 from gearfmu.commands import shared, variables
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gearfmu import cli
-from gearfmu.spec.coarse import coarse_stage
+from gearfmu.spec.proposals.coarse import coarse_stage
 from gearfmu.spec.scene import load_scene
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto-own-stage.md"

@@ -20,6 +20,11 @@ LARGER = {  # files that may be, up to 1.4 MB: tests/body/test_shipped.py
     "reduced_models/two_stage/pinion1.h5",
     "reduced_models/two_stage/pinion2.h5",
 }
+INSIDE = {  # sub-packages of a package in reading order; "" are its own files
+    "spec": ("reading", "tables", "forms", "scenes", "", "proposals"),
+    "stage": ("build", "run", ""),
+    "reduction": ("cyclic", "imported"),
+}
 KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
 
 
@@ -34,7 +39,7 @@ ORDER = {name: rank for rank, name in enumerate(packages())}
 
 
 def package_of(module: str) -> str:
-    """Package of "gearfmu.stage.trace" is "stage"; of "gearfmu" itself the empty string, which stands above all."""
+    """Package of "gearfmu.stage.run.trace" is "stage"; of "gearfmu" itself the empty string, which stands above all."""
     return (module.split(".") + [""])[1]
 
 
@@ -66,6 +71,19 @@ def test_imports_point_upward_only() -> None:
         below = {name for name in used if name and ORDER.get(name, len(ORDER)) > ORDER[own]}
         wrong += [f"{path} imports {name}" for name in below | (used - KERNEL_MAY_IMPORT if own == "kernel" else set())]
     assert len(SOURCES) > 300 and not wrong
+
+
+def test_imports_inside_a_package_point_upward_only() -> None:
+    wrong = []
+    for path in SOURCES:
+        package, *rest = path.relative_to(ROOT / "gearfmu").parts
+        order, own = INSIDE.get(package, ()), rest[0] if len(rest) > 1 else ""
+        if own not in order:
+            continue
+        words = [name.split(".") for name in imports_of(path) if name.startswith(f"gearfmu.{package}.")]
+        used = {word[2] if word[2] in order else "" for word in words} & set(order)
+        wrong += [f"{path} imports {name}" for name in used if order.index(name) > order.index(own)]
+    assert not wrong
 
 
 def test_every_way_to_write_an_import_is_seen() -> None:

@@ -15,7 +15,7 @@ import pytest
 from gearfmu.body import reduce_bodies
 from gearfmu.fmu import export, validate
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.new import new_stage
+from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, loaded_te
 

@@ -13,8 +13,8 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.api.settings import Integrator, Level, RunSettings
-from gearfmu.stage.shown import LINES, WIDTH
-from gearfmu.stage.trace import TraceError
+from gearfmu.stage.build.shown import LINES, WIDTH
+from gearfmu.stage.run.trace import TraceError
 
 matplotlib.use("Agg")
 ROOT = Path(__file__).resolve().parents[1]

@@ -28,8 +28,8 @@ from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import Material
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent

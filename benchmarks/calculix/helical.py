@@ -36,11 +36,11 @@ from helical_overlap import bodies_of  # noqa: E402  (found through the line abo
 from gearfmu.body import ReducedBody, load_body  # noqa: E402
 from gearfmu.body.store import save_body  # noqa: E402
 from gearfmu.geometry import PairGeometry, hertz  # noqa: E402
-from gearfmu.spec.gear import MeshSpec  # noqa: E402
-from gearfmu.spec.lead import Misalignment  # noqa: E402
 from gearfmu.spec.stage import StageSpec, load_stage  # noqa: E402
+from gearfmu.spec.tables.gear import MeshSpec  # noqa: E402
+from gearfmu.spec.tables.lead import Misalignment  # noqa: E402
 from gearfmu.stage import assemble  # noqa: E402
-from gearfmu.stage.te import TANGENT, place_of, statics_of  # noqa: E402
+from gearfmu.stage.run.te import TANGENT, place_of, statics_of  # noqa: E402
 
 WIDTH, LAYERS, SLICES = 12e-3, 5, 10
 POSITIONS = 4

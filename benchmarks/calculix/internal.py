@@ -29,8 +29,8 @@ from solid import extruded
 from gearfmu.body import reduce_bodies
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
 
@@ -46,7 +46,7 @@ STAGE, TABLE = HERE / "internal" / "stage.toml", HERE / "internal.csv"
 class Pair:
     """The stage, its engagement by itself and what the kernel says at TORQUES and POSITIONS."""
 
-    spec: GeneralStage
+    spec: Stage
     mesh: RingMesh
     ours: TeResult
 

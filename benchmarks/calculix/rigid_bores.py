@@ -11,8 +11,8 @@ from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.spec.stage import StageSpec
 
 

@@ -27,9 +27,9 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transient import Assembly, Joints, Member, Scheme, integrate
 from gearfmu.scenes.rattle import Rattle, free_pair, started
-from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.stage.nodal import mesh_penalty
+from gearfmu.stage.build.nodal import mesh_penalty
 
 HERE = Path(__file__).parent
 START = Rattle(position=0.1, speed=1.0)

@@ -10,25 +10,22 @@ from typing import Any, Protocol, TypeAlias
 
 from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.bores import with_bores
-from gearfmu.spec.changes import Changes
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.library import model_folder
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.bores import with_bores
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.turning import with_ports
+from gearfmu.spec.reading.changes import Changes
+from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scene import load_scene as load_scene_file
-from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.stage import load_stage as load_stage_file
-from gearfmu.spec.turning import with_ports
 from gearfmu.stage import StageModel
 from gearfmu.stage import assemble as assemble_model
 
 BORES = ("averaging", "rigid")
 PORT_KINDS = ("spring", "torque", "fixed")
 PathLike: TypeAlias = str | os.PathLike[str]
-Stage: TypeAlias = StageSpec | GeneralStage | PlanetarySpec
-AnyStage: TypeAlias = PathLike | Stage | StageModel
+AnyStage: TypeAlias = PathLike | Form | StageModel
 
 
 class Progress(Protocol):
@@ -37,7 +34,7 @@ class Progress(Protocol):
     def __call__(self, fraction: float, text: str = "") -> None: ...
 
 
-def load(stage: PathLike, changes: Changes | None = None) -> Stage:
+def load(stage: PathLike, changes: Changes | None = None) -> Form:
     """The numbers of a stage, checked and in SI: a pair, a general stage or a planetary set.
 
     stage : path of a stage.toml or its folder, or the name of a shipped one ("fzg_c", "fzg_c/stage_relief",
@@ -48,7 +45,7 @@ def load(stage: PathLike, changes: Changes | None = None) -> Stage:
 
     Raises SpecError, which lists everything that is wrong.
     """
-    found: Stage = load_stage_file(stage, changes)
+    found: Form = load_stage_file(stage, changes)
     return found
 
 
@@ -65,7 +62,7 @@ def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
 
 
 def reduce(
-    stage: PathLike | Stage, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
+    stage: PathLike | Form, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
 ) -> list[Any]:
     """The reduced bodies of a stage, in the order of its gears; what is missing or stale is made first (about a minute
     a gear) and stored as .h5.
@@ -83,7 +80,7 @@ def reduce(
     return reduce_bodies(spec, folder, force, told) if apart is None else reduce_apart(spec, apart, force, told)
 
 
-def changed_folder(spec: Stage) -> Path | None:
+def changed_folder(spec: Form) -> Path | None:
     """Where the bodies of a stage lie that asks for others than its file: bodies_<fingerprint> beside it; None where
     its own will do."""
     hashes = body_hashes(spec)
@@ -93,7 +90,7 @@ def changed_folder(spec: Stage) -> Path | None:
 
 
 def assemble(
-    stage: PathLike | Stage,
+    stage: PathLike | Form,
     ports: Mapping[str, str] | None = None,
     bore: str | None = None,
     observe: Sequence[str] = (),
@@ -115,8 +112,8 @@ def assemble(
 
 
 def reduced_to_move(
-    stage: PathLike | Stage, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
-) -> tuple[Stage, list[Any]]:
+    stage: PathLike | Form, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
+) -> tuple[Form, list[Any]]:
     """The stage with these bores, and its bodies: what `assemble` puts together. SpecError, before anything is reduced,
     for a set that does not say all that it needs to move."""
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
@@ -138,11 +135,7 @@ def bodies_folder(spec: Any, bore: str | None) -> Path | None:
 
 
 def with_other_bores(spec: Any, coupling: str) -> Any:
-    """The stage with every bore coupled so, "averaging" or "rigid"; SpecError for a planetary set, whose gears keep
-    averaging bores."""
-    if isinstance(spec, PlanetarySpec):
-        remedy = "the gears of a planetary set keep averaging bores: leave it away"
-        raise SpecError([Problem(str(spec.source), "bore", coupling, remedy)])
+    """`with_bores`, "averaging" or "rigid"; SpecError for any other word."""
     if coupling not in BORES:
         raise SpecError([Problem(str(spec.source), "bore", coupling, f"choose {' or '.join(BORES)}")])
     return with_bores(spec, coupling)

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing_extensions import Unpack
 
 from gearfmu import cosim
-from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_scene, model_of, reduce
+from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, model_of, reduce
 from gearfmu.api.quantities import Quantity, checked, in_si
 from gearfmu.api.settings import RunSettings, Settings
 from gearfmu.cosim.scene_run import Staged
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.profile import Profile, read_profile
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.members import Form
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
+from gearfmu.spec.tables.profile import Profile, read_profile
+from gearfmu.stage import StageModel, Steady, TeResult, Trace
 from gearfmu.stage import simulate as simulate_model
-from gearfmu.stage.set_te import SetTeResult, set_te
-from gearfmu.stage.simulate import Inputs
-from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.set_te import SetTeResult, stage_te
+from gearfmu.stage.run.simulate import Inputs
+from gearfmu.stage.run.steady import Drive, parameters, steady_run
 
 
 def te(
@@ -49,9 +49,7 @@ def te(
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
-    if isinstance(model.spec, PlanetarySpec):
-        return set_te(model, values, positions, pitches, None, **known)
-    return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
+    return stage_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
 
 
 def simulate(
@@ -72,7 +70,7 @@ def simulate(
     settle : from here on the report takes results and spectra.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
     profile : among the keyword arguments, torque, speed or both over time in place of the arguments: a CSV file with a
-        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.profile.Profile` of arrays in SI.
+        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.tables.profile.Profile` of arrays in SI.
 
     The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
     setting, SpecError for a port that this cannot turn, for a profile that cannot be used and for a torque or a speed
@@ -124,7 +122,7 @@ def wound_up(stage: AnyStage, torque: Quantity, speed: Quantity) -> Steady:
 def run(
     scene: PathLike | SceneSpec,
     out: PathLike | None = None,
-    stage: PathLike | Stage | None = None,
+    stage: PathLike | Form | None = None,
     unit: PathLike = "fmu",
     verify: bool = False,
     progress: Progress | None = None,
@@ -153,7 +151,7 @@ def run(
 
 def assemble_in_scene(
     scene: PathLike | SceneSpec,
-    stage: PathLike | Stage | None = None,
+    stage: PathLike | Form | None = None,
     observe: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> StageModel:
@@ -167,7 +165,7 @@ def assemble_in_scene(
     return _staged(*_scene_and_stage(scene, stage), observe, progress).model
 
 
-def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None) -> tuple[SceneSpec, Stage | None]:
+def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Form | None) -> tuple[SceneSpec, Form | None]:
     """The scene with the name of the chosen stage, and that stage; None for the scene's own."""
     spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     if stage is None:
@@ -178,7 +176,7 @@ def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None
     return spec.model_copy(update={"stage": choice}), own
 
 
-def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progress: Progress | None) -> Staged:
+def _staged(scene: SceneSpec, own: Form | None, observe: Sequence[str], progress: Progress | None) -> Staged:
     """The scene with the model of the stage, of its own when None; bodies that are missing are made."""
     own = load(scene.stage.name) if own is None else own
     as_general(own)

@@ -9,9 +9,9 @@ from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
 from gearfmu.api.quantities import Quantity
-from gearfmu.spec.profile import Profile
+from gearfmu.spec.scene import Level
+from gearfmu.spec.tables.profile import Profile
 
-Level: TypeAlias = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator: TypeAlias = Literal["dg4", "mix4", "em", "rk45", "central"]
 Settings = TypedDict(
     "Settings",

@@ -21,12 +21,14 @@ from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import Progress, elastic_modes
+from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
-from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported_carrier import imported_carrier
-from gearfmu.reduction.imported_gear import (
+from gearfmu.reduction.imported.carrier import imported_carrier
+from gearfmu.reduction.imported.gear import (
     BORE,
     CheckedGear,
     ImportedGear,
@@ -35,14 +37,12 @@ from gearfmu.reduction.imported_gear import (
     hinge_problem,
     imported_gear,
 )
-from gearfmu.reduction.imported_sector import ImportedSector
-from gearfmu.reduction.imported_whole import Held, imported_gear_order
-from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
-from gearfmu.reduction.modal import Progress, elastic_modes
-from gearfmu.reduction.statics import Statics, static_tables
-from gearfmu.spec.general import RingBody
-from gearfmu.spec.imported import ImportSpec, RingImportSpec
-from gearfmu.spec.members import Member
+from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
+from gearfmu.reduction.imported.sector import ImportedSector
+from gearfmu.reduction.imported.whole import Held, imported_gear_order
+from gearfmu.spec.forms.general import RingBody
+from gearfmu.spec.forms.members import Form, Member, carrier_of
+from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
 
 
 def check_gear(member: Member) -> CheckedGear:
@@ -93,16 +93,17 @@ def imported_sector_mesh(member: Member) -> FeMesh:
     return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, member.geometry.z, cut.cut_minus, cut.cut_plus)
 
 
-def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
-    """The imported carrier of a PlanetarySpec before reduction, known to be one solid, and plain facts. MeshError."""
-    found = imported_carrier(spec)
+def imported_carrier_order(spec: Form) -> tuple[FullOrder, dict[str, Any]]:
+    """The imported carrier of a planetary set before reduction, known to be one solid, and plain facts. MeshError."""
+    found, source = imported_carrier(spec), carrier_of(spec).part.imported
+    assert source is not None
     problem, space = None, elastic(found.full)
     try:
         problem = hinge_problem(space, float(space.modes(1)[0][0]))
     except (FactorError, ModesError) as error:
         problem = f"the stiffness matrix cannot be factorised ({error}): it is not of one free solid body"
     if problem:
-        raise MeshError(f"{spec.carrier.imported.file}: {problem}")
+        raise MeshError(f"{source.file}: {problem}")
     return found.full, found.facts
 
 

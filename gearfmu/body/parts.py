@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.reduced import Rim, Tangent
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.cyclic.modal import Modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import Statics
 from gearfmu.reduction.display import Display, Outline, Shapes, unfold_sectors, whole_surface
-from gearfmu.reduction.flank import Points, ToothFlank
-from gearfmu.reduction.frf import FrfError
-from gearfmu.reduction.modal import Modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import Statics
-from gearfmu.spec.gear import MeshSpec
+from gearfmu.spec.tables.gear import MeshSpec
 
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 _PICTURE_LOADS = 5

@@ -9,9 +9,9 @@ import numpy as np
 
 from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, Entry, entries_of
 from gearfmu.errors import BodyError
+from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.cyclic.spin import Spin
 from gearfmu.reduction.display import Display, Shapes
-from gearfmu.reduction.frf import FrfError
-from gearfmu.reduction.spin import Spin
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 

@@ -15,9 +15,9 @@ from gearfmu.body.packing import read_entry, write_entry
 from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.cyclic.spin import Spin
 from gearfmu.reduction.display import Display, Shapes, whole_surface
-from gearfmu.reduction.frf import FrfError
-from gearfmu.reduction.spin import Spin
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms

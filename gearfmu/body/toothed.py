@@ -25,15 +25,15 @@ from gearfmu.body.provenance import provenance
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.femesh import mesh_report, sector_mesh
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.display import outline
-from gearfmu.reduction.flank import Points, ToothFlank
-from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
-from gearfmu.spec.general import ToothedBody
-from gearfmu.spec.members import Member
+from gearfmu.spec.forms.general import ToothedBody
+from gearfmu.spec.forms.members import Member
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 Progress = Callable[[str, float], None]

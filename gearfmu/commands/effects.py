@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-WHIRL_BAND = 15e3  # Hz
 FIELDS = ("formula", "matters", "off", "switch", "code")
 HEAD = """# Effects
 
@@ -29,7 +28,7 @@ paper, bodies and modes against rigid ones, tip corners at 80 N·m, pitch errors
 def effects(stage: str | None) -> None:
     """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs
-    from gearfmu.stage.inertia import NEGLECTED
+    from gearfmu.stage.run.inertia import NEGLECTED
 
     found, numbers = costs(), _numbers(stage) if stage else {}
     for effect in EFFECTS:
@@ -66,7 +65,7 @@ def effects_page() -> str:
 
 
 def _left_out_page() -> str:
-    from gearfmu.stage.inertia import NEGLECTED
+    from gearfmu.stage.run.inertia import NEGLECTED
 
     rows = [f"| {term.name} | {_cell(term.formula)} | {term.why} |\n" for term in NEGLECTED]
     return (
@@ -101,32 +100,30 @@ def _numbers(stage: str) -> dict[str, str]:
     """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.spec.planetary import PlanetarySpec
-    from gearfmu.spec.shapes import gear_shape
+    from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape
+    from gearfmu.stage.build.flanks import FlankField
     from gearfmu.stage.effects import torque_on_flanks_alone
-    from gearfmu.stage.flanks import FlankField
-    from gearfmu.stage.meshes import mesh_geometry
 
     model = model_of(stage)
     spec = model.stage
     meshes, gears, turning = spec.engagements, spec.gears, "no carrier: it costs nothing"
-    if isinstance(model.spec, PlanetarySpec):
-        meshes = meshes[:: model.spec.set.planets]
-        turning = f"up to {model.spec.speed_max:g} rad/s of the carrier"
-    stored, modes = _modes(model)
-    widths = [min(g.face_width for g in gears if g.name in mesh.gears) for mesh in meshes]
+    if spec.carriers:
+        meshes = meshes[:: len(meshes) // 2]
+        turning = f"up to {model.spec.limits[1][0]:g} rad/s of the carrier"
+    modes = model.modes_of_levels()
+    widths = [face_width(spec, mesh) for mesh in meshes]
     alone = [torque_on_flanks_alone(model, mesh.name) for mesh in meshes]
     reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in gears]
     fields = [FlankField(gear, gear_shape(gear)) for gear in gears]
     misplaced = [1e6 * float(abs(field.index()).max()) for field in fields]
     deviating = [1e6 * field.span for field in fields]
     return {
-        "elastic": f"{stored} stored modes",
-        "modes": modes,
+        "elastic": f"{modes['full']} stored modes",
+        "modes": ", ".join(f"{name} {count}" for name, count in modes.items()),
         "residual": "of what is not dynamic",
         "hertz": f"local law up to {_listed(f'{mesh.torque_max:g} N·m' for mesh in meshes)}",
         "slices": f"{spec.slices} over {_listed(f'{1e3 * width:g} mm' for width in widths)}",
-        "coast_flank": _listed(f"{1e6 * mesh_geometry(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
+        "coast_flank": _listed(f"{1e6 * mesh_shape(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
         + " of backlash along the normal",
         "contact_damping": _listed(f"{mesh.damping:g} N·s/m" for mesh in meshes) + " per metre of face width",
         "tip_relief": _listed(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),
@@ -164,32 +161,17 @@ def _film(spec: Any, mesh: Any) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
-    from gearfmu.stage.film import REACH, film_impulse
-    from gearfmu.stage.meshes import mesh_geometry
+    from gearfmu.stage.build.film import REACH, film_stop
 
-    pair = mesh_geometry(spec, mesh)
-    a, b = (gear.r_b for gear in pair.gears)
-    rings = any(gear.name in mesh.gears and gear.kind == "ring" for gear in spec.gears)
-    reach = b - a if rings else a + b
-    rolls = [pair.length * r_b / reach for r_b in (a, b)]
-    radius = rolls[0] * rolls[1] / (rolls[1] - rolls[0] if rings else rolls[0] + rolls[1])
-    width = min(gear.face_width for gear in spec.gears if gear.name in mesh.gears)
-    taken = film_impulse(REACH, mesh.film.viscosity, mesh.film.roughness, radius, width)
-    return f"takes {1e3 * taken:.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
+    return f"takes {1e3 * film_stop(spec, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
 
 def _whirling(model: Any) -> str:
     """What turning does to the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
     from gearfmu.body import load_bodies
-    from gearfmu.stage.assembly import stage_group
-    from gearfmu.stage.inertia import inertia_terms, whirl_shift
-    from gearfmu.stage.observed import gear_bodies
+    from gearfmu.stage.run.inertia import WHIRL_BAND, whirling
 
-    bodies = load_bodies(model.spec)
-    shift = whirl_shift(model.stage, stage_group(model.spec, bodies), WHIRL_BAND)
-    toothed = gear_bodies(model.spec, bodies)
-    coupled = max((gear.whirl for gear in inertia_terms(model.stage, toothed)), default=0.0)
-    silent = sorted({body.name for body in toothed.values() if body.spin is None})
+    shift, coupled, silent = whirling(model.spec, load_bodies(model.spec))
     missing = f"; not known of elastic patterns of {_listed(silent)}: `gearfmu reduce STAGE --force`" if silent else ""
     return (
         f"at speed_max frequencies of bodies on their bearings below {WHIRL_BAND / 1e3:g} kHz move by up to "
@@ -200,9 +182,9 @@ def _whirling(model: Any) -> str:
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of what is left out, a line for every gear whose file tells."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.spec.expand import as_general
-    from gearfmu.stage.inertia import inertia_terms
-    from gearfmu.stage.observed import gear_bodies
+    from gearfmu.spec.forms.expand import as_general
+    from gearfmu.stage.build.observed import gear_bodies
+    from gearfmu.stage.run.inertia import inertia_terms
 
     spec, bodies = bodies_of(stage)
     for gear in inertia_terms(as_general(spec), gear_bodies(spec, bodies)):
@@ -225,14 +207,3 @@ def _stiffness(radial: float | str | None) -> str:
 
 def _idle(idle: bool) -> str:
     return ": none, it costs nothing" if idle else ""
-
-
-def _modes(model: Any) -> tuple[int, str]:
-    """Modes of both bodies, and how many of them are dynamic at which level."""
-    counts = {}
-    for level, name in enumerate(("rigid", "fast", "standard", "full")):
-        kernel = model.kernel(level=float(level))
-        kernel.prepare()
-        kernel.initialize()
-        counts[name] = int(kernel.get("solver.n_dyn"))
-    return counts["full"], ", ".join(f"{name} {count}" for name, count in counts.items())

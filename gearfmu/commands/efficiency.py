@@ -22,6 +22,6 @@ def efficiency(stage: str, torque: float, speed: float, pitches: int) -> None:
 
     The coefficient follows what the stage says ([contact] friction), else it is 0.05. Losses of bearings, seals and
     churned oil are in neither number."""
-    from gearfmu.stage.efficiency import mesh_efficiency
+    from gearfmu.stage.run.efficiency import mesh_efficiency
 
     echo_pairs(mesh_efficiency(model_of(stage), torque, speed, pitches=pitches).columns())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +83,7 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 def _shipped(name: Path) -> Path:
     """File of a shipped scene, or of a stage as `find_stage` knows it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
-    from gearfmu.spec.library import find_stage, shipped_stages
+    from gearfmu.spec.reading.library import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
 
     scenes = shipped_scenes()
@@ -102,8 +101,8 @@ def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
     from gearfmu.body.layout import FORMAT
     from gearfmu.hdf5 import format_of
-    from gearfmu.stage.deformation import FILE as DEFORMATION
-    from gearfmu.stage.trace import Trace
+    from gearfmu.stage.run.deformation import FILE as DEFORMATION
+    from gearfmu.stage.run.trace import Trace
 
     if format_of(path) in (FORMAT, INTERFACE_FORMAT):
         return inspect_file(path)
@@ -126,7 +125,7 @@ def _hdf5(path: Path) -> dict[str, Any]:
 
 
 def _deformation(path: Path) -> dict[str, Any]:
-    from gearfmu.stage.deformation import Deformation
+    from gearfmu.stage.run.deformation import Deformation
 
     found = Deformation.load(path)
     return {
@@ -141,7 +140,8 @@ def _deformation(path: Path) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    from gearfmu.spec.base import read_toml
+    from gearfmu.spec.forms.derived import derived
+    from gearfmu.spec.reading.base import read_toml
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage
 
@@ -152,7 +152,7 @@ def _toml(path: Path) -> dict[str, Any]:
         "file": str(path),
         "kind": "stage",
         **spec.model_dump(mode="json", exclude={"kind"}),
-        "derived": _derived(spec),
+        "derived": derived(spec),
         "reduction": _needs(spec),
     }
 
@@ -173,8 +173,8 @@ def _needs(spec: Any) -> Any:
 
 
 def _toml_with_units(path: Path) -> dict[str, Any]:
+    from gearfmu.spec.reading.shown import shown
     from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.shown import shown
     from gearfmu.spec.stage import load_stage
 
     found = _toml(path)
@@ -192,93 +192,6 @@ def in_units(found: Any, key: str = "") -> Any:
         return {name: in_units(value, key if name in ("sun_planet", "planet_ring") else name)
                 for name, value in found.items()}  # fmt: skip
     return quantity_text(found, UNITS[key]) if isinstance(found, float) and key in UNITS else found
-
-
-def _derived(spec: Any) -> dict[str, Any]:
-    """What follows from the numbers of a stage (ISO 21771): working pressure angle, contact ratio, radii in m."""
-    from gearfmu.geometry import PairGeometry
-
-    if spec.kind == "planetary_set":
-        return _derived_set(spec)
-    if spec.kind == "general":
-        from gearfmu.stage.meshes import mesh_geometry
-
-        return {mesh.name: _derived_pair(mesh_geometry(spec, mesh), mesh.gears) for mesh in spec.engagements}
-    pair = PairGeometry.of(spec)
-    helix = _derived_helix(spec, pair) if spec.pair.helix_angle else {}
-    return _derived_pair(pair, [gear.name for gear in spec.gears]) | helix
-
-
-def _derived_pair(pair: Any, names: Sequence[str]) -> dict[str, Any]:
-    """What follows from the numbers of two gears in mesh."""
-    import math
-
-    radii = {
-        name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
-        for name, shape in zip(names, pair.gears, strict=True)
-    }
-    return {
-        "working_pressure_angle_deg": math.degrees(pair.alpha_wt),
-        "contact_ratio": pair.contact_ratio,
-        "base_pitch": pair.base_pitch,
-        **radii,
-    }
-
-
-def _derived_helix(spec: Any, pair: Any) -> dict[str, Any]:
-    """What a helical pair has besides: angles of the transverse section, overlap of the common face width."""
-    import math
-
-    overlap = pair.overlap_ratio(min(gear.face_width for gear in spec.gears))
-    return {
-        "transverse_pressure_angle_deg": math.degrees(pair.gears[0].alpha_t),
-        "base_helix_angle_deg": math.degrees(pair.gears[0].beta_b),
-        "overlap_ratio": overlap,
-        "total_contact_ratio": pair.contact_ratio + overlap,
-        "virtual_teeth": {g.name: s.z_virtual for g, s in zip(spec.gears, pair.gears, strict=True)},
-    }
-
-
-def _derived_set(spec: Any) -> dict[str, Any]:
-    """What follows from the numbers of a planetary set."""
-    import math
-
-    from gearfmu.geometry.carrier import CarrierGeometry
-    from gearfmu.geometry.planetary import PlanetaryGeometry
-    from gearfmu.spec.planetary_checks import mesh_torque, ring_half_width
-
-    g = PlanetaryGeometry.of(spec)
-    shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
-    carrier = CarrierGeometry.of(spec)
-    return {
-        "speed_ratio_sun_to_carrier": g.ratio,
-        "working_pressure_angle_deg": {
-            "sun_planet": math.degrees(g.sun_mesh.alpha_wt), "planet_ring": math.degrees(g.ring_mesh.alpha_wt)
-        },
-        "contact_ratio": {"sun_planet": g.sun_mesh.contact_ratio, "planet_ring": g.ring_mesh.contact_ratio},
-        "ring_least_tip_radius": g.ring_mesh.least_tip_radius,
-        "gap_between_planets": g.neighbour_clearance,
-        "sun_torque_in_one_mesh": mesh_torque(spec),
-        "largest_hertz_half_width_planet_ring": ring_half_width(spec, g.ring_mesh),
-        "carrier_mass": carrier.volume * spec.carrier.material.density,
-        **{name: {"r_b": s.r_b, "r_f": s.r_f, "r_a": s.r_a} for name, s in shapes.items()},
-        **(_derived_set_helix(spec, g) if spec.set.helix_angle else {}),
-    }  # fmt: skip
-
-
-def _derived_set_helix(spec: Any, g: Any) -> dict[str, Any]:
-    """What a helical set has besides: angle and overlap, and what torque_max presses along the axis in the mean."""
-    import math
-
-    sun = g.sun_mesh.gears[0]
-    axial = spec.torque_max / g.ratio / spec.set.planets / sun.r * math.tan(abs(sun.beta))
-    apart = g.sun_mesh.r_w[1] + g.ring_mesh.planet_pitch_radius
-    return {
-        "base_helix_angle_deg": math.degrees(sun.beta_b),
-        "overlap_ratio": sun.overlap_ratio(min(gear.face_width for gear in spec.gears)),
-        "axial_force_of_a_mesh": axial,
-        "tilting_moment_on_a_pin": axial * apart,
-    }
 
 
 def _fmu(path: Path) -> dict[str, Any]:

@@ -67,7 +67,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     from gearfmu.api.results import windup_file, with_windup
     from gearfmu.commands.models import model_in_scene, model_of
     from gearfmu.commands.settings import parameters
-    from gearfmu.stage.windup import write_starts
+    from gearfmu.stage.run.windup import write_starts
 
     scene, observe = how.pop("scene"), how.pop("observe")
     if scene is not None:

@@ -86,7 +86,7 @@ def frf(stage: str, body: str, **options: Any) -> None:
 
 def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
     """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -106,8 +106,8 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrde
         return carrier_full_order(spec, **factor)
     if imported is not None:
         return imported_full_order(toothed[body])
-    if body == "ring" and spec.kind == "planetary_set":
-        return ring_full_order(spec, **factor)
+    if toothed[body].gear.kind == "ring":
+        return ring_full_order(spec, name=body, **factor)
     return gear_full_order(spec, body, **factor)
 
 

@@ -32,7 +32,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -47,10 +47,10 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
-    from gearfmu.reduction.imported_carrier import imported_carrier
-    from gearfmu.spec.general import RingBody
-    from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-    from gearfmu.spec.members import member_of
+    from gearfmu.reduction.imported.carrier import imported_carrier
+    from gearfmu.spec.forms.general import RingBody
+    from gearfmu.spec.forms.members import member_of
+    from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     if name == "carrier":
         if not options["bore"] or len(options["bolts"]) != spec.set.planets:
@@ -69,25 +69,18 @@ def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) ->
     import numpy as np
 
     from gearfmu.errors import MeshError
-    from gearfmu.fem import solids
     from gearfmu.fem.mesh_checks import mesh_problems
     from gearfmu.femesh.imported import read_mesh
+    from gearfmu.reduction.imported import files
 
     mesh = read_mesh(file, length, ignore)
     if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
         raise MeshError(f"{file}: " + "; ".join(problems))
-    quality = np.concatenate(
-        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
-    )
     return {
+        **files.mesh_facts(mesh),
         "file": str(file),
-        "nodes": len(mesh.nodes),
-        "elements": {kind: len(block) for kind, block in mesh.elements.items()},
-        "raised_to_quadratic": mesh.raised,
         "size_mm": [float(1e3 * size) for size in np.ptp(mesh.nodes, axis=0)],
         "axis": axis,
-        "scaled_jacobian_min": float(quality.min()),
-        "scaled_jacobian_mean": float(quality.mean()),
         "sets": {name: f"{len(nodes)} nodes" for name, nodes in sorted(mesh.sets.items())} or "none",
     }
 

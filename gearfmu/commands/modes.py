@@ -67,8 +67,8 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
-    from gearfmu.stage.limits import engagements_per_turn, largest_speed, largest_torque
-    from gearfmu.stage.trace import write_columns
+    from gearfmu.stage.run.limits import engagements_per_turn, largest_speed, largest_torque
+    from gearfmu.stage.run.trace import write_columns
 
     model = assemble(spec, bodies)
     found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
@@ -131,14 +131,16 @@ def table(body: Any) -> list[str]:
 
 def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
     """how: the ring on its mounts, the carrier without couplings."""
+    from gearfmu.spec.forms.members import CARRIER, carriers
     from gearfmu.spec.stage import load_stage
 
     spec, (mounted, uncoupled) = load_stage(stage), how
-    if uncoupled and (spec.kind != "planetary_set" or name != "carrier"):
+    of_set = bool(carriers(spec))
+    if uncoupled and not (of_set and name == CARRIER):
         raise click.BadParameter("only the carrier of a planetary set has couplings", param_hint="--uncoupled")
-    if mounted and (spec.kind != "planetary_set" or name != "ring"):
+    if mounted and not (of_set and name == "ring"):
         raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
-    if spec.kind == "planetary_set":
+    if of_set:
         return _of_set(spec, name, count, how)
     names = [gear.name for gear in spec.gears]
     _check(name, names)
@@ -151,7 +153,7 @@ def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyMo
 
 def _of_set(spec: Any, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
     from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
-    from gearfmu.spec.members import body_names
+    from gearfmu.spec.forms.members import body_names
 
     _check(name, body_names(spec))
     with progress_bar("shapes") as progress:
@@ -172,7 +174,7 @@ def _write(body: Any, out: Path) -> None:
     """Table, contact sheet, and a picture and a .vtu a frequency."""
     from gearfmu.modes.vtu import write_mode
     from gearfmu.report.modes import mode_columns, write_contact_sheet, write_mode_picture
-    from gearfmu.stage.trace import write_columns
+    from gearfmu.stage.run.trace import write_columns
 
     out.mkdir(parents=True, exist_ok=True)
     write_columns(out / f"{body.name}_modes.csv", mode_columns(body.modes))

@@ -68,8 +68,7 @@ class _Teeth(click.ParamType):
 def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: Any) -> int:
     """Write NAME/stage.toml, every field commented: from numbers of teeth, module and face width with everything else
     proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
-    from gearfmu.spec.new import new_stage
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.spec.proposals.new import new_stage
 
     given = {key: value for key, value in numbers.items() if value not in (None, False)}
     forms = [word for word, there in (("--like", like), ("--rexs", rexs), ("--teeth", given)) if there]
@@ -80,24 +79,26 @@ def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: A
     if rexs is not None:
         return _new_from_rexs(name, rexs, stage)
     path = new_stage(name, like or "fzg_c")
-    further = "" if load_stage(path).kind == "planetary_set" else f" and 'gearfmu export {path}'"
-    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}'{further}.")
+    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}' and 'gearfmu export {path}'.")
     return 0
 
 
 def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
     """The stage file of teeth, module and width, and the shape that it proposes."""
-    from gearfmu.spec.proposal import Wish, new_from_numbers
+    from gearfmu.spec.forms.expand import as_general
+    from gearfmu.spec.forms.shapes import centre_distance
+    from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
     from gearfmu.spec.stage import load_stage
 
     path = new_from_numbers(name, Wish(**({"teeth": ()} | given)))
     spec = load_stage(path)
-    shared = spec.set if spec.kind == "planetary_set" else spec.pair
+    stage = as_general(spec)
+    mesh = stage.engagements[0]
     shape = {
-        "centre distance": f"{1e3 * shared.center_distance:.6g} mm",
+        "centre distance": f"{1e3 * centre_distance(stage, mesh):.6g} mm",
         "profile shifts": ", ".join(f"{gear.profile_shift:.4f}" for gear in spec.gears),
         "tip diameters": ", ".join(f"{1e3 * gear.tip_diameter:.6g}" for gear in spec.gears) + " mm",
-        "backlash": f"{1e3 * shared.backlash:.4g} mm",
+        "backlash": f"{1e3 * mesh.backlash:.4g} mm",
         "torque_max": f"{spec.torque_max:.4g} N*m",
         "speed_max": f"{30 / math.pi * spec.speed_max:.4g} rpm",
     }
@@ -112,7 +113,7 @@ def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
     """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
     from gearfmu.errors import SpecError
     from gearfmu.rexs import draft_from_rexs
-    from gearfmu.spec.new import write_drafted
+    from gearfmu.spec.proposals.new import write_drafted
     from gearfmu.spec.stage import load_stage
 
     draft = draft_from_rexs(rexs, stage)

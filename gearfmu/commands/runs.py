@@ -114,8 +114,8 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
     profile, wound up by the torque."""
     from gearfmu.commands.models import model_of
     from gearfmu.commands.settings import parameters
-    from gearfmu.spec.profile import read_profile
-    from gearfmu.stage.steady import Drive, steady_run
+    from gearfmu.spec.tables.profile import read_profile
+    from gearfmu.stage.run.steady import Drive, steady_run
 
     if profile is None and (missing := [f"--{name}" for name in ("torque", "speed") if drive[name] is None]):
         raise click.UsageError(f"give {' and '.join(missing)}, or a --profile")
@@ -146,7 +146,7 @@ def demo(out: Path) -> int:
 def deformed(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the gears that a run recorded deformed, FOLDER/deformation.h5, as .vtu with a .pvd for ParaView."""
     from gearfmu.api.results import stage_and_bodies
-    from gearfmu.stage.deformation import FILE_NAME, Deformation
+    from gearfmu.stage.run.deformation import FILE_NAME, Deformation
 
     found = Deformation.load(path / FILE_NAME if path.is_dir() else path)
     home = path if path.is_dir() else path.parent
@@ -249,9 +249,9 @@ def write_deformed(deformation: Any, folder: Path, spec: Any, reduced: Any) -> l
     bodies."""
     from gearfmu.modes.deformed import deformed_gear
     from gearfmu.modes.vtu import write_series
-    from gearfmu.spec.expand import as_general
-    from gearfmu.stage.meshes import tooth_phases
-    from gearfmu.stage.observed import gear_bodies
+    from gearfmu.spec.forms.expand import as_general
+    from gearfmu.stage.build.meshes import tooth_phases
+    from gearfmu.stage.build.observed import gear_bodies
 
     bodies = gear_bodies(spec, reduced)
     phases = tooth_phases(as_general(spec))

@@ -14,7 +14,7 @@ def parameters(model: StageModel, settings: tuple[str, ...], option: str = "--se
     """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for what the model
     does not know, SpecError for numbers out of range."""
     from gearfmu.errors import ModelError
-    from gearfmu.stage import steady
+    from gearfmu.stage.run import steady
 
     model.kernel_variables()  # a model that the kernel refuses is not the option's fault
     pairs = (text.partition("=") for text in settings)

@@ -27,7 +27,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -62,7 +62,7 @@ def reduce(stage: str, out: Path | None, force: bool, coarse: bool) -> None:
     import time
 
     from gearfmu.body import current_bodies, reduce_bodies
-    from gearfmu.spec.coarse import STATED_ERROR, coarse_stage
+    from gearfmu.spec.proposals.coarse import STATED_ERROR, coarse_stage
     from gearfmu.spec.stage import load_stage
 
     if coarse:
@@ -95,7 +95,7 @@ def _described(body: Any, kept: bool) -> str:
 def _cost(body: Any, kept: bool) -> str:
     """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
     mesh, made = body.mesh, body.provenance
-    memory, sectors = made["peak_memory_GB"], getattr(body, "teeth", mesh["teeth"])
+    memory, sectors = made["peak_memory_GB"], mesh["teeth"]
     return (
         f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; "
         + ("up to date, only read; it was reduced in " if kept else "reduced in ")

@@ -43,12 +43,13 @@ def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bo
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices; of a planetary set also
     over the number of planets and single effects (sets.csv)."""
     from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.spec.forms.members import carriers
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage, require_pair
 
     specs = [load_scene(scene) for scene in scenes]
     stages = {spec.stage.name: load_stage(spec.stage.name) for spec in specs}
-    sets = {name for name, stage in stages.items() if stage.kind == "planetary_set"}
+    sets = {name for name, stage in stages.items() if carriers(stage)}
     if sets and set(tables) != {"errors"}:
         raise click.UsageError(f"{', '.join(sorted(sets))} is a planetary set: it has the table errors alone")
     for name, stage in stages.items():
@@ -119,6 +120,7 @@ def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:
 
 
 def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | None) -> list[Any]:
+    from gearfmu.stage.build.levels import LEVELS
     from gearfmu.study import cuts, limits, order, refined
     from gearfmu.study.ladder import quick_scene
 
@@ -126,7 +128,7 @@ def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | No
     if table == "cuts":
         return [row for scene in windows for row in cuts.cut_rows(scene, quick, progress)[0]]
     if table == "limits":
-        levels = ("fast",) if quick else limits.LEVELS
+        levels = ("fast",) if quick else LEVELS
         return [row for scene in windows for row in limits.limit_rows(scene, levels, progress=progress)]
     if table == "bodies":
         stages = {spec.stage.name for spec in specs}

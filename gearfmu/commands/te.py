@@ -60,11 +60,11 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
-    if model.spec.kind == "planetary_set":
+    if model.stage.carriers:
         return _of_set(model, list(torques), out, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
-    from gearfmu.stage.trace import write_columns
+    from gearfmu.stage.run.trace import write_columns
 
     meshes = [mesh.name for mesh in model.stage.engagements]
     for mesh in meshes:
@@ -99,7 +99,7 @@ def _draw_flanks(model: Any, out: Path) -> None:
 
 def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
     """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
-    from gearfmu.stage.limits import beyond_limits
+    from gearfmu.stage.run.limits import beyond_limits
 
     for torque in torques:
         for text in beyond_limits(model, torque):
@@ -112,8 +112,8 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
             "a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings"
         )
     from gearfmu.report.te import write_set_plot
-    from gearfmu.stage.set_te import set_te
-    from gearfmu.stage.trace import write_columns
+    from gearfmu.stage.run.set_te import set_te
+    from gearfmu.stage.run.trace import write_columns
 
     with progress_bar(f"te {model.spec.name}") as progress:
         result = set_te(model, torques, where["positions"], where["pitches"], progress)
@@ -130,7 +130,7 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
 
 def above_sharing(result: Any, load_sharing: float) -> list[str]:
     """Where a planet of a set carries more than the stage file's `load_sharing` says."""
-    from gearfmu.stage.set_te import GEARS
+    from gearfmu.stage.run.set_te import GEARS
 
     return [
         f"{torque:g} N·m: K_gamma {most:.3f} at the {gear}, above load_sharing = {load_sharing:g} of the stage file"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearfmu.errors import CouplingError
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 AVERAGE_OVER = 10e-3  # s: in transient runs AC is the signal minus this moving average of the reference
 

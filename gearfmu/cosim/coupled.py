@@ -14,7 +14,7 @@ from gearfmu.cosim.recorder import Recorder
 from gearfmu.cosim.shaft_loads import Loaded
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError, FmuError, ModelError, SimulationError
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 OK = "ok"
 STOPPED = "stopped"  # a call was refused: the message says which

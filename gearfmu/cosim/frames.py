@@ -10,9 +10,9 @@ import numpy as np
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage.deformation import Deformation, GearMotion
-from gearfmu.stage.groups import MOTIONS
-from gearfmu.stage.observed import MODE, MOTION
+from gearfmu.stage.build.groups import MOTIONS
+from gearfmu.stage.build.observed import MODE, MOTION
+from gearfmu.stage.run.deformation import Deformation, GearMotion
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import Any
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.fmu.opened import OpenedFmu
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import PortSpec
 
 UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": "kg*m^2"}
 UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}

@@ -10,14 +10,14 @@ from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.start import Start
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.parts import GROUND, Drivetrain
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import undriven
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import undriven
+from gearfmu.spec.scenes.parts import GROUND, Drivetrain
+from gearfmu.spec.tables.ports import PortSpec
 
 
-def part_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
+def part_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
     """The stage's ports that parts hang on, as spring ports. SpecError with every one that the stage does not have,
     every shaft without stiffness or damping, and every spring port of the stage that nothing hangs on."""
     assert scene.drivetrain is not None
@@ -33,7 +33,7 @@ def part_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
     return found
 
 
-def _port_problems(file: str, parts: Drivetrain, stage: GeneralStage) -> Iterator[Problem]:
+def _port_problems(file: str, parts: Drivetrain, stage: Stage) -> Iterator[Problem]:
     for name, shaft in parts.ports.items():
         field, own = f"drivetrain.ports.{name}", stage.ports.get(name)
         if own is None:

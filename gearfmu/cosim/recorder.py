@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.cosim.units import Recorded, Variable
 from gearfmu.errors import CouplingError
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 DRIVE = "drive."  # drivetrain variables are recorded under this prefix
 

@@ -29,15 +29,15 @@ from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import require_driven, shafts_of, with_ports
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.spec.turning import require_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.deformation import FILE_NAME
-from gearfmu.stage.observed import gear_hashes
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.observed import gear_hashes
+from gearfmu.stage.run.deformation import FILE_NAME
+from gearfmu.stage.run.trace import Trace
 
 WHOLE = Wiring()
 
@@ -141,7 +141,7 @@ def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
     return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
-def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
+def in_drivetrain(scene: SceneSpec, spec: StageSpec | Stage) -> StageSpec | Stage:
     """The stage with the ports that the scene's drivetrain needs. SpecError where it leaves a spring port alone, or has
     something for a port that the stage does not have."""
     general = as_general(spec)

@@ -24,11 +24,11 @@ import numpy as np
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import CouplingError, Problem, SpecError
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import turns, undriven
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.shaft_loads import ShaftLoad
-from gearfmu.spec.turning import turns, undriven
+from gearfmu.spec.scenes.shaft_loads import ShaftLoad
+from gearfmu.spec.tables.ports import PortSpec
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on
@@ -185,7 +185,7 @@ class TorqueMaster:
         return np.array([getattr(law, what)(*when, w) for law, w in laws])
 
 
-def torque_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
+def torque_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
     """The stage's loaded ports as torque ports. SpecError with every load of a port that the stage does not have, and
     every spring port that nothing would drive."""
     assert scene.shaft_loads is not None
@@ -199,7 +199,7 @@ def torque_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
     return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}
 
 
-def start_speeds(scene: SceneSpec, stage: GeneralStage, input_port: str) -> dict[str, float]:
+def start_speeds(scene: SceneSpec, stage: Stage, input_port: str) -> dict[str, float]:
     """Speed (rad/s) of every torque port at the start: that of the input, and what is geared to it by its teeth; others
     begin at rest."""
     turning = turns(stage, input_port)

@@ -17,10 +17,10 @@ import numpy as np
 from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.parts import GROUND, Drivetrain
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import rolling, solved
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import rolling, solved
+from gearfmu.spec.scenes.parts import GROUND, Drivetrain
 
 SAME = 1e-9  # relative to the largest speed: speeds that do not differ
 SMALL = 1e-9  # N·m: torques that are none
@@ -54,7 +54,7 @@ class _Joints:
         return [*self.meshes, *self.ports.values(), *self.shafts.values()]
 
 
-def start_of(scene: SceneSpec, stage: GeneralStage, rest: Rest) -> Start:
+def start_of(scene: SceneSpec, stage: Stage, rest: Rest) -> Start:
     """The start of a scene's own parts. rest: angles (rad) of the ports' bores under torques (N·m) on them, by port.
     SpecError: `start_speeds_of`."""
     parts = scene.drivetrain
@@ -68,7 +68,7 @@ def start_of(scene: SceneSpec, stage: GeneralStage, rest: Rest) -> Start:
     return Start({name: speed[name] for name in parts.inertias}, angle, ground, on_ports)
 
 
-def start_speeds_of(scene: SceneSpec, stage: GeneralStage) -> dict[str, float]:
+def start_speeds_of(scene: SceneSpec, stage: Stage) -> dict[str, float]:
     """Speeds (rad/s) of inertias, and of the stage's rotors as `stage.<name>`, from the input's speed and the given
     ones through shafts and meshes. SpecError with every inertia whose speed nothing decides, or where given speeds
     contradict each other."""
@@ -105,7 +105,7 @@ def _contradictions(
             return
 
 
-def _joints(parts: Drivetrain, stage: GeneralStage) -> _Joints:
+def _joints(parts: Drivetrain, stage: Stage) -> _Joints:
     meshes = [{f"stage.{name}": float(factor) for name, factor in row.items()} for row in rolling(stage)]
     meshes += [{_rotor(stage, name): 1.0} for name, port in stage.ports.items() if port.kind == "fixed"]
     ports = {name: _difference(part.on, _rotor(stage, name)) for name, part in parts.ports.items()}
@@ -113,7 +113,7 @@ def _joints(parts: Drivetrain, stage: GeneralStage) -> _Joints:
     return _Joints(meshes, ports, shafts, {name: _difference(*part.between) for name, part in parts.clutches.items()})
 
 
-def _rotor(stage: GeneralStage, port: str) -> str:
+def _rotor(stage: Stage, port: str) -> str:
     return f"stage.{stage.rotor_of(stage.ports[port].body)}"
 
 
@@ -166,7 +166,7 @@ def _balance(
 
 
 def _angles(
-    parts: Drivetrain, stage: GeneralStage, torque: Mapping[str, float], bore: Mapping[str, float]
+    parts: Drivetrain, stage: Stage, torque: Mapping[str, float], bore: Mapping[str, float]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Angles (rad) of inertias and of shafts' ends on the ground: every shaft is twisted by its torque."""
     known: dict[str, float] = {}

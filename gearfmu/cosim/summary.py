@@ -12,9 +12,9 @@ from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
 from gearfmu.kernel.binding import status_words
+from gearfmu.spec.forms.turning import meshings
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import meshings
-from gearfmu.stage.model import integrator_of
+from gearfmu.stage.build.model import integrator_of
 
 TORQUES = (
     "{}.shaft.tau",

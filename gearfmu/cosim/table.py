@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import get_args
 
-from gearfmu.spec.base import Quantity, Spec
-from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
-from gearfmu.spec.parts import TABLES, Drivetrain
+from gearfmu.spec.reading.base import Quantity, Spec
 from gearfmu.spec.scene import load_scene, shipped_scenes
-from gearfmu.spec.shaft_loads import ShaftLoad
+from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig, table
+from gearfmu.spec.scenes.parts import TABLES, Drivetrain
+from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 
 INTRODUCTION = """# Drivetrains and scenes
 

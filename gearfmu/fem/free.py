@@ -17,7 +17,27 @@ from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.factor import Factor
 
 
-class FreeBody:
+class Balanced:
+    """What M and the mass-normalised rigid motions `rigid` say of loads and displacements."""
+
+    mass_matrix: sp.csr_array
+    rigid: np.ndarray
+    _mass_rigid: np.ndarray
+
+    def mass(self, vectors: np.ndarray) -> np.ndarray:
+        """M v."""
+        return self.mass_matrix @ vectors
+
+    def balance(self, loads: np.ndarray) -> np.ndarray:
+        """Pᵀ f: loads together with the inertia forces of the rigid motion they cause."""
+        return loads - self._mass_rigid @ (self.rigid.T @ loads)
+
+    def gauge(self, vectors: np.ndarray) -> np.ndarray:
+        """P u: displacement without its rigid part."""
+        return vectors - self.rigid @ (self._mass_rigid.T @ vectors)
+
+
+class FreeBody(Balanced):
     """Free–free body from its stiffness and mass matrix (3N, 3N), nodes (N, 3) and elements (E, 20).
 
     `rigid` (3N, 6): mass-normalised rigid modes; `mass(v)`, `flexibility(f)` as the eigensolver needs them.
@@ -38,18 +58,6 @@ class FreeBody:
     def _factor(self) -> tuple[np.ndarray, Factor]:
         free = np.setdiff1d(np.arange(self.size), self._held)
         return free, Factor(self.stiffness[free][:, free], self.elements, free // 3)
-
-    def mass(self, vectors: np.ndarray) -> np.ndarray:
-        """M v."""
-        return self.mass_matrix @ vectors
-
-    def balance(self, loads: np.ndarray) -> np.ndarray:
-        """Pᵀ f: loads together with the inertia forces of the rigid motion they cause."""
-        return loads - self._mass_rigid @ (self.rigid.T @ loads)
-
-    def gauge(self, vectors: np.ndarray) -> np.ndarray:
-        """P u: displacement without its rigid part."""
-        return vectors - self.rigid @ (self._mass_rigid.T @ vectors)
 
     def flexibility(self, loads: np.ndarray) -> np.ndarray:
         """C f = P K⁺ Pᵀ f, N → m. K⁺ by six statically determinate supports, which carry nothing of balanced loads."""

@@ -13,8 +13,8 @@ from gearfmu.body import body_hashes, load_bodies
 from gearfmu.errors import BodyError, FmuError, ModelError, Problem, SpecError
 from gearfmu.fmu.stage_file import EXPORT_AGAIN, MODEL_FILE, STAGE_FILE, read_stage_file, refused
 from gearfmu.spec.stored import differences, restored, stored_files
-from gearfmu.stage.model import StageModel
-from gearfmu.stage.observed import MOTION
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.build.observed import MOTION
 
 MOST_SHOWN = 5  # differences
 

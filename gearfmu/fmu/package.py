@@ -18,7 +18,7 @@ from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import host_platform, library_path
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.build.model import StageModel
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 RUNTIMES = ("native", "python")

@@ -12,7 +12,7 @@ from typing import Any
 
 from gearfmu.errors import FmuError, Problem, SpecError
 from gearfmu.spec.stored import stored, stored_files
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.build.model import StageModel
 
 MODEL_FILE = "resources/model.gkb"
 STAGE_FILE = "resources/stage.json"

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.geometry.reference import GAUSS, ReferenceGear
 from gearfmu.geometry.root import RackRounding
-
-_GAUSS = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
@@ -90,17 +88,9 @@ class GearGeometry(ReferenceGear):
         roll = self.s_tip - self.tip_edge
         return self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b)
 
-    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Points (..., 2) in m of the flank of tooth 0."""
-        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
-
     def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
         """Unit normals (..., 2) out of tooth 0 in the transverse section."""
         return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
-    def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
-        """Half tooth-thickness angle (rad) on a circle of `radius` (m) between form and tip circle."""
-        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
 
     def tip_edge_centre(self, sg: int = 1) -> np.ndarray:
         """Centre (2,) in m of the tip edge rounding."""
@@ -126,24 +116,17 @@ class GearGeometry(ReferenceGear):
         """∫ r^power dθ along the outline of one sector from space to space, tip edges sharp (m^power)."""
         tip = self.tip_half_angle * self.r_a**power
         land = self.rounding.land_angle * self.r_f**power
-        return 2 * (tip + land + self._flank_moment(power) + self._root_moment(power))
-
-    def _flank_moment(self, power: int) -> float:
-        """dθ = u²/(1+u²) du with u = s/r_b."""
-        low, high = self.s_form / self.r_b, self.s_a / self.r_b
-        u = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
-        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
-        return float(0.5 * (high - low) * np.dot(_GAUSS[1], values))
+        return 2 * (tip + land + self.flank_moment(power, self.s_form, self.s_a) + self._root_moment(power))
 
     def _root_moment(self, power: int) -> float:
         edges = np.linspace(self.alpha_t, math.pi / 2, 5)
         total = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
-            tau = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
+            tau = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
             total += (
                 0.5
                 * (high - low)
-                * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self.rounding.angle_slope(tau)))
+                * float(np.dot(GAUSS[1], self.rounding.polar(tau)[0] ** power * self.rounding.angle_slope(tau)))
             )
         return total
 

@@ -1,8 +1,15 @@
-"""Hertz's line contact, for the check of the load strip."""
+"""Hertz's line contact, and the width that it has."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
+
+
+def common_width(gears: Iterable[Any]) -> float:
+    """Common face width (m) of gears in mesh, of anything with a `face_width`."""
+    return min(float(gear.face_width) for gear in gears)
 
 
 def contact_modulus(modulus: tuple[float, float], poisson: tuple[float, float]) -> float:

@@ -18,9 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import ReferenceGear
-
-_GAUSS = np.polynomial.legendre.leggauss(40)
+from gearfmu.geometry.reference import GAUSS, ReferenceGear
 
 
 @dataclass(frozen=True)
@@ -84,17 +82,9 @@ class InternalGearGeometry(ReferenceGear):
         roll = self.s_tip + self.tip_edge
         return self.half_pitch - (self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
 
-    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Points (..., 2) in m of the flank of space 0."""
-        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
-
     def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
         """Unit normals (..., 2) out of the ring's material, into space 0."""
         return -involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
-    def space_angle(self, radius: ArrayLike) -> np.ndarray:
-        """Half angle (rad) of the space on a circle of `radius` (m) between tip and form circle."""
-        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
 
     def fillet_point(self, share: ArrayLike) -> np.ndarray:
         """Points (..., 2) in m of the fillet of flank sg = +1 at shares 0 (form point) … 1 (root circle) of its arc."""
@@ -130,24 +120,17 @@ class InternalGearGeometry(ReferenceGear):
         """∫ r^power dθ along the inner outline of one sector, tip edges sharp (m^power)."""
         land = self.fillet_centre[1] * self.r_f**power
         tip = self.tip_half_angle * self.r_a**power
-        return 2 * (land + self._fillet_moment(power) + self._flank_moment(power) + tip)
-
-    def _flank_moment(self, power: int) -> float:
-        """dθ = −u²/(1+u²) du with u = s/r_b; the outline runs from the root to the tip."""
-        low, high = self.s_a / self.r_b, self.s_form / self.r_b
-        u = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
-        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
-        return float(0.5 * (high - low) * np.dot(_GAUSS[1], values))
+        return 2 * (land + self._fillet_moment(power) + self.flank_moment(power, self.s_a, self.s_form) + tip)
 
     def _fillet_moment(self, power: int) -> float:
         """By the angle at the fillet's centre: dθ = (x dy − y dx)/r²."""
-        share = 0.5 * (1 + _GAUSS[0])
+        share = 0.5 * (1 + GAUSS[0])
         point, turn = self.fillet_point(share), self._fillet_turn
         radius, angle = self.fillet_centre
         arm = (point - radius * np.array([math.cos(angle), math.sin(angle)])) * turn
         square = (point**2).sum(axis=-1)
         swept = (point[:, 0] * arm[:, 0] + point[:, 1] * arm[:, 1]) / square
-        return float(-0.5 * np.dot(_GAUSS[1], square ** (power / 2) * swept))
+        return float(-0.5 * np.dot(GAUSS[1], square ** (power / 2) * swept))
 
 
 def _signed_root(radius: float, r_b: float) -> float:

@@ -106,11 +106,6 @@ class PairGeometry:
         return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
 
     @property
-    def backlash_angles(self) -> tuple[float, float]:
-        """Free angle (rad) of either gear with the other one held."""
-        return self.backlash / self.r_w[0], self.backlash / self.r_w[1]
-
-    @property
     def wheel_phase(self) -> float:
         """Angle (rad) of the wheel's frame at which the nominal drive flanks touch while the pinion's tooth 0 is on +x.
 

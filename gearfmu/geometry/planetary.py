@@ -157,7 +157,7 @@ class PlanetaryGeometry:
     @property
     def ratio(self) -> float:
         """Speed of the sun over that of the carrier with the ring at rest, 1 + z_r/z_s."""
-        return 1 + self.ring_mesh.ring.z / self.sun_mesh.gears[0].z
+        return set_ratio(self.sun_mesh.gears[0].z, self.ring_mesh.ring.z)
 
     def planet_centre(self, planet: int) -> np.ndarray:
         """(2,) m, with the carrier at angle 0."""
@@ -168,16 +168,6 @@ class PlanetaryGeometry:
     def neighbour_clearance(self) -> float:
         """Gap (m) between the tip circles of neighbouring planets; negative: they touch."""
         return 2 * self.sun_mesh.a * math.sin(least_apart(self.angles) / 2) - 2 * self.ring_mesh.planet.r_a
-
-    def planet_phase(self, planet: int) -> float:
-        """Angle (rad, in (−π/z_p, π/z_p]) of planet k's tooth 0 from +x that centres it in the mesh with the ring.
-
-        Ring at rest with space 0 on +x, carrier at 0: the planet rolls in the ring by θ (1 − z_r/z_p) on the way to its
-        place θ.
-        """
-        z_p, z_r = self.ring_mesh.planet.z, self.ring_mesh.ring.z
-        theta, pitch = self.angles[planet], 2 * math.pi / z_p
-        return _wrapped(theta * (1 - z_r / z_p), pitch)
 
     def sun_phase(self) -> float:
         """Angle (rad, in (−π/z_s, π/z_s]) of the sun's tooth 0 from +x that centres it in the mesh with planet 0.
@@ -191,6 +181,11 @@ class PlanetaryGeometry:
         """Whether the planets fit: their angles are multiples of 2π/(z_s + z_r)."""
         teeth = self.sun_mesh.gears[0].z + self.ring_mesh.ring.z
         return all(abs(math.remainder(angle, 2 * math.pi / teeth)) < SAME_ANGLE for angle in self.angles)
+
+
+def set_ratio(sun: int, ring: int) -> float:
+    """1 + z_r/z_s: speed of the sun over that of the carrier with the ring at rest; numbers of teeth."""
+    return 1 + ring / sun
 
 
 def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
@@ -218,12 +213,3 @@ def planet_angles(spec: Any) -> tuple[float, ...]:
 def least_apart(angles: tuple[float, ...]) -> float:
     """Smallest angle (rad) between neighbours of ascending `angles`."""
     return min(b - a for a, b in zip(angles, (*angles[1:], angles[0] + 2 * math.pi), strict=True))
-
-
-def _wrapped(angle: float, period: float) -> float:
-    turned = math.fmod(angle, period)
-    if turned > period / 2 * (1 + 1e-12):
-        turned -= period
-    elif turned <= -period / 2 * (1 - 1e-12):
-        turned += period
-    return turned

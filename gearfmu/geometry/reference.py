@@ -11,7 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from gearfmu.geometry import involute
+
+GAUSS = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
@@ -74,3 +79,18 @@ class ReferenceGear:
         """Half angle at the base circle, rad, of an external gear's tooth or an internal gear's space: ψ + inv α
         (ISO 21771). In the transverse section, where s_t = s_n / cos β and m_t = m_n / cos β leave ψ as it is."""
         return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha_t))
+
+    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Points (..., 2) in m of the flank of tooth 0, in a ring of space 0."""
+        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
+        """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
+        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
+
+    def flank_moment(self, power: int, low: float, high: float) -> float:
+        """∫ r^power dθ (m^power) along a flank between two rolls (m), dθ = u²/(1+u²) du with u = s/r_b."""
+        low, high = low / self.r_b, high / self.r_b
+        u = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
+        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
+        return float(0.5 * (high - low) * np.dot(GAUSS[1], values))

@@ -37,10 +37,6 @@ class RackRounding:
     stretch: float = 1.0
 
     @property
-    def root_radius(self) -> float:
-        return self.r - self.centre_depth - self.radius
-
-    @property
     def land_angle(self) -> float:
         """Angle (rad) from the middle of the tooth space to the end of the root circle's arc."""
         return self.centre_offset / self.r

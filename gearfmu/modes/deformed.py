@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.reduction.display import Shapes, turn_sectors, whole_surface
-from gearfmu.stage.deformation import DeformationError, GearMotion
+from gearfmu.stage.run.deformation import DeformationError, GearMotion
 
 
 @dataclass(frozen=True)

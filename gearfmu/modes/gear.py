@@ -11,16 +11,13 @@ from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.general import GeneralStage, RingBody
-from gearfmu.spec.members import member_of
-from gearfmu.spec.pair import StageSpec
+from gearfmu.spec.forms.general import RingBody
+from gearfmu.spec.forms.members import Form, member_of
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 
 
-def gear_modes(
-    spec: StageSpec | GeneralStage, stored: ReducedBody, count: int, progress: Progress | None = None
-) -> BodyModes:
+def gear_modes(spec: Form, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
     """The `count` lowest elastic modes of a gear of `spec` (one more where that would split a pair).
 
     stored : the gear's reduced body, whose frequencies they must have: BodyError where they differ (a file made by

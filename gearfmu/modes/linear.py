@@ -21,12 +21,12 @@ import scipy.linalg as sl
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
-from gearfmu.spec.general import ShaftBody
+from gearfmu.spec.forms.general import ShaftBody
 from gearfmu.stage import StageModel
-from gearfmu.stage.assembly import mount_sets
-from gearfmu.stage.groups import Group
-from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.limits import places_of
+from gearfmu.stage.build.assembly import mount_sets
+from gearfmu.stage.build.groups import Group
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.run.limits import places_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 FULL = 3.0  # level at which every oscillator is dynamic

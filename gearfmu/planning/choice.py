@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.effects import EFFECTS, Effect, costs
-from gearfmu.study.ladder import LEVELS, SLICES, STEPS, fitting
+from gearfmu.study.ladder import SLICES, STEPS, fitting
 
 LEAST_SHARE = 0.03  # of the cost of a step: what saves less stays on
 FULL = "full"
@@ -118,7 +118,7 @@ def space(scene: SceneSpec, model: StageModel, least_share: float = LEAST_SHARE,
     """What may be chosen for a scene. Effects that the scene switches off stay off; of the others the table of effects
     says which are kept. least_share: effects that cost less stay on, but those of `force`."""
     step = scene.coupling.step
-    finest = FULL_STEP_OF_SETS if isinstance(model.spec, PlanetarySpec) else FULL_STEP
+    finest = FULL_STEP_OF_SETS if model.stage.carriers else FULL_STEP
     steps = sorted({fitting(step, h) for h in (*STEPS, finest) if h >= finest})
     own = scene.stage.slices
     slices = tuple(sorted({n for n in SLICES if n < own} | {own}))

@@ -19,11 +19,11 @@ from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import MODES, SLICED, STEP, Choice, Knob
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Trial
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.stage import StageModel, loaded_te
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.place import place_of
-from gearfmu.stage.set_te import set_te
+from gearfmu.stage import StageModel
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.set_te import stage_te
 
 POSITIONS = 16
 DECIBEL = 20.0 / math.log(10.0)  # of a small relative error
@@ -78,7 +78,7 @@ def _modes(level: str, known: Conditions) -> float:
     """(f/f₁)² of the highest frequency of the band and the first mode that is quasi-static: what its inertia would
     add."""
     sections = {name: v for name, v in read_blob(known.model.blob).items() if isinstance(v, np.ndarray)}
-    cuts = dict(zip(("rigid", "fast", "standard"), [1.0, *map(float, sections["limits"][:2])], strict=True))
+    cuts = dict(zip(LEVELS[:3], [1.0, *map(float, sections["limits"][:2])], strict=True))
     if level not in cuts:
         return 0.0
     modes = [v.ravel() / (2 * math.pi) for name, v in sections.items() if re.fullmatch(r"omega\d+", name)]
@@ -98,12 +98,14 @@ def _coriolis(known: Conditions) -> float:
 
 def _centrifugal(known: Conditions) -> float:
     """m a Ω² of a planet over the force of a mesh."""
-    spec = known.model.spec
-    if not isinstance(spec, PlanetarySpec):
+    stage = known.model.stage
+    if not stage.carriers:
         return UNKNOWN
-    radius = 0.25 * spec.planet.teeth * spec.set.normal_module
-    mass = 7800.0 * math.pi * radius**2 * spec.planet.face_width  # of a disc of steel: an order of magnitude
-    return mass * spec.set.center_distance * known.speed**2 / max(abs(known.force), 1e-9)
+    places = {gear: math.hypot(*stage.rotors[stage.rotor_of(gear.name)].axis) for gear in stage.gears}
+    planet, distance = max(places.items(), key=lambda item: item[1])
+    radius = 0.25 * planet.teeth * planet.normal_module
+    mass = 7800.0 * math.pi * radius**2 * planet.face_width  # of a disc of steel: an order of magnitude
+    return mass * distance * known.speed**2 / max(abs(known.force), 1e-9)
 
 
 def _gyroscopic(known: Conditions) -> float:
@@ -121,15 +123,9 @@ FORMULAS: dict[str, Callable[[Conditions], float]] = {
 
 def _quasi_static(settings: dict[str, float], known: Conditions) -> float:
     """rms of what the transmission error changes over a pitch, its mean left out, over its own alternating part."""
-    own = {"slices": float(known.full.choice.slices)}
+    own: dict[str, Any] = {"slices": float(known.full.choice.slices)}
     try:
-        on, off = (_te(known.model, known.torque, own | more) for more in ({}, settings))
+        on, off = (stage_te(known.model, [known.torque], POSITIONS, **(own | more)).te[0] for more in ({}, settings))
     except GearfmuError:
         return UNKNOWN
     return float(np.std(off - on) / max(float(np.std(on)), 1e-15))
-
-
-def _te(model: StageModel, torque: float, settings: dict[str, Any]) -> np.ndarray:
-    if isinstance(model.spec, PlanetarySpec):
-        return set_te(model, [torque], POSITIONS, **settings).te[0]
-    return loaded_te(model, [torque], POSITIONS, **settings).te[0]

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from gearfmu.errors import GearfmuError, Problem, SpecError, near_or_all
-from gearfmu.geometry.planetary import set_geometry
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stage.run.set_te import set_error
 from gearfmu.units import to_si
 
 WHERE = "plan"
@@ -98,9 +97,8 @@ def _judged(known: set[str]) -> list[str]:
 
 
 def _named(model: StageModel, name: str, known: set[str]) -> Iterator[Output]:
-    spec = model.spec
-    if name == "te" and isinstance(spec, PlanetarySpec):
-        r_b, ratio = set_geometry(spec, "sun").r_b, 1 + spec.ring.teeth / spec.sun.teeth
+    if name == "te" and model.stage.carriers:
+        r_b, ratio = set_error(model.stage)
         yield Output("te", (("sun.gear.phi", r_b), ("carrier.gear.phi", -r_b * ratio)))
     elif name == "te":
         for mesh in model.stage.engagements:

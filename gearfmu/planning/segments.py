@@ -20,7 +20,7 @@ from gearfmu.planning.windows import LONGEST, first_window, whole_periods
 from gearfmu.report.signals import LOCKED, spans
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.limits import largest_torque
+from gearfmu.stage.run.limits import largest_torque
 
 BIN = 5e-3  # s: contact is looked at in bins
 SHORTEST = 20e-3  # s

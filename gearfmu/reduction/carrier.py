@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,74 +10,77 @@ from gearfmu.fem import hex20
 from gearfmu.fem.repeated import Parts
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported_carrier import imported_carrier
+from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
+from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 
 
-def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
-    """The carrier of a PlanetarySpec: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
+def carrier_full_order(spec: Form, scale: float = 1.0) -> FullOrder:
+    """The carrier of a planetary set: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
 
     scale : factor on all element counts (1: about 150 000 unknowns); an imported carrier has none and is taken as it
     is. Rotations count with the bolt circle's radius. Raises MeshError.
     """
-    if spec.carrier.imported is not None:
+    carrier = carrier_of(spec)
+    if carrier.part.imported is not None:
         return imported_carrier(spec).full
-    geometry, sector = CarrierGeometry.of(spec), scaled_sector(spec, scale)
-    full = full_order("carrier", *_whole_elements(spec, sector), Judgement(("bore",), geometry.a))
-    return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(spec) else full
+    sector = scaled_sector(carrier, scale)
+    full = full_order("carrier", *_whole_elements(carrier, sector), Judgement(("bore",), carrier.geometry.a))
+    return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full
 
 
-def carrier_need(spec: Any) -> Need:
+def carrier_need(spec: Form) -> Need:
     """Memory that the reduction of a carrier meshed here takes, from its counts: the whole body, or the sector of the
     finer mesh (`FINER`) by which its error is measured."""
-    sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
-    own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
+    carrier = carrier_of(spec)
+    sector = carrier_sector(carrier.geometry, carrier.part.mesh)
+    own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * carrier.part.modes
     size, finer = own * sector.teeth, round(own * FINER**3)
-    if cyclic_carrier(spec):
+    if cyclic_carrier(carrier):
         both = [parts_need(size, sector.teeth, vectors), modes_need(finer)]
     else:
         both = [whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (size, round(size * FINER**3))]
     return Need(size, max(need.memory for need in both), True)
 
 
-def cyclic_carrier(spec: Any) -> bool:
-    """Are the bolts of the carrier of a PlanetarySpec evenly spaced and coupled alike, and enough for cuts?"""
-    geometry = CarrierGeometry.of(spec)
-    kinds = {spec.carrier.coupling_of(f"bolt{k}") for k in range(geometry.planets)}
+def cyclic_carrier(carrier: CarrierMember) -> bool:
+    """Are the bolts of a carrier evenly spaced and coupled alike, and enough for cuts?"""
+    geometry = carrier.geometry
+    kinds = {carrier.part.coupling_of(f"bolt{k}") for k in range(geometry.planets)}
     even = np.allclose(geometry.angles, 2 * np.pi * np.arange(geometry.planets) / geometry.planets, atol=1e-9)
     return even and len(kinds) == 1 and geometry.planets >= 3
 
 
-def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
+def carrier_elements(spec: Form, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
     """Finite elements of the carrier as the file describes it, and the couplings of its bolts and bore."""
-    return _whole_elements(spec, scaled_sector(spec, scale))
+    carrier = carrier_of(spec)
+    return _whole_elements(carrier, scaled_sector(carrier, scale))
 
 
-def scaled_sector(spec: Any, scale: float) -> FeMesh:
-    """One bolt's sector of the carrier of a PlanetarySpec. scale : factor on all element counts."""
-    counts = spec.carrier.mesh
-    return carrier_sector(CarrierGeometry.of(spec), counts.model_copy(update={"scale": counts.scale * scale}))
+def scaled_sector(carrier: CarrierMember, scale: float) -> FeMesh:
+    """One bolt's sector of a carrier meshed here. scale : factor on all element counts."""
+    counts = carrier.part.mesh
+    return carrier_sector(carrier.geometry, counts.model_copy(update={"scale": counts.scale * scale}))
 
 
-def _whole_elements(spec: Any, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
-    geometry = CarrierGeometry.of(spec)
+def _whole_elements(carrier: CarrierMember, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
+    geometry = carrier.geometry
     whole = whole_carrier(geometry, sector)
-    body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, spec.carrier.material))
+    body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, carrier.part.material))
     couplings = [
         Coupling(
             f"bolt{k}",
-            spec.carrier.coupling_of(f"bolt{k}"),
+            carrier.part.coupling_of(f"bolt{k}"),
             sector.sector_nodes(k)[sector.sets["bolt"]],
             geometry.bolt_axis(k),
         )
         for k in range(geometry.planets)
     ]
-    couplings.append(Coupling("bore", spec.carrier.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
+    couplings.append(Coupling("bore", carrier.part.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
     return body, couplings
 
 

@@ -11,27 +11,29 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.carrier import FINER, carrier_full_order, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
+from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
 
 COMPARED = 20  # lowest elastic modes
 
 
-def carrier_mesh_error(spec: Any) -> dict[str, Any]:
-    """How far the lowest free frequencies of the carrier of a PlanetarySpec, coupled as the file says, lie above those
+def carrier_mesh_error(spec: Form) -> dict[str, Any]:
+    """How far the lowest free frequencies of a carrier, coupled as the file says, lie above those
     of a finer mesh: plain facts, relative errors of the largest and of every mode. Raises MeshError."""
     own, fine = (free_frequencies(spec, scale, COMPARED) for scale in (1.0, FINER))
     error = own / fine - 1
     return {"finer": FINER, "modes": len(error), "to_Hz": float(own[-1]), "max_error": float(error.max())}
 
 
-def free_frequencies(spec: Any, scale: float, count: int) -> np.ndarray:
+def free_frequencies(spec: Form, scale: float, count: int) -> np.ndarray:
     """The `count` lowest elastic frequencies (Hz) of the free carrier; `scale`: factor on all element counts.
 
     By one sector where bolts are evenly spaced and coupled alike, by the whole body else. Raises MeshError.
     """
-    if not cyclic_carrier(spec):
+    carrier = carrier_of(spec)
+    if not cyclic_carrier(carrier):
         squared, _ = Elastic(carrier_full_order(spec, scale)).modes(count)
         return np.sqrt(squared) / (2 * np.pi)
-    space = _space(spec, scale)
+    space = _space(carrier, scale)
     families = []
     for index in range(space.teeth // 2 + 1):
         harmonic = space.harmonic(index)
@@ -40,13 +42,12 @@ def free_frequencies(spec: Any, scale: float, count: int) -> np.ndarray:
     return np.sqrt(np.sort(np.concatenate(families))[:count]) / (2 * np.pi)
 
 
-def _space(spec: Any, scale: float) -> SectorSpace:
+def _space(carrier: CarrierMember, scale: float) -> SectorSpace:
     """The fields of one bolt's sector."""
-    carrier = spec.carrier
-    mesh = scaled_sector(spec, scale)
-    matrices = hex20.assemble(mesh.nodes, mesh.elements, carrier.material)
-    bore = mesh.sets["bore"] if carrier.coupling_of("bore") == "rigid" else None
-    bolt = mesh.sets["bolt"] if carrier.coupling_of("bolt0") == "rigid" else None
+    part, mesh = carrier.part, scaled_sector(carrier, scale)
+    matrices = hex20.assemble(mesh.nodes, mesh.elements, part.material)
+    bore = mesh.sets["bore"] if part.coupling_of("bore") == "rigid" else None
+    bolt = mesh.sets["bolt"] if part.coupling_of("bolt0") == "rigid" else None
     (space,) = sector_spaces(
         Sector(mesh.nodes, mesh.elements, *matrices, mesh.teeth, mesh.cut_minus, mesh.cut_plus, True, bore, bolt)
     )

@@ -17,10 +17,10 @@ from gearfmu.report.moving import View, moving_view
 from gearfmu.report.plots_set import PlanetSet
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
-from gearfmu.stage.deformation import DeformationError
-from gearfmu.stage.meshes import tooth_phases
-from gearfmu.stage.observed import gear_bodies
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.deformation import DeformationError
+from gearfmu.stage.run.trace import Trace
 
 Maker: TypeAlias = Callable[[], "Plot | None"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from gearfmu.files import write_text
 from gearfmu.report import metrics, page, sections
 from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
-from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded, position_of
+from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import plain, shown
 from gearfmu.report.plots import of_mesh
@@ -22,8 +22,9 @@ from gearfmu.report.plots_nvh import SHOWN_TO, averaging, force_channels, octave
 from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
-from gearfmu.stage.te import mesh_harmonics
-from gearfmu.stage.trace import write_columns
+from gearfmu.stage.run.te import mesh_harmonics
+from gearfmu.stage.run.touching import position_of
+from gearfmu.stage.run.trace import write_columns
 
 ORDERS = 6
 ALIKE = 0.05  # dB, or %: smaller differences are not called better or worse

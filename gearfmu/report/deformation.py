@@ -23,12 +23,12 @@ from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
 from gearfmu.report.picture import round_scale
 from gearfmu.report.scene3d import STEEL
-from gearfmu.report.signals import GEAR_PHI
 from gearfmu.report.style import INK, MUTED, WIDTH, png, styled
-from gearfmu.spec.general import GeneralStage
-from gearfmu.stage.deformation import Deformation
-from gearfmu.stage.meshes import mesh_axes
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.general import Stage
+from gearfmu.stage.build.meshes import mesh_axes
+from gearfmu.stage.run.deformation import Deformation
+from gearfmu.stage.run.touching import GEAR_PHI
+from gearfmu.stage.run.trace import Trace
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn
 IN_A_ROW = 3
@@ -48,7 +48,7 @@ class _Face:
     neighbours: tuple[np.ndarray, float, float] | None
 
 
-def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: GeneralStage | None) -> Plot | None:
+def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
     """The gear at the times of the pictures, side by side; None without one. stage: for the marks of planets."""
     chosen = list(deformation.pictures)
     if not chosen:
@@ -70,7 +70,7 @@ def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: 
     return Plot(f"deformation_{gear.name}", title, _caption(face, moved), image, _columns(deformation, gear, chosen))
 
 
-def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: GeneralStage | None) -> Plot | None:
+def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
     """The frames of the film as one animated PNG; None with fewer than two."""
     chosen = list(deformation.film)
     if len(chosen) < 2:
@@ -103,7 +103,7 @@ def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Gene
 
 
 def _face(
-    deformation: Deformation, gear: DeformedGear, frames: Sequence[int], run: tuple[Trace, GeneralStage | None]
+    deformation: Deformation, gear: DeformedGear, frames: Sequence[int], run: tuple[Trace, Stage | None]
 ) -> tuple[_Face, list[np.ndarray]]:
     """What the frames have in common, and their elastic displacements."""
     points, quads = gear.surface
@@ -118,7 +118,7 @@ def _face(
 
 
 def _neighbours(
-    time: np.ndarray, gear: str, trace: Trace, stage: GeneralStage | None
+    time: np.ndarray, gear: str, trace: Trace, stage: Stage | None
 ) -> tuple[np.ndarray, float, float] | None:
     """Angles (planets, F) of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's."""
     if stage is None or not stage.rotors[stage.rotor_of(gear)].stands:

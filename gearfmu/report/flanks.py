@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, WIDTH, styled
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import gear_shape
-from gearfmu.stage.flanks import FlankField
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.stage.build.flanks import FlankField
 
 ROW = 2.2  # inches of a gear
 
 
-def write_flanks(stage: GeneralStage, path: Path) -> bool:
+def write_flanks(stage: Stage, path: Path) -> bool:
     """Write a picture with one row for every gear whose flanks are not nominal: material over the length of roll at
     mid-width and over the face width at the middle roll, all teeth, and index deviations by tooth; left flanks in
     full lines, right ones in broken ones. False, and no file, where all are nominal."""

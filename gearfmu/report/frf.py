@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 
-from gearfmu.files import written_whole
-from gearfmu.report.style import COLOURS, INK, panels, styled
+from gearfmu.report.style import COLOURS, INK, panels, saved, styled
 
 LABELS = {
     "modal": "modal truncation",
@@ -41,7 +40,7 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
         axes[-1].set_ylabel("relative error (Frobenius)")
         axes[-1].set_xlabel("frequency, Hz")
         axes[-1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        return _saved(figure, path)
+        return saved(figure, path)
 
 
 def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str) -> list[Path]:
@@ -63,7 +62,7 @@ def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[0].set_xlabel("vectors n")
         axes[1].set_xlabel("processor time of the reduction, s")
-        return _saved(figure, path)
+        return saved(figure, path)
 
 
 def write_cost_chart(
@@ -89,7 +88,7 @@ def write_cost_chart(
             axis.set_ylim(bottom=0.5 * min(row[y] for row in rows))
         axes[0].set_title(title, loc="left")
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        return _saved(figure, path)
+        return saved(figure, path)
 
 
 def _power(value: float, _: int) -> str:
@@ -105,14 +104,3 @@ def label_of(method: str) -> str:
     """A method's name for a legend; what follows a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
-
-
-def _saved(figure: Any, path: Path) -> list[Path]:
-    written = []
-    for suffix in (".svg", ".png"):
-        target = path.with_suffix(suffix)
-        with written_whole(target) as temporary:
-            metadata = {"Date": None} if suffix == ".svg" else {}
-            figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=metadata)
-        written.append(target)
-    return written

@@ -13,7 +13,7 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
 from gearfmu.report.signals import GEAR_SPEED
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 STEADY = 0.1  # nine tenths of the samples lie as close together, over their median
 

@@ -17,8 +17,8 @@ from gearfmu.report.plan import plan_sections
 from gearfmu.report.results import dynamic_factors, key_results, strict
 from gearfmu.report.run import Run
 from gearfmu.report.sound import Sound, heard_channel, player, sound_of
-from gearfmu.stage.deformation import Deformation
-from gearfmu.stage.trace import Trace, TraceError, write_columns
+from gearfmu.stage.run.deformation import Deformation
+from gearfmu.stage.run.trace import Trace, TraceError, write_columns
 
 NVH = ("spectrum", "orders", "spectrogram")
 RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from gearfmu.spec.library import model_folder
+from gearfmu.spec.reading.library import model_folder
 
 COLUMNS = (
     "scene",

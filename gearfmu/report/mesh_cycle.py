@@ -14,14 +14,16 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import GEAR_PHI, SETTLED, Window
-from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.report.signals import SETTLED, Window
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import assemble
-from gearfmu.stage.flank_loads import FlankLoads, flank_loads
-from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
-from gearfmu.stage.place import place_of
-from gearfmu.stage.te import mesh_harmonics, statics_of
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.meshes import EXTERNAL, kind_of
+from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.te import mesh_harmonics, statics_of
+from gearfmu.stage.run.touching import position_of
+from gearfmu.stage.run.trace import Trace
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
@@ -43,7 +45,7 @@ def static_loads(
         try:
             place = place_of(model, mesh)
             torque = float(np.mean(part[f"{mesh}.force"])) * place.lever
-            torque *= math.cos(mesh_geometry(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
+            torque *= math.cos(mesh_shape(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
             if abs(torque) >= LEAST_LOAD * place.most:
                 kernel = kernel or statics_of(model, slices=slices)
                 found[mesh] = flank_loads(model, torque, mesh, positions, kernel)
@@ -62,20 +64,8 @@ def folded(position: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     return np.bincount(bins, values, BINS) / count if np.all(count) else None
 
 
-def position_of(trace: Trace, stage: GeneralStage, mesh: EngagementSpec) -> np.ndarray | None:
-    """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B, in the
-    axes of what carries them; None where that was not recorded."""
-    rotor, frame = stage.rotor_of(mesh.gears[1]), stage.frame_of(mesh)
-    names = [name + GEAR_PHI for name in (rotor, frame) if name is not None]
-    pair = mesh_geometry(stage, mesh)
-    if any(name not in trace for name in names):
-        return None
-    angle = trace[names[0]] - (trace[names[1]] if len(names) > 1 else 0.0)
-    return np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
-
-
 def transmission_error(
-    trace: Trace, window: Window, stage: GeneralStage, names: Sequence[str], loads: Mapping[str, FlankLoads]
+    trace: Trace, window: Window, stage: Stage, names: Sequence[str], loads: Mapping[str, FlankLoads]
 ) -> Plot | None:
     """Transmission error of engagements over the mesh cycle with its harmonics: quasi-static where `loads` has it, and
     of a steady run its mean over all cycles of the window; None without either."""
@@ -118,11 +108,11 @@ def transmission_error(
     return Plot(file, title, f"{caption}{told[:1].upper()}{told[1:]}.", Chart(panels, across=2), data)
 
 
-def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLoads) -> Plot:
+def contact_pattern(trace: Trace, stage: Stage, mesh: str, loads: FlankLoads) -> Plot:
     """Force per width on the flanks of both gears of an engagement, and its load over the width in the run where forces
     of slices were recorded."""
     engagement = next(e for e in stage.engagements if e.name == mesh)
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     pressed = loads.roll[loads.force > 0]
     rolls = np.linspace(pressed.min(), pressed.max(), ROLLS)
     z = np.linspace(-500, 500, WIDTHS) * loads.face_width

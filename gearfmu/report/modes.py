@@ -21,6 +21,7 @@ from gearfmu.fem.surface import shape as face_shape
 from gearfmu.files import written_whole
 from gearfmu.modes import BodyModes, Mode
 from gearfmu.modes.shapes import cylindrical
+from gearfmu.report.scene3d import camera
 from gearfmu.report.style import INK, MUTED, styled
 
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
@@ -107,8 +108,8 @@ def _component(mode: Mode) -> tuple[int, str]:
 
 def _paint(axis: Axes, body: BodyModes, surface: _Surface, mode: Mode, view: int) -> None:
     moved, rest = surface.sample @ body.drawn(mode)[0], surface.sample @ body.points
-    camera = np.eye(3) if view == ALONG_AXIS else _oblique()
-    drawn, normal = (rest + moved) @ camera.T, _normals((rest + moved) @ camera.T, surface.quads)
+    axes = np.eye(3) if view == ALONG_AXIS else camera(ELEVATION, AZIMUTH)
+    drawn, normal = (rest + moved) @ axes.T, _normals((rest + moved) @ axes.T, surface.quads)
     value = np.linalg.norm(moved, axis=1)
     value = cylindrical(rest, moved)[:, _component(mode)[0]] if view == ALONG_AXIS else value
     value = (value / np.abs(value).max())[surface.quads].mean(axis=1)
@@ -118,8 +119,8 @@ def _paint(axis: Axes, body: BodyModes, surface: _Surface, mode: Mode, view: int
     order = facing[np.argsort(drawn[surface.quads[facing], 2].mean(axis=1))]
     polygons, colours = list(drawn[surface.quads[order], :2]), np.clip(colours[order], 0, 1)
     axis.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=colours, linewidths=0.3))
-    _outline(axis, body.points @ camera.T, rest @ camera.T, surface)
-    _frame(axis, rest @ camera.T, np.linalg.norm(moved, axis=1).max())
+    _outline(axis, body.points @ axes.T, rest @ axes.T, surface)
+    _frame(axis, rest @ axes.T, np.linalg.norm(moved, axis=1).max())
 
 
 def _outline(axis: Axes, points: np.ndarray, rest: np.ndarray, surface: _Surface) -> None:
@@ -191,14 +192,6 @@ def _normals(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-
-
-def _oblique() -> np.ndarray:
-    """Rows: right, up and towards the eye, of a camera above and left of the axis."""
-    ce, se, ca, sa = np.cos(ELEVATION), np.sin(ELEVATION), np.cos(AZIMUTH), np.sin(AZIMUTH)
-    tilt = np.array([[1, 0, 0], [0, ce, -se], [0, se, ce]])
-    turn = np.array([[ca, 0, sa], [0, 1, 0], [-sa, 0, ca]])
-    return tilt @ turn
 
 
 def mode_columns(modes: Sequence[Mode]) -> dict[str, np.ndarray]:

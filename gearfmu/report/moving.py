@@ -18,12 +18,13 @@ from scipy.spatial import cKDTree
 
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
-from gearfmu.report.picture import SHOWN_FRACTION, contacts_at, mirrored, round_scale
-from gearfmu.report.signals import GEAR_PHI
+from gearfmu.report.picture import SHOWN_FRACTION, mirrored, round_scale
 from gearfmu.report.structure import AROUND, parts, turned
-from gearfmu.spec.general import EngagementSpec, GeneralStage
-from gearfmu.stage.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_phases
+from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
+from gearfmu.stage.run.trace import Trace
 
 FRAMES, CONTACTS, PITCHES = 160, 4, 8
 STEPS = 127  # of a displacement, in the page
@@ -95,12 +96,12 @@ class View:
 
 
 def moving_view(
-    trace: Trace, stage: GeneralStage, bodies: Mapping[str, Any], window: tuple[float, float],
+    trace: Trace, stage: Stage, bodies: Mapping[str, Any], window: tuple[float, float],
     recorded: Sequence[tuple[DeformedGear, np.ndarray]] = (),
 ) -> View | None:  # fmt: skip
     """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: ReducedBody
     by gear; recorded: gears with the times (s) of their frames."""
-    gears = [gear.name for gear in stage.gears if getattr(bodies.get(gear.name), "display", None) is not None]
+    gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].display is not None]
     time = np.linspace(*window, FRAMES)
     if not gears or any(_rotor_angle(trace, stage, stage.rotor_of(name)) is None for name in gears):
         return None
@@ -123,7 +124,7 @@ def moving_view(
     return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
 
 
-def _structure(trace: Trace, stage: GeneralStage, time: np.ndarray) -> list[Body]:
+def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Body]:
     """Shafts and carriers whose angle was recorded."""
     found = []
     for name, rotor, profile, (x, y), z in parts(stage):
@@ -139,7 +140,7 @@ def _structure(trace: Trace, stage: GeneralStage, time: np.ndarray) -> list[Body
     return found
 
 
-def _body(trace: Trace, stage: GeneralStage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
+def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
     (name, body), rotor = named, stage.rotor_of(named[0])
     display, carrier = body.display, stage.carrier_of(rotor)
     turned = _rotor_angle(trace, stage, rotor)
@@ -159,7 +160,7 @@ def _body(trace: Trace, stage: GeneralStage, named: tuple[str, Any], time: np.nd
     )  # fmt: skip
 
 
-def _rotor_angle(trace: Trace, stage: GeneralStage, rotor: str) -> np.ndarray | None:
+def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
     """Angle (n,) rad of a rotor in the fixed axes; a rotor that stands does not turn."""
     if stage.rotors[rotor].stands:
         return np.zeros(trace.time.size)
@@ -181,12 +182,12 @@ def _periodic(points: np.ndarray, quads: np.ndarray, teeth: int) -> bool:
 
 
 def _load(
-    trace: Trace, stage: GeneralStage, mesh: EngagementSpec, gears: tuple[dict[str, Body], Mapping[str, Any]],
+    trace: Trace, stage: Stage, mesh: EngagementSpec, gears: tuple[dict[str, Body], Mapping[str, Any]],
     time: np.ndarray,
 ) -> None:  # fmt: skip
     """Add the tooth pairs in contact of an engagement to its two bodies."""
     made, bodies = gears
-    pair, force = mesh_geometry(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
+    pair, force = mesh_shape(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
     carried = _carried(trace, stage, mesh, time)
     gamma = direction_of(pair, *mesh_axes(stage, mesh))
     found: list[Contacts] = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
@@ -204,7 +205,7 @@ def _load(
             body.rolls, body.unit = _unit_loads(bodies[name].display)
 
 
-def _carried(trace: Trace, stage: GeneralStage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
+def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
     """Angle (F,) rad of the axes in which an engagement rolls."""
     frame = stage.frame_of(mesh)
     return np.zeros_like(time) if frame is None else np.interp(time, trace.time, trace[f"{frame}{GEAR_PHI}"])
@@ -233,14 +234,14 @@ def _record(body: Body, gear: DeformedGear, times: np.ndarray, window: tuple[flo
     body.contacts, body.unit, body.rolls = {}, None, None
 
 
-def _turn_together(stage: GeneralStage, made: dict[str, Body]) -> None:
+def _turn_together(stage: Stage, made: dict[str, Body]) -> None:
     """Turn of every rotor per unit of enlargement that closes the gaps which the enlarged displacement opens: from the
     last gears B, which stay, back to the input, by equal lengths on the base circles."""
     turned: dict[str, list[np.ndarray]] = {}
     for mesh in reversed(stage.engagements):
         if not set(mesh.gears) <= set(made):
             continue
-        pair = mesh_geometry(stage, mesh)
+        pair = mesh_shape(stage, mesh)
         a, b = (stage.rotor_of(name) for name in mesh.gears)
         behind = np.mean(turned[b], axis=0) if b in turned else np.zeros(FRAMES)
         recede = sum(_recede(made[name], mesh.name, own) for name, own in zip(mesh.gears, pair.gears, strict=True))
@@ -281,11 +282,11 @@ def _largest(body: Body) -> float:
     return max(found, default=0.0)
 
 
-def _close(stage: GeneralStage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Pitch point of the first engagement, x and y (F,) m, and a radius (m) around it."""
     mesh = stage.engagements[0]
     (x, y), (u, v) = mesh_axes(stage, mesh)
-    pair = mesh_geometry(stage, mesh)
+    pair = mesh_shape(stage, mesh)
     part = pair.gears[0].z / (pair.gears[0].z + pair.gears[1].z)
     at = complex(x + part * (u - x), y + part * (v - y)) * np.exp(1j * _carried(trace, stage, mesh, time))
     return at.real, at.imag, 4.0 * float(stage.gears[0].normal_module)

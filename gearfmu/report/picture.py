@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,24 +13,16 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.report.chart import Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
-from gearfmu.report.signals import GEAR_PHI
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import MeshShape
-from gearfmu.stage.meshes import mesh_axes, mesh_geometry, tooth_phases
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.meshes import mesh_axes, tooth_phases
+from gearfmu.stage.run.touching import Contact, angle_of, contacts_at, meshing_angles
+from gearfmu.stage.run.trace import Trace
 
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
 
 
-@dataclass(frozen=True)
-class Contact:
-    """One tooth pair in contact: tooth number and roll (m) on either gear."""
-
-    teeth: tuple[int, int]
-    rolls: tuple[float, float]
-
-
-def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
+def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
     """Two gears in mesh at the largest |force| of their engagement: their elastic displacement, enlarged, under that
     force applied statically and split evenly over the tooth pairs in contact. Drawn with gear A at the origin and gear
     B on +x. None without the force or the angle of gear A.
@@ -42,12 +33,12 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     if engagement is None:
         return None
     numbers = [[gear.name for gear in stage.gears].index(name) for name in engagement.gears]
-    own, angle = [bodies[number] for number in numbers], _turned(trace, stage, engagement.gears[0])
+    own, angle = [bodies[number] for number in numbers], angle_of(trace, stage, engagement.gears[0])
     if f"{mesh}.force" not in trace or angle is None or any(body.display is None for body in own):
         return None
     sample = int(np.argmax(np.abs(trace[f"{mesh}.force"])))
     force = float(trace[f"{mesh}.force"][sample])
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     if not isinstance(pair, PairGeometry):
         return None  # of a ring the recorded deformation is drawn (deformation.py)
     sg = 1 if force >= 0 else -1
@@ -81,46 +72,6 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     file = "deformed_pair" if len(stage.engagements) == 1 else f"deformed_pair_{mesh}"
     title = of_mesh(trace, mesh, "The deformed pair at the largest mesh force")
     return Plot(file, title, caption, image, _columns(shapes, moved))
-
-
-def _turned(trace: Trace, stage: GeneralStage, gear: str) -> np.ndarray | None:
-    """Angle (n,) rad of a gear in the axes in which the axes of the stage stand: those of its carrier, where it has
-    one."""
-    rotor = stage.rotor_of(gear)
-    names = [name + GEAR_PHI for name in (rotor, stage.rotors[rotor].carried_by) if name is not None]
-    if any(name not in trace for name in names):
-        return None
-    return trace[names[0]] - trace[names[1]] if len(names) > 1 else trace[names[0]]
-
-
-def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
-    """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
-    the rolls of docs/theory eq. 4 add up to L."""
-    a, b = pair.gears
-    t = -sg * pair.alpha_wt
-    roll = a.r_b * sg * (phi + sg * a.psi_b - t)
-    beta = t + math.pi + sg * (pair.length - roll) / b.r_b
-    return phi, beta - sg * b.psi_b
-
-
-def contacts_at(pair: MeshShape, angles: Sequence[float], sg: int) -> list[Contact]:
-    """The tooth pairs whose contact point lies on both flanks `sg`, from gear A's root outward. angles (rad) of the
-    bodies from the line of their centres, A to B; of a ring, B, from its axis to A's."""
-    (a, b), external = pair.gears, isinstance(pair, PairGeometry)
-    t, length = -sg * pair.alpha_wt, pair.length
-    base, first, low, high = a.r_b, angles[0] + sg * a.psi_b - t, a.s_form, a.s_tip
-    found, ends = [], sorted((b.s_form, b.s_tip))
-    for k in range(a.z):
-        roll = base * sg * _wrapped(first + 2 * math.pi * k / a.z)
-        opposite = length - roll if external else length + roll
-        if low <= roll <= high and ends[0] <= opposite <= ends[1]:
-            turn = t + (math.pi if external else 0.0) + sg * (opposite / b.r_b - b.psi_b) - angles[1]
-            found.append(Contact((k, round(turn * b.z / (2 * math.pi)) % b.z), (roll, opposite)))
-    return sorted(found, key=lambda contact: contact.rolls[0])
-
-
-def _wrapped(angle: float) -> float:
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def _displacement(body: Any, teeth: int, loads: Sequence[tuple[int, float]], force: float) -> np.ndarray:

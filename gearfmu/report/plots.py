@@ -9,7 +9,7 @@ import numpy as np
 from gearfmu.report.chart import SPANS, Curve, Panel, Plot, Span, over_time
 from gearfmu.report.names import mesh_words
 from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, noise_floor, spans
-from gearfmu.stage.trace import Trace, heading
+from gearfmu.stage.run.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi

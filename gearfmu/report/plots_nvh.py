@@ -11,7 +11,7 @@ from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_li
 from gearfmu.report.names import shown
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import Window, bearings, meshes, noise_floor
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 RANGE_DB = 90
 ORDERS = 5

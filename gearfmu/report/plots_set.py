@@ -14,8 +14,8 @@ from gearfmu.report.names import mesh_words
 from gearfmu.report.plots import RPM, channels, columns
 from gearfmu.report.plots_nvh import SHOWN_TO, segment, spectrum_curve
 from gearfmu.report.signals import GEAR_SPEED, Window, noise_floor
-from gearfmu.spec.turning import Meshing
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.turning import Meshing
+from gearfmu.stage.run.trace import Trace
 
 ENERGIES = ("energy.work", "energy.stored", "energy.dissipated", "energy.residual")
 MARKED_ORDERS = 12

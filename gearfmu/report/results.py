@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.signals import SETTLED, bearings, lock_time, meshes, window_of_interest
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 REACHED_THE_END = ("completed", "ok")  # outcomes of a run
 LOADED = 0.1  # of the largest static force: below it there is hardly a load to refer to

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
+from gearfmu.body import ReducedBody
 from gearfmu.report import metrics
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample
-from gearfmu.report.signals import GEAR_PHI
-from gearfmu.spec.expand import as_general
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.stage.run.touching import GEAR_PHI
+from gearfmu.stage.run.trace import Trace
 
 NYQUIST_PART = 0.8  # of it: modes above this part are left out
 RING = "ring"
@@ -28,7 +29,8 @@ RING = "ring"
 
 def rim_velocity(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any]) -> np.ndarray | None:
     """Radial velocity (n,) m/s of the standing ring's rim on +x; None where the ring turns or a channel is missing."""
-    stage, ring = as_general(spec), next((body for body in bodies if getattr(body, "rim", None) is not None), None)
+    stage = as_general(spec)
+    ring = next((body for body in bodies if isinstance(body, ReducedBody) and body.rim is not None), None)
     meshes = own.meshes.get(RING, {})
     turning = f"{own.carrier}{GEAR_PHI}"
     needed = [turning, *(f"{mesh}.force" for mesh in meshes.values())]

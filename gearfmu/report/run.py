@@ -12,12 +12,12 @@ from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.plots_set import PlanetSet, planet_set
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.turning import Meshing
-from gearfmu.stage.deformation import Deformation
-from gearfmu.stage.flank_loads import FlankLoads
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import Meshing
+from gearfmu.stage.run.deformation import Deformation
+from gearfmu.stage.run.flank_loads import FlankLoads
+from gearfmu.stage.run.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Run:
         return mesh_angles(self.trace, self.spec)
 
     @cached_property
-    def stage(self) -> GeneralStage | None:
+    def stage(self) -> Stage | None:
         """The stage in general terms, where it and its bodies are at hand."""
         return as_general(self.spec) if self.spec is not None and self.bodies else None
 

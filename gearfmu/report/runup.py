@@ -16,11 +16,12 @@ from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
 from gearfmu.report.ring_pickup import rim_velocity
-from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window, bearings
-from gearfmu.spec.turning import Meshing
+from gearfmu.report.signals import GEAR_SPEED, Window, bearings
+from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
-from gearfmu.stage.place import place_of
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.touching import GEAR_PHI
+from gearfmu.stage.run.trace import Trace
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
 BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution

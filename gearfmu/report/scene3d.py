@@ -36,7 +36,7 @@ def draw(shapes: Sequence[Shape], centre: np.ndarray, radius: float, label: str)
     with styled():
         figure = Figure(figsize=(WIDTH, 0.4 * WIDTH), layout="constrained")
         whole, detail = figure.subplots(1, 2, width_ratios=(1.55, 1))
-        _paint(whole, shapes, _view(), norm, 0.15)
+        _paint(whole, shapes, camera(), norm, 0.15)
         _paint(detail, shapes, np.eye(3), norm, 0.35)
         detail.set(xlim=(centre[0] - radius, centre[0] + radius), ylim=(centre[1] - radius, centre[1] + radius))
         figure.colorbar(ScalarMappable(norm, STEEL), ax=[whole, detail], label=label, shrink=0.7, aspect=26, pad=0.01)
@@ -69,9 +69,9 @@ def _shaded(colormap: Colormap, values: np.ndarray, normals: np.ndarray) -> np.n
     return np.clip(colours, 0, 1)
 
 
-def _view() -> np.ndarray:
-    """Rows: right, up and towards the eye, of a camera above and left of the axis."""
-    ce, se, ca, sa = np.cos(ELEVATION), np.sin(ELEVATION), np.cos(AZIMUTH), np.sin(AZIMUTH)
+def camera(elevation: float = ELEVATION, azimuth: float = AZIMUTH) -> np.ndarray:
+    """Rows: right, up and towards the eye, of a camera above and left of the axis (rad)."""
+    ce, se, ca, sa = np.cos(elevation), np.sin(elevation), np.cos(azimuth), np.sin(azimuth)
     tilt = np.array([[1, 0, 0], [0, ce, -se], [0, se, ce]])
     turn = np.array([[ca, 0, sa], [0, 1, 0], [-sa, 0, ca]])
     return tilt @ turn

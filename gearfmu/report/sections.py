@@ -15,7 +15,7 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 WORDS = {  # key of a result: words, channel of the mesh, unit
     "mesh_force_mean_N": ("Mesh force, mean", "force", "N"),

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.turning import Meshing, meshings
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.turning import Meshing, meshings
+from gearfmu.stage.run.trace import Trace
 
 GEAR_SPEED = ".gear.w"
-GEAR_PHI = ".gear.phi"
 LOCKED = ".locked"
 MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
 NOISE = 1e-4  # of the largest mesh force: forces that cancel leave less

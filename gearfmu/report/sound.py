@@ -17,7 +17,7 @@ from gearfmu.report.metrics import level, sample_step
 from gearfmu.report.names import shown
 from gearfmu.report.plots_nvh import force_channels
 from gearfmu.report.signals import SETTLED, window_of_interest
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 RATE, LONGEST, FADE = 48_000, 10.0, 5e-3  # Hz, s, s
 HEADROOM = 10 ** (-1 / 20)  # the largest sample lies 1 dB below full scale

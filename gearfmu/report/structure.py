@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.spec.general import CarrierBody, GeneralStage, ShaftBody
+from gearfmu.spec.forms.general import CarrierBody, ShaftBody, Stage
 
 AROUND = 40  # sectors of a surface of revolution
 Profile = Sequence[tuple[float, float]]
@@ -45,7 +45,7 @@ def turned(profile: Profile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return points, quads, ahead
 
 
-def parts(stage: GeneralStage) -> list[tuple[str, str, Profile, tuple[float, float], float]]:
+def parts(stage: Stage) -> list[tuple[str, str, Profile, tuple[float, float], float]]:
     """Shafts and carriers of a stage: name, rotor with which it turns, profile, axis (x, y) in that rotor's axes, and z
     (m). A carrier is its plate and a bolt for each rotor that it carries beside its middle."""
     found: list[tuple[str, str, Profile, tuple[float, float], float]] = []

@@ -8,8 +8,8 @@ from typing import Any
 
 from matplotlib import rc_context
 
-from gearfmu.files import written_whole
-from gearfmu.report.style import COLOURS, MUTED, panels, styled
+from gearfmu.report.style import COLOURS, MUTED, panels, saved, styled
+from gearfmu.stage.build.levels import LEVELS
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
 MARKS = {"rk45": "s", "dg4": "o"}
@@ -20,7 +20,6 @@ def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -
 
     rows: of gearfmu.study, one scene; slices: of the scene, drawn full, others thin.
     """
-    written = []
     with styled(), rc_context({"svg.hashsalt": "study"}):
         figure, axes = panels((2.7, 2.4, 2.4))
         for name, panel in zip(QUANTITIES, axes, strict=True):
@@ -28,12 +27,7 @@ def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -
         axes[0].set_title(title, loc="left")
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[-1].set_xlabel("processor time of the stage per simulated second")
-        for suffix in (".svg", ".png"):
-            target = path.with_suffix(suffix)
-            with written_whole(target) as temporary:
-                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
-            written.append(target)
-    return written
+        return saved(figure, path)
 
 
 def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
@@ -79,20 +73,15 @@ def _label(key: tuple[str, str, int]) -> str:
 
 
 def _rank(level: str) -> int:
-    order = ("rigid", "fast", "standard", "full", "paper")
+    order = (*LEVELS, "paper")
     return order.index(level) if level in order else len(order)
-
-
-def _undated(suffix: str) -> dict[str, str | None]:
-    """No date in the file: the same rows give the same bytes."""
-    return {"Date": None} if suffix == ".svg" else {}
 
 
 def write_bodies_chart(rows: Sequence[Any], path: Path) -> list[Path]:
     """Distance of level full to refined bodies as bars, SVG and PNG beside each other; rows: BodyRow of
     gearfmu.study.refined."""
     refined, scenes = list(dict.fromkeys(r.refined for r in rows)), list(dict.fromkeys(r.scene for r in rows))
-    written, width = [], 0.8 / len(scenes)
+    width = 0.8 / len(scenes)
     with styled(), rc_context({"svg.hashsalt": "bodies"}):
         figure, axes = panels((1.7,) * len(QUANTITIES))
         for name, panel in zip(QUANTITIES, axes, strict=True):
@@ -105,8 +94,4 @@ def write_bodies_chart(rows: Sequence[Any], path: Path) -> list[Path]:
             panel.set_ylabel(f"{QUANTITIES[name]}, %")
             panel.set_xticks(range(len(refined)), refined)
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        for suffix in (".svg", ".png"):
-            with written_whole(path.with_suffix(suffix)) as temporary:
-                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
-            written.append(path.with_suffix(suffix))
-    return written
+        return saved(figure, path)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 import io
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any
 
 import matplotlib
 from cycler import cycler
 from matplotlib.figure import Figure
 from PIL import Image
+
+from gearfmu.files import written_whole
 
 COLOURS = ("#1f5a92", "#c8642b", "#3f8f5f", "#8a5a9e", "#9a8a2f", "#4c4f56", "#b23a48", "#2f9aa0")
 INK, MUTED, GRID = "#23262b", "#6a7079", "#e3e6ea"
@@ -66,3 +69,13 @@ def png(figure: Figure) -> str:
         packed, "PNG", optimize=True
     )
     return f'<img alt="" src="data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}">'
+
+
+def saved(figure: Any, path: Path) -> list[Path]:
+    """Write a figure as SVG and PNG; without a date, so that the same rows give the same bytes."""
+    written = [path.with_suffix(suffix) for suffix in (".svg", ".png")]
+    for target in written:
+        with written_whole(target) as temporary:
+            metadata = {"Date": None} if target.suffix == ".svg" else {}
+            figure.savefig(temporary, format=target.suffix[1:], dpi=160, metadata=metadata)
+    return written

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from gearfmu.errors import Problem
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.draft import Draft, millimetres
+from gearfmu.spec.proposals.draft import Draft, millimetres
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")

@@ -7,6 +7,7 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -19,9 +20,8 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.base import validate
-from gearfmu.spec.checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
-from gearfmu.spec.draft import (
+from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.proposals.draft import (
     BACKLASH_PER_MODULE,
     PITCH_SPEED,
     STRIP_PER_MODULE,
@@ -30,7 +30,8 @@ from gearfmu.spec.draft import (
     millimetres,
     usual_torque,
 )
-from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.spec.reading.base import validate
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.units import to_si
 
 NAMES = ("pinion", "wheel")
@@ -140,7 +141,7 @@ def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
 
 def assumed_torque(gears: list[RexsGear]) -> float:
     """Torque (N·m) on the first gear at the usual load K."""
-    width = min(gear.face_width for gear in gears)
+    width = common_width(gears)
     return usual_torque(2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth, width)
 
 

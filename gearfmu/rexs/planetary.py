@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
+from gearfmu.geometry.planetary import set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -26,8 +27,8 @@ from gearfmu.rexs.pair import (
     put_rack_data,
     root_diameter,
 )
-from gearfmu.spec.checks import rounded_up
-from gearfmu.spec.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
+from gearfmu.spec.forms.pair_checks import rounded_up
+from gearfmu.spec.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
@@ -192,8 +193,8 @@ def _tip_that_clears(draft: Draft, distance: float) -> float:
     from gearfmu.geometry.gear import GearGeometry
     from gearfmu.geometry.internal import InternalGearGeometry
     from gearfmu.geometry.planetary import HANDS, RingMesh
-    from gearfmu.spec.base import validate
-    from gearfmu.spec.planetary import RingSpec, SetGearSpec, SetSpec
+    from gearfmu.spec.forms.planetary import RingSpec, SetGearSpec, SetSpec
+    from gearfmu.spec.reading.base import validate
 
     ring_table = {"tip_diameter": "1 mm", "rim_diameter": "1 m"} | {
         key: value for key, value in draft.tables["ring"].items() if key not in ("tip_diameter", "rim_diameter")
@@ -250,7 +251,7 @@ def _put_loads(
     model: RexsModel, draft: Draft, stage: Component, gears: list[RexsGear], planets: list[Component]
 ) -> None:
     sun, planet, ring = gears
-    ratio = 1 + ring.teeth / sun.teeth
+    ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
     if torque:
         text = f"{rounded_up(torque * ratio, 3):g} N*m"

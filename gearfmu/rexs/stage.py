@@ -8,7 +8,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.rexs.model import Component, RexsModel, read_rexs
 from gearfmu.rexs.pair import draft_pair
 from gearfmu.rexs.planetary import draft_set
-from gearfmu.spec.draft import Draft, Unread
+from gearfmu.spec.proposals.draft import Draft, Unread
 
 
 def draft_from_rexs(path: Path, stage: str = "") -> Draft:

@@ -17,12 +17,12 @@ import numpy as np
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.gear import Bearing, GearSpec
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.gear import Bearing, GearSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
-from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.fields import GEAR_NUMBERS, change_gear
+from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.build.fields import GEAR_NUMBERS, change_gear
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 

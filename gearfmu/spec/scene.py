@@ -11,14 +11,14 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError, near_or_all
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
-from gearfmu.spec.changes import Changes, changed_tables
-from gearfmu.spec.deformation import DeformationChoice, deformation_problems
-from gearfmu.spec.drivetrain import PassengerCar, TestRig
-from gearfmu.spec.layers import merged_tables
-from gearfmu.spec.library import shipped_stages
-from gearfmu.spec.parts import ClutchSpec, Drivetrain, drivetrain_problems
-from gearfmu.spec.shaft_loads import ShaftLoad, load_problems, time_problems
+from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
+from gearfmu.spec.reading.changes import Changes, changed_tables
+from gearfmu.spec.reading.layers import merged_tables
+from gearfmu.spec.reading.library import shipped_stages
+from gearfmu.spec.scenes.deformation import DeformationChoice, deformation_problems
+from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
+from gearfmu.spec.scenes.parts import ClutchSpec, Drivetrain, drivetrain_problems
+from gearfmu.spec.scenes.shaft_loads import ShaftLoad, load_problems, time_problems
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
 TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}

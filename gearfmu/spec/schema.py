@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gearfmu.spec.base import Spec
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.stage import StageSpec
 
 
@@ -41,7 +41,7 @@ def set_schema() -> dict[str, Any]:
 
 def general_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the stage.toml of a general stage: a table for every body by its name."""
-    schema = file_schema(GeneralStage)
+    schema = file_schema(Stage)
     schema["title"] = "gearfmu general stage"
     schema["required"] = [*(name for name in schema["required"] if name != "source"), "kind"]
     here = {"GearBody": {"name", "bearing"}, "RingBody": {"name", "mounts"}, "ShaftBody": {"name"}}

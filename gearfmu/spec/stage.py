@@ -1,4 +1,4 @@
-"""stage.toml → StageSpec, PlanetarySpec or GeneralStage, read and checked with the geometry."""
+"""stage.toml → StageSpec, PlanetarySpec or Stage, read and checked with the geometry."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.base import Spec, validate
-from gearfmu.spec.changes import Changes, changed_tables
-from gearfmu.spec.checks import geometry_problems
-from gearfmu.spec.flank_checks import located, topography_problems, with_rolls
-from gearfmu.spec.gear import GearSpec, PairSpec
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.general_checks import general_problems, with_relief_rolls
-from gearfmu.spec.imported import missing_files
-from gearfmu.spec.judge import read_and_judge
-from gearfmu.spec.layers import Layers, read_layers
-from gearfmu.spec.library import find_stage
-from gearfmu.spec.members import members
-from gearfmu.spec.pair import StageSpec as StageSpec
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.planetary_checks import set_problems
+from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.pair import StageSpec as StageSpec
+from gearfmu.spec.forms.pair_checks import geometry_problems
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary_checks import set_problems
+from gearfmu.spec.reading.base import Spec, validate
+from gearfmu.spec.reading.changes import Changes, changed_tables
+from gearfmu.spec.reading.judge import read_and_judge
+from gearfmu.spec.reading.layers import Layers, read_layers
+from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.spec.tables.imported import missing_files
 from gearfmu.units import to_si
 
 
 def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Any:
-    """The StageSpec, PlanetarySpec or GeneralStage of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
+    """The StageSpec, PlanetarySpec or Stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
     "fzg_c/stage_relief", "planetary54").
 
     changes : fields that are to be other than in the file (`changes.py`), {"gears.pinion.tip_relief.amount": "20 um"};
@@ -40,14 +40,14 @@ def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) ->
     layers = layers.changed(changed_tables(kind, changes or {}))
     if kind is PlanetarySpec:
         return _load_set(layers)
-    if kind is GeneralStage:
+    if kind is Stage:
         return _load_general(layers)
     return _load_pair(layers)
 
 
 def stage_class(tables: Mapping[str, Any]) -> type[Spec]:
-    """StageSpec, PlanetarySpec or GeneralStage: what the tables of a stage file are read as."""
-    kinds: dict[Any, type[Spec]] = {"planetary_set": PlanetarySpec, "general": GeneralStage}
+    """StageSpec, PlanetarySpec or Stage: what the tables of a stage file are read as."""
+    kinds: dict[Any, type[Spec]] = {"planetary_set": PlanetarySpec, "general": Stage}
     return kinds.get(tables.get("kind"), StageSpec)
 
 
@@ -58,10 +58,21 @@ def load_pair(stage: str | os.PathLike[str]) -> StageSpec:
     return spec
 
 
+def load_set(stage: str | os.PathLike[str]) -> PlanetarySpec:
+    """`load_stage` where only a planetary set will do; SpecError for any other stage."""
+    spec = load_stage(stage)
+    _require(spec, "planetary_set", "a planetary set", "planetary54")
+    return spec
+
+
 def require_pair(spec: Any) -> None:
     """SpecError unless `spec` is a pair: a verb about one pair, or its gears' files, means nothing else."""
-    if spec.kind != "external_pair":
-        remedy = "this is about one pair: name a stage of kind external_pair, such as fzg_c"
+    _require(spec, "external_pair", "one pair", "fzg_c")
+
+
+def _require(spec: Any, kind: str, what: str, example: str) -> None:
+    if spec.kind != kind:
+        remedy = f"this is about {what}: name a stage of kind {kind}, such as {example}"
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
 
 
@@ -110,10 +121,10 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     return _judged(spec and _set_with_paths(spec, layers), layers, problems)
 
 
-def _load_general(layers: Layers) -> GeneralStage:
+def _load_general(layers: Layers) -> Stage:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
-    spec, found = read_and_judge(GeneralStage, raw | {"source": path}, str(path), partial(general_problems, str(path)))
+    spec, found = read_and_judge(Stage, raw | {"source": path}, str(path), partial(general_problems, str(path)))
     problems += found.problems
     problems += missing_files(layers)
     if spec is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Spec, validate
+from gearfmu.spec.reading.base import Spec, validate
 from gearfmu.spec.stage import stage_class
 
 FILES_OF_IMPORT = ("file", "stiffness", "mass", "unknowns")
@@ -16,7 +16,7 @@ FREE = ("description", "ports")  # fields in which two exports of one stage may 
 
 
 def stored(spec: Spec) -> dict[str, Any]:
-    """The fields of a StageSpec, GeneralStage or PlanetarySpec for JSON, SI, without `source`; files by their names
+    """The fields of a StageSpec, Stage or PlanetarySpec for JSON, SI, without `source`; files by their names
     without folders."""
     tables = spec.model_dump(mode="json", exclude={"source"})
     for table, key, _ in _files(tables):
@@ -38,7 +38,7 @@ def stored_files(spec: Spec) -> dict[str, str]:
 
 
 def restored(tables: Mapping[str, Any], source: Path) -> Any:
-    """The StageSpec, GeneralStage or PlanetarySpec of `stored` tables. source : the file that held them, for messages.
+    """The StageSpec, Stage or PlanetarySpec of `stored` tables. source : the file that held them, for messages.
     SpecError with everything that is wrong."""
     spec, problems = validate(stage_class(tables), {**tables, "source": source}, str(source), from_file=False)
     if spec is None:

@@ -12,10 +12,10 @@ import numpy as np
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
-from gearfmu.spec.lead import LeadSpec
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
+from gearfmu.spec.tables.lead import LeadSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.case import STEPS, Case
 from gearfmu.stage import StageModel, assemble, loaded_te
 

@@ -9,8 +9,8 @@ import numpy as np
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import run as run_scene
 from gearfmu.cosim.scene_run import stage_model
-from gearfmu.spec.ports import ChainSpec, PortSpec
 from gearfmu.spec.scene import load_scene
+from gearfmu.spec.tables.ports import ChainSpec, PortSpec
 from gearfmu.stability.bench import Variant, geometry, internal_step, kernel, model
 from gearfmu.stability.case import COMPLETED, Case, Finding
 from gearfmu.stability.checks import Expected, at_least, finding, lost, statistics

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.bench import PLAIN, Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import (

@@ -14,11 +14,11 @@ import numpy as np
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.kernel import Kernel
-from gearfmu.spec.gear import MeshSpec
-from gearfmu.spec.members import member_of
-from gearfmu.spec.planetary import PlanetarySpec, RingSpec
-from gearfmu.spec.ports import PortSpec
-from gearfmu.spec.stage import load_stage
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec
+from gearfmu.spec.stage import load_set
+from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.bench import kernel
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import CLEARANCE, deep, judged, near
@@ -74,17 +74,16 @@ PLAIN_SET = SetVariant()
 
 
 @lru_cache(maxsize=1)
-def set_bodies() -> list[ReducedBody]:
+def set_bodies() -> list[Any]:
     """Sun, planet, ring and carrier, as shipped."""
-    return load_bodies(load_stage(SET))
+    return load_bodies(load_set(SET))
 
 
 @lru_cache(maxsize=1)
 def thin_ring() -> tuple[RingSpec, ReducedBody]:
     """A ring with 3.4 mm of rim instead of 9 behind its teeth, oval at 0.4 kHz where the shipped one is at 1.6, and its
     body: reduced here in a few seconds, on a coarse mesh."""
-    spec = load_stage(SET)
-    assert isinstance(spec, PlanetarySpec)
+    spec = load_set(SET)
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
     body = spec.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
     ring = spec.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
@@ -100,8 +99,7 @@ def set_model(variant: SetVariant) -> StageModel:
 
 def set_spec(variant: SetVariant) -> PlanetarySpec:
     """The shipped set with the changes of a variant."""
-    spec = load_stage(SET)
-    assert isinstance(spec, PlanetarySpec)
+    spec = load_set(SET)
     parts: dict[str, tuple[Any, float | None]] = {
         "sun": (spec.sun, variant.sun),
         "planet": (spec.planet, variant.pin),
@@ -128,8 +126,7 @@ def set_kernel(variant: SetVariant, case: Case, parameters: Mapping[str, float] 
 @lru_cache(maxsize=1)
 def base_radius() -> float:
     """Base radius of the sun, m."""
-    spec = load_stage(SET)
-    assert isinstance(spec, PlanetarySpec)
+    spec = load_set(SET)
     return member_of(spec, "sun").geometry.r_b
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.case import COMPLETED, Case, Finding
 from gearfmu.stability.checks import at_most
 from gearfmu.stability.motion import Constant, Step

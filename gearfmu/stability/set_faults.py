@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_least, at_most, near
 from gearfmu.stability.motion import Constant

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gearfmu.spec.ports import ChainSpec, PortSpec
+from gearfmu.spec.tables.ports import ChainSpec, PortSpec
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_least
 from gearfmu.stability.motion import Constant

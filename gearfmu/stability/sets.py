@@ -9,9 +9,9 @@ import numpy as np
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.scene import load_scene
-from gearfmu.spec.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stability.bench import internal_step
 from gearfmu.stability.case import COMPLETED, Case, Finding

@@ -27,7 +27,7 @@ from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
 from gearfmu.stability.sets import BACKFIRE, planetary
 from gearfmu.stability.trains import CLOSING, train
-from gearfmu.stage.blob import rounded_hash
+from gearfmu.stage.build.blob import rounded_hash
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
 GIVEN = "given"  # the step of a case whose h was named

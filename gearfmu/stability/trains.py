@@ -14,8 +14,8 @@ from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import run as run_scene
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.scene import load_scene
-from gearfmu.spec.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stability.bench import internal_step, kernel
 from gearfmu.stability.case import COMPLETED, Case, Finding

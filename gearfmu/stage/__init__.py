@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from gearfmu.stage.assembly import assemble
-from gearfmu.stage.model import StageModel
-from gearfmu.stage.simulate import Steady, simulate
-from gearfmu.stage.te import TeResult, loaded_te
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.build.assembly import assemble
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.simulate import Steady, simulate
+from gearfmu.stage.run.te import TeResult, loaded_te
+from gearfmu.stage.run.trace import Channel, Trace
 
 __all__ = ["Channel", "StageModel", "Steady", "TeResult", "Trace", "assemble", "loaded_te", "simulate"]

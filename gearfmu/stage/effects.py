@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 
-from gearfmu.stage.model import StageModel
-from gearfmu.stage.place import place_of
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.te import statics_of
 
 COSTS = "effects_cost.csv"
 

@@ -21,12 +21,11 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.kernel import Kernel
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
-from gearfmu.stage.model import integrator_of
-from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.build.model import integrator_of
+from gearfmu.stage.build.tables import ROLLS
 from gearfmu.study.norm import Signals, set_signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
@@ -182,9 +181,9 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
 
 def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
     """What a run of a pair or of a planetary set is judged by."""
-    if isinstance(model.spec, PlanetarySpec):
-        return set_signals(trace, model.spec, settle)
-    pinion, wheel = (gear.name for gear in model.spec.gears)
+    if model.stage.carriers:
+        return set_signals(trace, model.stage, settle)
+    pinion, wheel = (gear.name for gear in model.stage.gears)
     return signals_of(trace, (pinion, wheel), settle)
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearfmu.stage.assembly import MODEL_VERSION
-from gearfmu.stage.blob import write_blob
-from gearfmu.stage.compact import residual_sections
-from gearfmu.stage.fields import gear_numbers, order_sections
-from gearfmu.stage.tables import OFFSETS
+from gearfmu.stage.build.assembly import MODEL_VERSION
+from gearfmu.stage.build.blob import write_blob
+from gearfmu.stage.build.compact import residual_sections
+from gearfmu.stage.build.fields import gear_numbers, order_sections
+from gearfmu.stage.build.tables import OFFSETS
 
 GRID = 4  # rolls of the tables: all equal
 OWN = 3

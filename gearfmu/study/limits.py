@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from gearfmu.errors import ModelError
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import Errors, errors
 
 COMMUNICATION = 120e-6  # s: the kernel takes no step beyond a communication step
 COUNTS = (240, 120, 80, 60, 48, 40, 32, 24, 20, 16, 12, 10, 8, 6, 5, 4, 3, 2, 1)  # internal steps in one of those
 REFERENCE_COUNT = 480
-LEVELS = ("rigid", "fast", "standard", "full")
 GAMMA_LOWERED = 8  # bit of solver.status
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
-from gearfmu.geometry.planetary import set_geometry
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.spec.forms.general import Stage
+from gearfmu.stage.run.set_te import set_error
+from gearfmu.stage.run.trace import Channel, Trace
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 
@@ -59,15 +59,14 @@ def signals_of(trace: Trace, gears: tuple[str, str], settle: float) -> Signals:
     )
 
 
-def set_signals(trace: Trace, spec: PlanetarySpec, settle: float) -> Signals:
+def set_signals(trace: Trace, stage: Stage, settle: float) -> Signals:
     """The signals of a run of a planetary set after `settle` (s): transmission error of the set, forces in all meshes
     and on all pins."""
     part = trace.window(settle * (1.0 - 1e-12))
-    planets, ratio = range(1, spec.set.planets + 1), 1 + spec.ring.teeth / spec.sun.teeth
-    r_b = set_geometry(spec, "sun").r_b
+    r_b, ratio = set_error(stage)
     te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
-    force = [part[f"{gear}_planet{k}.force_mean"] for gear in ("sun", "ring") for k in planets]
-    pins = [part[f"pin.planet{k}.{axis}_mean"] for k in planets for axis in ("fx", "fy")]
+    force = [part[f"{mesh.name}.force_mean"] for mesh in stage.engagements]
+    pins = [part[f"pin.{s.name}.{axis}_mean"] for s in stage.supports if s.to for axis in ("fx", "fy")]
     interval = float(trace.time[1] - trace.time[0])
     return Signals(te, np.stack(force, 1), np.stack(pins, 1), None, interval, float(part.time[0]), settle > 0)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.trace import TraceError
+from gearfmu.stage.run.trace import TraceError
 from gearfmu.study.bench import Point, measure
 from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
 from gearfmu.study.norm import Errors, Signals, errors, kept_signals

@@ -13,8 +13,8 @@ from typing import Any
 from gearfmu.body import load_bodies, reduce_body
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.stage.dashpot import same_loss
-from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.build.tables import ROLLS
+from gearfmu.stage.run.dashpot import same_loss
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
 
@@ -46,7 +46,7 @@ class BodyRow:
 @dataclass(frozen=True)
 class Variant:
     """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls. Reduced
-    anew, the contact's dashpots take the constant with which they lose the same (`gearfmu.stage.dashpot`)."""
+    anew, the contact's dashpots take the constant with which they lose the same (`gearfmu.stage.run.dashpot`)."""
 
     name: str
     gears: tuple[Any, ...] | None

@@ -20,8 +20,9 @@ from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
-from gearfmu.study.ladder import LEVELS, base_point, points, quick_scene
+from gearfmu.study.ladder import base_point, points, quick_scene
 from gearfmu.study.norm import band_error, errors, lock_time
 from gearfmu.study.notes import notes
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference

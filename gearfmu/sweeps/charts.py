@@ -14,7 +14,7 @@ from gearfmu.files import written_whole
 from gearfmu.report.metrics import level
 from gearfmu.report.style import panels, styled
 from gearfmu.report.te import write_plot
-from gearfmu.stage.te import mesh_harmonics
+from gearfmu.stage.run.te import mesh_harmonics
 from gearfmu.sweeps.table import SweepTable
 
 TORQUE, SPEED = "torque_Nm", "speed_rad_s"

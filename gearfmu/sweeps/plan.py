@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import GearfmuError
-from gearfmu.spec.base import Quantity, read_toml
-from gearfmu.spec.changes import quantity_at
-from gearfmu.spec.layers import read_layers
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.reading.base import Quantity, read_toml
+from gearfmu.spec.reading.changes import quantity_at
+from gearfmu.spec.reading.layers import read_layers
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.scene import SceneSpec, StageChoice, full_key, scene_path, shipped_scenes
 from gearfmu.spec.stage import stage_class
 from gearfmu.units import to_si

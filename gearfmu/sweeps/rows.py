@@ -12,11 +12,10 @@ from gearfmu.cosim.scene_run import Staged
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
 from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage import StageModel, Trace, loaded_te
-from gearfmu.stage.set_te import GEARS, set_te
-from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.stage import StageModel, Trace
+from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
+from gearfmu.stage.run.steady import Drive, parameters, steady_run
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
 
@@ -32,18 +31,17 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
     settings: dict[str, Any] = _settings(TE, model, values)
     torque, positions = own["torque"], int(own.get("positions", POSITIONS))
     pitches = int(own.get("pitches", 1))
-    if isinstance(model.spec, PlanetarySpec):
-        result = set_te(model, [torque], positions, pitches, **settings)
-        factors = {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, result.load_factor[0], strict=True)}
-        return _te_numbers(result, "") | factors, _curve(result, "")
-    names = [mesh.name for mesh in model.stage.engagements]
+    stage = model.stage
+    names = [None] if stage.carriers else [mesh.name for mesh in stage.engagements]
     row: dict[str, float] = {}
     curve: dict[str, list[float]] = {}
     for mesh in names:
-        found = loaded_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
+        found = stage_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
         before = f"{mesh}_" * (len(names) > 1)
         row |= _te_numbers(found, before)
         curve |= _curve(found, before)
+        if isinstance(found, SetTeResult):
+            row |= {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, found.load_factor[0], strict=True)}
     return row, curve
 
 

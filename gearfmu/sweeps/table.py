@@ -12,7 +12,7 @@ import numpy as np
 
 from gearfmu.extras import has, required
 from gearfmu.files import written_whole
-from gearfmu.stage.trace import Trace, write_columns
+from gearfmu.stage.run.trace import Trace, write_columns
 from gearfmu.sweeps.plan import SweepError
 
 if TYPE_CHECKING:

@@ -24,12 +24,13 @@ from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.spec.gear import MeshSpec
-from gearfmu.spec.planetary_body import SET_BODIES
+from gearfmu.spec.forms.members import body_names
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")
+NAMES = body_names(SPEC)
 COARSE = SPEC.model_copy(
     update={"carrier": SPEC.carrier.model_copy(update={
         "mesh": SPEC.carrier.mesh.model_copy(update={"scale": 0.34}), "modes": 72, "method": "rubin"
@@ -39,7 +40,7 @@ COARSE = SPEC.model_copy(
 
 @pytest.fixture(scope="module")
 def shipped() -> dict:
-    return dict(zip(SET_BODIES, load_bodies(SPEC), strict=True))
+    return dict(zip(NAMES, load_bodies(SPEC), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,7 @@ def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
         assert name == "carrier" or (body.knows_profile and body.spin is not None)
         error, band = (body.max_error, body.band) if name == "carrier" else (body.frf.max_error, body.frf.band)
         assert error < 0.01 and tuple(band) == pytest.approx((50.0, 10e3))
-    assert [shipped[name].modes for name in SET_BODIES] == [400, 400, 399, 120]  # 400 would split a pair of the ring
+    assert [shipped[name].modes for name in NAMES] == [400, 400, 399, 120]  # 400 would split a pair of the ring
     assert shipped["carrier"].max_error < 1e-6
 
 
@@ -165,7 +166,7 @@ def test_a_carrier_body_that_cannot_be_is_refused(carrier):
 def test_missing_and_stale_bodies_are_refused(carrier, tmp_path):
     with pytest.raises(BodyError, match="sun.h5: no such body file"):
         load_bodies(SPEC, tmp_path)
-    for name in SET_BODIES:
+    for name in NAMES:
         (tmp_path / f"{name}.h5").write_bytes(body_path(SPEC, name).read_bytes())
     save_interface_body(carrier, tmp_path / "carrier.h5")
     with pytest.raises(BodyError, match="carrier.h5: stale: made from other numbers"):
@@ -183,7 +184,7 @@ def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_p
     save_interface_body(carrier, tmp_path / "carrier.h5")  # current already
     before, said = (tmp_path / "carrier.h5").stat().st_mtime_ns, []
     bodies = reduce_bodies(spec, tmp_path, progress=lambda what, share: said.append(what))
-    assert [body.name for body in bodies] == list(SET_BODIES) and any("ring" in what for what in said)
+    assert [body.name for body in bodies] == list(NAMES) and any("ring" in what for what in said)
     assert (tmp_path / "carrier.h5").stat().st_mtime_ns == before and bodies[2].internal
     (tmp_path / "sun.h5").unlink()
     stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}

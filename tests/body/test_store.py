@@ -19,8 +19,8 @@ from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import seal
-from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 TINY = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=2)
 

@@ -20,8 +20,8 @@ from gearfmu.fmu.package import write_archive
 from gearfmu.planning.book import Plan
 from gearfmu.planning.run import run_planned
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage.model import StageModel
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.trace import Trace
 
 OF_A_ROAD = {"finished", "cpu_s", "realtime_factor", "stage_cpu_s", "stage_realtime_factor", "unit", "fmu_path"}
 OF_A_NAME = {"stage", "hashes"}  # "planetary54/stage_pin_error" calls itself planetary54_pin_error

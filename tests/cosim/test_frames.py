@@ -12,9 +12,9 @@ from gearfmu.cosim.frames import frame_plan
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, SpecError
-from gearfmu.spec.deformation import DeformationChoice
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.stage.deformation import Deformation
+from gearfmu.spec.scenes.deformation import DeformationChoice
+from gearfmu.stage.run.deformation import Deformation
 
 
 def closure(**deformation: object) -> SceneSpec:

@@ -14,8 +14,8 @@ from gearfmu.cosim.parts import part_network, part_ports
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.start import start_of, start_speeds_of
 from gearfmu.errors import SpecError
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 
@@ -52,7 +52,7 @@ load = { on = "machine", proportional = { torque = "45 N*m", speed = "-66.666666
 
 
 @pytest.fixture(scope="module")
-def pair() -> GeneralStage:
+def pair() -> Stage:
     return as_general(load_stage("fzg_c"))
 
 
@@ -88,7 +88,7 @@ def test_a_drivetrain_is_one_of_four_and_brings_its_own_clutches(tmp_path: Path)
     assert "found test_rig and drivetrain" in found[""] and "[drivetrain.clutches.…]" in found["clutch"]
 
 
-def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path: Path, pair: GeneralStage) -> None:
+def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path: Path, pair: Stage) -> None:
     scene = scene_of(tmp_path, PAIR.replace("ports.wheel", "ports.whel").replace('damping = "0.2 N*m*s/rad"\n', ""))
     with pytest.raises(SpecError) as told:
         part_ports(scene, pair)
@@ -97,18 +97,18 @@ def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path:
     assert remedies["ports.wheel.kind"] == "nothing drives it: write [drivetrain.ports.wheel]"
 
 
-def test_what_a_port_does_not_say_is_the_stage_s(tmp_path: Path, pair: GeneralStage) -> None:
+def test_what_a_port_does_not_say_is_the_stage_s(tmp_path: Path, pair: Stage) -> None:
     ports = part_ports(scene_of(tmp_path, PAIR.replace('stiffness = "2e4 N*m/rad"\n', "")), pair)
     assert ports["pinion"].k == pair.ports["pinion"].k and ports["pinion"].c == 0.2 and ports["wheel"].k == 5e4
 
 
-def test_speeds_follow_shafts_and_meshes(tmp_path: Path, pair: GeneralStage) -> None:
+def test_speeds_follow_shafts_and_meshes(tmp_path: Path, pair: Stage) -> None:
     speeds = start_speeds_of(scene_of(tmp_path, PAIR), pair)
     wheel = -100.0 * 16 / 24
     assert (speeds["motor"], speeds["flange"], speeds["machine"]) == pytest.approx((100.0, wheel, wheel), rel=1e-14)
 
 
-def test_speeds_that_nothing_decides_or_that_contradict_each_other(tmp_path: Path, pair: GeneralStage) -> None:
+def test_speeds_that_nothing_decides_or_that_contradict_each_other(tmp_path: Path, pair: Stage) -> None:
     alone = PAIR.replace("[drivetrain.shafts.half_shaft]", "[drivetrain.clutches.coupling]")
     alone = alone.replace('stiffness = "800 N*m/rad"', 'capacity = [["0 s", "5 N*m"]]')
     with pytest.raises(SpecError, match=r"drivetrain\.inertias\.machine\.speed.*nothing decides its speed"):
@@ -128,7 +128,7 @@ def rest_at(angles: dict[str, float], seen: dict[str, float]):
     return rest
 
 
-def test_everything_gathers_speed_together_and_shafts_carry_what_that_takes(tmp_path: Path, pair: GeneralStage) -> None:
+def test_everything_gathers_speed_together_and_shafts_carry_what_that_takes(tmp_path: Path, pair: Stage) -> None:
     """Ratio i: (J_m + (J_f + J_l)/i²) a = T_m + T_l/i; the pinion's shaft carries T_m − J_m a, the half shaft of the
     machine J_l a_l − T_l."""
     scene, seen = scene_of(tmp_path, PAIR), {}
@@ -182,7 +182,7 @@ def test_a_port_on_the_ground_is_held_at_the_angle_its_torque_needs(tmp_path: Pa
     assert isinstance(next(node for node in network.nodes if node.name == "ground.ring"), Driven)
 
 
-def test_parts_swing_as_their_shafts_say(tmp_path: Path, pair: GeneralStage) -> None:
+def test_parts_swing_as_their_shafts_say(tmp_path: Path, pair: Stage) -> None:
     """Flange and machine on the half shaft alone: ω² = k (1/J₁ + 1/J₂), slips and torques by name."""
     scene = scene_of(tmp_path, PAIR.replace("45 N*m", "0 N*m"))
     start = start_of(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, {}))
@@ -198,9 +198,7 @@ def test_parts_swing_as_their_shafts_say(tmp_path: Path, pair: GeneralStage) -> 
     assert np.allclose(seen, twist * np.cos(omega * times), atol=1e-9 * abs(twist) + 1e-15)
 
 
-def test_the_drivetrain_of_the_page_loads_and_starts_with_a_clutch_that_slips(
-    tmp_path: Path, pair: GeneralStage
-) -> None:
+def test_the_drivetrain_of_the_page_loads_and_starts_with_a_clutch_that_slips(tmp_path: Path, pair: Stage) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "howto-scene.md").read_text(encoding="utf-8")
     block = next(text for text in page.split("```toml\n") if text.startswith('name = "two_machines"'))
     scene, seen = scene_of(tmp_path, block.partition("```")[0]), {}

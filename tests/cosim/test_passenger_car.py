@@ -23,8 +23,8 @@ from gearfmu.cosim.drivetrain import (
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.table import page
-from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
 from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig, table
 
 SHAFTS = Shafts("pinion", "wheel", -1.5)
 CAR = PassengerCar()

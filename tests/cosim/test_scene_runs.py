@@ -15,7 +15,7 @@ from gearfmu.cosim.scene_run import run_once, stage_model, verified
 from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, FmuError, ModelError, SpecError
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 
 def scene(name: str, duration: float, **stage) -> SceneSpec:

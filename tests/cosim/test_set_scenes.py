@@ -14,9 +14,9 @@ from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.fmu import export
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.shaft_loads import SpeedControl
+from gearfmu.spec.scenes.shaft_loads import SpeedControl
 from gearfmu.stage import StageModel
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 R_B_SUN, PIN_CIRCLE = 21.143e-3, 45e-3  # m
 BACKLASH = 0.06e-3  # m, of each of the two meshes in series

@@ -18,9 +18,9 @@ from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.source import Source
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
-from gearfmu.spec.shaft_loads import ShaftLoad
+from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from gearfmu.errors import Problem
 from gearfmu.femesh import gear_sector, scaled_jacobian, volume
 from gearfmu.geometry import GearGeometry, involute
-from gearfmu.spec.checks import geometry_problems
-from gearfmu.spec.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
+from gearfmu.spec.forms.pair_checks import geometry_problems
+from gearfmu.spec.tables.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
 
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)
 

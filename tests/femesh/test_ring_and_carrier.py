@@ -18,9 +18,9 @@ from gearfmu.femesh import FeMesh, mesh_report, ring_sector, scaled_jacobian, vo
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.spec.gear import MeshSpec
-from gearfmu.spec.planetary import CarrierMeshSpec
+from gearfmu.spec.forms.planetary import CarrierMeshSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 SPEC = load_stage("planetary54")
 RING, WIDTH = InternalGearGeometry.of(SPEC.ring, SPEC.set), SPEC.ring.face_width

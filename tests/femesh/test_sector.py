@@ -12,8 +12,8 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.section import graded, transfinite
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 STAGE = load_stage("fzg_c")
 SHAPES = [GearGeometry.of(gear, STAGE.pair) for gear in STAGE.gears]

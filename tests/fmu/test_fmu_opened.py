@@ -16,10 +16,10 @@ from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import write_archive
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.validate import _stage as stage_findings
-from gearfmu.spec.library import shipped_stages
+from gearfmu.spec.reading.library import shipped_stages
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.stored import restored, stored
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.build.model import StageModel
 
 TOPOGRAPHY = "roll_mm,z_mm,deviation_um\n10,-5,0\n10,5,0\n20,-5,3\n20,5,3\n"
 

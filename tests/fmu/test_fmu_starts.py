@@ -18,7 +18,7 @@ from gearfmu.fmu import export, validate
 from gearfmu.fmu.probes import Subject
 from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel
-from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.build.blob import read_blob, write_blob
 
 STARTS = {"level": 1.0, "slices": 3.0, "backlash": 5e-5, "effect.hertz": 0.0}
 

@@ -14,7 +14,7 @@ from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
 from gearfmu.kernel.build import PORTABLE, build_library, host_platform
-from gearfmu.spec.library import model_folder
+from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 

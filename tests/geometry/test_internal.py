@@ -32,7 +32,7 @@ def test_flank_is_the_involute_of_the_base_circle_and_its_normal_points_into_the
 
 
 def test_space_and_tooth_share_the_pitch_on_the_reference_circle():
-    assert float(RING.space_angle(RING.r)) == pytest.approx(RING.half_pitch / 2, rel=1e-12)
+    assert float(RING.thickness_angle(RING.r)) == pytest.approx(RING.half_pitch / 2, rel=1e-12)
 
 
 def test_fillet_is_tangent_to_flank_and_root_circle():
@@ -101,8 +101,8 @@ def test_planets_fit_between_sun_and_ring():
     uneven = replace(SET, angles=tuple(2 * math.pi * k / 72 for k in (0, 14, 29, 43, 58)))
     for case in (SET, three, uneven):
         assert case.assembles()
-        for k, theta in enumerate(case.angles):
-            phase = case.planet_phase(k)
+        for theta in case.angles:
+            phase = math.remainder(theta * (1 - z_r / z_p), 2 * math.pi / z_p)  # rolled in the ring
             assert abs(phase) <= math.pi / z_p * (1 + 1e-9)
             in_ring = (z_p * (theta - phase) - z_r * theta) / (2 * math.pi)  # a tooth meets a space of the ring
             in_sun = (z_p * (theta + math.pi - phase) + z_s * (theta - case.sun_phase())) / (2 * math.pi)

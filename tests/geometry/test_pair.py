@@ -102,7 +102,7 @@ def test_nominal_backlash_grows_with_the_centre_distance() -> None:
 
 
 def test_backlash_angles_and_normal_backlash() -> None:
-    free = PAIR.backlash_angles
+    free = [PAIR.backlash / r_w for r_w in PAIR.r_w]
     assert free[0] * PINION.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
     assert free[1] * WHEEL.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
 

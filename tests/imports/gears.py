@@ -11,7 +11,7 @@ from decks import write_deck
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import StageSpec, load_stage
 
 COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",

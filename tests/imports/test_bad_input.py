@@ -21,7 +21,7 @@ from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported_gear import hinge_problem
+from gearfmu.reduction.imported.gear import hinge_problem
 from gearfmu.spec.stage import load_stage
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'

@@ -16,7 +16,7 @@ from gearfmu.body.imported import imported_full_order
 from gearfmu.fem import solids
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
-from gearfmu.spec.members import member_of
+from gearfmu.spec.forms.members import member_of
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'

@@ -26,11 +26,11 @@ from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.modes.planetary import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.imported_carrier import circle_centre
+from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.spec.library import find_stage
-from gearfmu.spec.members import member_of
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 
 BOLTS = ["PIN_A", "PIN_B", "PIN_C", "PIN_D"]

@@ -11,13 +11,13 @@ from small_gear import GEAR, STEEL, coarse, flank
 
 from gearfmu.fem import patches, solids
 from gearfmu.fem.coupling import rigid_modes
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
-from gearfmu.reduction.imported_flank import tooth_loads
-from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.imported.flank import tooth_loads
+from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 
 COUNT = 49
 

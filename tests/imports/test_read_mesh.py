@@ -14,7 +14,7 @@ from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported import Matrices, SetInterface, full_order
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
 
 MM = 1e-3
 

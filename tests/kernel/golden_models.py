@@ -19,7 +19,7 @@ import numpy as np
 from gearfmu.body import load_bodies
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.build.blob import read_blob, write_blob
 
 FOLDER = Path(__file__).parents[1] / "reference" / "golden_models"
 MODELS = {  # name → stage, modes of a body (a set needs more: distant teeth), width functions, friction possible

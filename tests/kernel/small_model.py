@@ -2,7 +2,7 @@
 bars.
 
 The sections are those of gearfmu/kernel/src/model/gk_fields.inc; the pair's ground oscillators come from its invented
-free bodies by gearfmu.stage.groups, as those of every stage.
+free bodies by gearfmu.stage.build.groups, as those of every stage.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 from exact_bars import Bar
 
-from gearfmu.spec.ports import LevelSpec
-from gearfmu.stage.assembly import (
+from gearfmu.spec.tables.ports import LevelSpec
+from gearfmu.stage.build.assembly import (
     MODEL_VERSION,
     flank_sections,
     flank_sizes,
@@ -22,10 +22,10 @@ from gearfmu.stage.assembly import (
     port_compliances,
     set_sections,
 )
-from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.fields import gear_numbers, order_sections
-from gearfmu.stage.free import FreeBody, free_gear
-from gearfmu.stage.groups import Group, Layout, Support, mount
+from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.build.fields import gear_numbers, order_sections
+from gearfmu.stage.build.free import FreeBody, free_gear
+from gearfmu.stage.build.groups import Group, Layout, Support, mount
 from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 NAMES = ("pinion", "wheel")

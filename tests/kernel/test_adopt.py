@@ -10,7 +10,7 @@ from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.steady import Steady
+from gearfmu.stage.run.steady import Steady
 
 STEP, BEFORE, AFTER = 20e-6, 250, 250  # s; communication steps
 

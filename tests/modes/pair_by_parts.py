@@ -15,7 +15,7 @@ from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec
-from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
+from gearfmu.stage.build.tables import BORE, excited_modes, resampling, symmetric_functions
 
 DRIVE = 0
 LEAST_HALF_WIDTH = 5e-6  # m: below it the local law is a parabola (docs/theory.md 2.4), not known here

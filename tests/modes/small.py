@@ -11,8 +11,8 @@ from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import Material
 
 COUNT = 10
 

@@ -17,9 +17,9 @@ from pair_by_parts import Contact, couple, gear_at, slice_weights, tangents
 from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.assembly import general_sections
-from gearfmu.stage.free import read_tables
-from gearfmu.stage.tables import OFFSETS
+from gearfmu.stage.build.assembly import general_sections
+from gearfmu.stage.build.free import read_tables
+from gearfmu.stage.build.tables import OFFSETS
 
 ROLLS = 48
 PLACES = [((0, 0), (20, 30)), ((1, -1), (38, 9))]  # tooth numbers and grid rolls of both gears

@@ -19,10 +19,10 @@ from gearfmu.body.parts import DRAWN, sector_shapes
 from gearfmu.femesh import gear_sector
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.modes.vtu import write_series
+from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.display import outline, turn_sectors
-from gearfmu.reduction.modal import elastic_modes
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.deformation import Deformation, DeformationError, GearMotion
+from gearfmu.stage.run.deformation import Deformation, DeformationError, GearMotion
 
 
 @pytest.fixture(scope="module", params=["sun", "ring"])

@@ -19,11 +19,11 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
 from gearfmu.modes.linear import Linearised, full_kernel, linearised, shaft_rows, stage_modes
-from gearfmu.spec.ports import ChainSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.limits import largest_torque, places_of
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.run.limits import largest_torque, places_of
+from gearfmu.stage.run.te import statics_of
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 TORQUE = 302.0

@@ -13,17 +13,17 @@ from train_by_parts import Load, frequencies
 
 from gearfmu.body import load_bodies
 from gearfmu.modes.linear import FULL, Linearised, linearised
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.limits import places_of
+from gearfmu.stage.run.limits import places_of
 
 COUNT = 60
 LIGHT = 0.1  # N·m: frequencies move with the place at which gears stand, in proportion to the load: 3e-4 at 1 N·m
 
 
-def plain(stage: GeneralStage) -> GeneralStage:
+def plain(stage: Stage) -> Stage:
     """Without profile and lead modification, so that under little load whole flanks touch."""
     bodies = {
         name: body.model_copy(update={"tip_relief": None, "lead": None}) if hasattr(body, "teeth") else body
@@ -33,7 +33,7 @@ def plain(stage: GeneralStage) -> GeneralStage:
 
 
 @pytest.fixture(scope="module")
-def train() -> tuple[GeneralStage, list[Any], StageModel]:
+def train() -> tuple[Stage, list[Any], StageModel]:
     stage, bodies = plain(load_stage("two_stage")), load_bodies(load_stage("two_stage"))
     return stage, bodies, assemble(stage, bodies)
 

@@ -16,7 +16,7 @@ from gearfmu.fem import solids
 from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.modes.planetary import set_body_modes, uncoupled_carrier_modes
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 
 

@@ -21,9 +21,9 @@ from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
 from gearfmu.body import ReducedBody
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.general import EngagementSpec, GeneralStage, ShaftBody
-from gearfmu.spec.shapes import mesh_shape
-from gearfmu.stage.tables import resampling
+from gearfmu.spec.forms.general import EngagementSpec, ShaftBody, Stage
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.tables import resampling
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out
@@ -65,7 +65,7 @@ class Touch:
     part: np.ndarray
 
 
-def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[float, float]) -> Touch:
+def touch(stage: Stage, mesh: EngagementSpec, load: Load, turned: tuple[float, float]) -> Touch:
     """Of a slice of an engagement whose gears have turned by `turned` (rad) since the drive flanks of tooth 0 touched,
     tooth 0 of gear A on +x. A slice that has partly left a flank touches, loads and reads what is left of it."""
     pair = mesh_shape(stage, mesh)
@@ -105,7 +105,7 @@ def _about_z(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def _tangent(stage: GeneralStage, mesh: EngagementSpec, curvature: float, line: float) -> float:
+def _tangent(stage: Stage, mesh: EngagementSpec, curvature: float, line: float) -> float:
     """δ′ (m²/N) of both bodies under the line load (N/m): docs/theory.md 2.4, the parabola of narrow contacts too."""
     gears = [stage.bodies[name] for name in mesh.gears]
     yields = [2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in gears]
@@ -116,7 +116,7 @@ def _tangent(stage: GeneralStage, mesh: EngagementSpec, curvature: float, line: 
     return slope + a * (1 - min(line / lowest, 1.0))
 
 
-def gear_part(stage: GeneralStage, body: ReducedBody, touches: Sequence[tuple[Load, Touch, int]], count: int) -> Part:
+def gear_part(stage: Stage, body: ReducedBody, touches: Sequence[tuple[Load, Touch, int]], count: int) -> Part:
     """A gear with its bore's node and the slices that it carries; the last of each entry: 0 gear A, 1 gear B. count: of
     width functions."""
     zero = touches[0][1].zero[touches[0][2]]
@@ -153,7 +153,7 @@ def gear_part(stage: GeneralStage, body: ReducedBody, touches: Sequence[tuple[Lo
     )
 
 
-def shaft_part(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -> Part:
+def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:
     """A shaft of finite elements, nodes at `places` (m, in the stage)."""
     origin, m = stage.place(shaft.name, None), shaft.material
     beam = Shaft(
@@ -178,7 +178,7 @@ def shaft_part(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -
 
 
 def frequencies(
-    stage: GeneralStage, bodies: Sequence[ReducedBody], loads: Sequence[Load], turned: Mapping[str, float], count: int
+    stage: Stage, bodies: Sequence[ReducedBody], loads: Sequence[Load], turned: Mapping[str, float], count: int
 ) -> np.ndarray:
     """(count,) lowest frequencies, Hz. turned: angle (rad) of every rotor; every seat is at a gear's mid-width."""
     touches = []

@@ -15,8 +15,8 @@ from gearfmu.planning.choice import FULL_STEP_OF_SETS
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
 from gearfmu.planning.table import plan_text
+from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.scene import load_scene
-from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.sweeps.runners import in_this_process

@@ -18,13 +18,13 @@ from gearfmu.fem.free import FreeBody
 from gearfmu.femesh import ring_sector
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.couplings import Elements
-from gearfmu.reduction.flank import flank_loads
-from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.cyclic.flank import flank_loads
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
-from gearfmu.spec.gear import BodySpec, MeshSpec
-from gearfmu.spec.members import member_of
-from gearfmu.spec.planetary import MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.forms.planetary import MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 MOUNTS = MountsSpec(points=6, stiffness=5e7)

@@ -10,11 +10,11 @@ from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import sector_mesh
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.reduction.flank import Points
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
-from gearfmu.spec.gear import MeshSpec
+from gearfmu.reduction.cyclic.flank import Points
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
 CASES = {

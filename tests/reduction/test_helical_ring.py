@@ -13,9 +13,9 @@ from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.reduction.flank import ToothFlank
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.cyclic.flank import ToothFlank
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.statics import static_tables
 
 BETA = math.radians(20)
 Z, POINTS, WIDTH = 24, 2 * 4 * 3, 8e-3

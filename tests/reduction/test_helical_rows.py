@@ -16,11 +16,11 @@ from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh import gear_sector, scaled_jacobian
 from gearfmu.geometry import PairGeometry
-from gearfmu.reduction.flank import Points, flank_loads
-from gearfmu.reduction.modal import Modes, elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import Statics, static_tables
-from gearfmu.spec.gear import MeshSpec
+from gearfmu.reduction.cyclic.flank import Points, flank_loads
+from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import Statics, static_tables
+from gearfmu.spec.tables.gear import MeshSpec
 
 FLANK_ROWS = 2 * 4 * 3
 

@@ -10,7 +10,7 @@ from gearfmu.body import load_bodies
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.mesh_error import COMPARED, FINER, carrier_mesh_error, free_frequencies
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
 
 ALLOWED = {"planetary54": 3.2e-3, "helical_set": 4.3e-3}  # reached; 3e-3 were wished

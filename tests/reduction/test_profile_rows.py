@@ -16,10 +16,10 @@ from turned_rows import on_tooth
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.flank import flank_loads
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.cyclic.flank import flank_loads
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 
 POINTS = 2 * 4 * 3
 

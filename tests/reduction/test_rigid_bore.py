@@ -16,11 +16,11 @@ import small_ring
 from gearfmu.fem import hex20
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.frf import FrfCase, frf_error
-from gearfmu.reduction.modal import Modes, elastic_modes
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import Statics, static_tables
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.frf import FrfCase, frf_error
-from gearfmu.reduction.modal import Modes, elastic_modes
-from gearfmu.reduction.statics import Statics, static_tables
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.reduction.cyclic.statics import Statics, static_tables
 
 TEETH = range(GEAR.z)
 

@@ -25,8 +25,8 @@ from gearfmu.body.mounted import mount_sectors, mounted, turned_rows
 from gearfmu.errors import BodyError
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.toothed import ring_full_order
 
 Z, POINTS = GEOMETRY.z, 2 * 4 * 3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.reduction.modal import Modes
+from gearfmu.reduction.cyclic.modal import Modes
 
 
 def on_tooth(modes: Modes, rows: np.ndarray, tooth: int, teeth: int) -> np.ndarray:

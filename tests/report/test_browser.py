@@ -15,10 +15,10 @@ from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.moving import moving_view
 from gearfmu.report.picture import _displacement
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.observed import gear_bodies
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.trace import Trace
 from gearfmu.sweeps.page import write_page
 
 pytestmark = [pytest.mark.full, pytest.mark.needs("chromium")]

@@ -18,11 +18,11 @@ from PIL import Image
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.picture import deformed_pair
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.deformation import Deformation, GearMotion
-from gearfmu.stage.observed import gear_bodies
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.deformation import Deformation, GearMotion
+from gearfmu.stage.run.trace import Channel, Trace
 
 CARRIER = 85.0
 

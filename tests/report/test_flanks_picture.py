@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gearfmu.report.flanks import write_flanks
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.flanks import ProfileSpec
-from gearfmu.spec.lead import LeadSpec
-from gearfmu.spec.shapes import gear_shape
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.flanks import FlankField
+from gearfmu.spec.tables.flanks import ProfileSpec
+from gearfmu.spec.tables.lead import LeadSpec
+from gearfmu.stage.build.flanks import FlankField
 
 
 def test_only_flanks_that_are_not_nominal_are_drawn(tmp_path: Path) -> None:

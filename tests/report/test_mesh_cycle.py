@@ -20,12 +20,12 @@ from gearfmu.report.mesh_cycle import (
 )
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.signals import Window, window_of_interest
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.flank_loads import flank_loads
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.flank_loads import flank_loads
+from gearfmu.stage.run.trace import Channel, Trace
 
 TORQUE = 302.0
 
@@ -38,7 +38,7 @@ def model(request: pytest.FixtureRequest) -> StageModel:
 
 def test_forces_of_the_slices_carry_the_torque_and_lie_on_the_path_of_contact(model: StageModel) -> None:
     found = flank_loads(model, 150.0, "mesh", positions=8)
-    pair = mesh_geometry(model.stage, model.stage.engagements[0])
+    pair = mesh_shape(model.stage, model.stage.engagements[0])
     gear = pair.gears[0]
     carried = [found.force[found.at == i].sum() for i in range(8)]
     # the flanks slide off the theoretical line where a tip corner carries: a few per mille
@@ -55,7 +55,7 @@ def test_coast_flanks_are_named() -> None:
     model = assemble(spec, load_bodies(spec))
     drive, coast = (flank_loads(model, torque, "mesh", positions=6) for torque in (100.0, -100.0))
     assert (drive.side, coast.side) == (1, -1)
-    wanted = 100.0 / mesh_geometry(model.stage, model.stage.engagements[0]).gears[0].r_b
+    wanted = 100.0 / mesh_shape(model.stage, model.stage.engagements[0]).gears[0].r_b
     for own in (drive, coast):
         total = [own.force[own.at == i].sum() for i in range(6)]
         assert total == pytest.approx([wanted] * 6, rel=6e-3)
@@ -66,7 +66,7 @@ def test_line_load_over_the_path_adds_up_to_the_mesh_force() -> None:
     load over roll and width, divided by the base pitch."""
     spec = load_stage("fzg_c/stage_relief")
     model = assemble(spec, load_bodies(spec))
-    found, pair = flank_loads(model, TORQUE, "mesh"), mesh_geometry(model.stage, model.stage.engagements[0])
+    found, pair = flank_loads(model, TORQUE, "mesh"), mesh_shape(model.stage, model.stage.engagements[0])
     roll = np.linspace(found.roll.min(), found.roll.max(), 2000)
     load = found.line_load(roll)
     total = np.trapezoid(load.mean(axis=1), roll) * found.face_width / pair.base_pitch
@@ -95,7 +95,7 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     bodies: list[Any] = load_bodies(spec)
     model, time = assemble(spec, bodies), np.linspace(0.0, 1.0, 20_001)
     pitches = 30.0 * time
-    table, pair = loaded_te(model, [TORQUE], 48), mesh_geometry(model.stage, model.stage.engagements[0])
+    table, pair = loaded_te(model, [TORQUE], 48), mesh_shape(model.stage, model.stage.engagements[0])
     te = np.interp(np.mod(pitches, 1.0), np.append(table.position, 1.0), np.append(table.te[0], table.te[0, 0]))
     names = {"mesh.te": te, "wheel.gear.phi": -pitches * 2 * np.pi / pair.gears[1].z}
     trace = steady(np.full(time.size, TORQUE / pair.gears[0].r_b), time, **names)

@@ -12,13 +12,13 @@ from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack, unpacked
-from gearfmu.report.picture import contacts_at, meshing_angles
 from gearfmu.report.structure import AROUND, parts, turned
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.observed import gear_bodies
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.touching import contacts_at, meshing_angles
+from gearfmu.stage.run.trace import Channel, Trace
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N
 TIME = np.linspace(0.0, 0.02, 2001)
@@ -56,7 +56,7 @@ def test_contacts_carry_the_recorded_force(view: View) -> None:
 
 def test_loaded_teeth_stand_where_the_flanks_of_both_gears_meet(view: View) -> None:
     """The contact points of both gears, each from its own angle, tooth and roll, are one point."""
-    pair = mesh_geometry(turning_pair()[1], turning_pair()[1].engagements[0])
+    pair = mesh_shape(turning_pair()[1], turning_pair()[1].engagements[0])
     for frame in range(0, FRAMES, 7):
         spots = []
         for number, body in enumerate(view.bodies):
@@ -72,7 +72,7 @@ def test_a_pair_at_rest_has_the_contacts_of_the_picture() -> None:
     trace, stage, bodies = turning_pair(-1.0)
     found = moving_view(trace, stage, bodies, (0.0, 0.02))
     assert found is not None and np.all(found.bodies[0].contacts["mesh"][2] <= 0)
-    pair = mesh_geometry(stage, stage.engagements[0])
+    pair = mesh_shape(stage, stage.engagements[0])
     assert isinstance(pair, PairGeometry)
     angles = meshing_angles(pair, 0.1, 1)
     assert [c.teeth for c in contacts_at(pair, angles, 1)] == [c.teeth for c in contacts_at(pair, list(angles), 1)]
@@ -114,7 +114,7 @@ def test_planets_stand_between_sun_and_ring() -> None:
     assert view is not None and len(view.bodies) == 6
     made = {body.name: body for body in view.bodies}
     for mesh in stage.engagements:
-        pair, sg = mesh_geometry(stage, mesh), -1 if mesh.name.startswith("sun") else 1
+        pair, sg = mesh_shape(stage, mesh), -1 if mesh.name.startswith("sun") else 1
         for frame in (3, 77):
             spots = []
             for name, geometry in zip(mesh.gears, pair.gears, strict=True):

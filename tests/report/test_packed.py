@@ -11,7 +11,7 @@ import pytest
 from gearfmu import report
 from gearfmu.report.names import plain
 from gearfmu.report.packed import COLUMNS, EXACT, LEVELS, MOST, Pack, reduced, unpacked
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 LIMIT = 6_000_000  # bytes of a page
 TIME = np.arange(20_000) * 2e-5

@@ -12,9 +12,10 @@ from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report import picture
 from gearfmu.report.scene3d import Shape, draw
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run import touching
+from gearfmu.stage.run.trace import Channel, Trace
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +29,8 @@ def stage() -> tuple[Any, list[Any]]:
 def test_teeth_touch_where_both_flanks_are(stage: tuple[Any, list[Any]], sg: int, phi: float) -> None:
     """The flank points of both gears at the rolls found coincide in space, to rounding."""
     pair = PairGeometry.of(stage[0])
-    angles = picture.meshing_angles(pair, phi, sg)
-    contacts = picture.contacts_at(pair, angles, sg)
+    angles = touching.meshing_angles(pair, phi, sg)
+    contacts = touching.contacts_at(pair, angles, sg)
     assert 1 <= len(contacts) <= 2
     for contact in contacts:
         spots = []
@@ -48,8 +49,8 @@ def test_flanks_recede_under_load_on_either_side(stage: tuple[Any, list[Any]]) -
     pair = PairGeometry.of(spec)
     found = {}
     for sg in (1, -1):
-        angles = picture.meshing_angles(pair, sg * 0.3, sg)
-        contacts = picture.contacts_at(pair, angles, sg)
+        angles = touching.meshing_angles(pair, sg * 0.3, sg)
+        contacts = touching.contacts_at(pair, angles, sg)
         moved = [
             picture._displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], sg * 5000.0)
             for g in (0, 1)

@@ -15,7 +15,7 @@ from gearfmu import report
 from gearfmu.report.plots import distinct
 from gearfmu.report.results import key_results, strict
 from gearfmu.report.signals import lock_time, spans, window_of_interest
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 STEP, SAMPLES = 1e-4, 3000
 AXIAL = {"fz": "N", "mx": "N.m", "my": "N.m"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu.commands.runs import finish
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 
 def test_a_run_says_where_its_time_went(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

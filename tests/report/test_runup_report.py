@@ -20,7 +20,7 @@ from gearfmu.report.runup import PICKUP, Turning, passing_orders, resonances, ru
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 STEP, SLOW, FAST, DURATION = 5e-5, 60.0, 240.0, 1.0  # s, rad/s of the carrier
 TIME = np.arange(round(DURATION / STEP) + 1) * STEP

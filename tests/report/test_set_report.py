@@ -15,7 +15,7 @@ from gearfmu.report.chart import Chart
 from gearfmu.report.metrics import Spectrum, band_rms
 from gearfmu.report.plots_set import LEAST_SPAN, planet_set, planets, shares, sharing
 from gearfmu.report.signals import Window, known_meshings
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
 MESH = 54 * CARRIER / (2 * np.pi)  # Hz

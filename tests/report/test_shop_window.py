@@ -11,7 +11,7 @@ from gearfmu.commands.runs import DEMO_STEP, with_step
 from gearfmu.report.plots_nvh import octave_table, sampling_warning
 from gearfmu.report.signals import window_of_interest
 from gearfmu.spec.scene import load_scene
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.run.trace import Trace
 
 
 def closure(step: float, folder: Path) -> Trace:

@@ -17,7 +17,7 @@ from gearfmu.commands.runs import compare as compare_verb
 from gearfmu.errors import GearfmuError
 from gearfmu.report.metrics import amplitude_spectrum
 from gearfmu.report.sound import RATE, STEPS, heard_channel, sound_of
-from gearfmu.stage.trace import Channel, Trace, TraceError
+from gearfmu.stage.run.trace import Channel, Trace, TraceError
 
 TIME = np.arange(25_000) * 2e-5
 TONE = 950.0

@@ -10,8 +10,8 @@ import pytest
 import gearfmu as gf
 from gearfmu.report.te import peak_to_peak, write_plot, write_set_plot
 from gearfmu.stage import loaded_te
-from gearfmu.stage.set_te import SetTeResult
-from gearfmu.stage.te import TeResult
+from gearfmu.stage.run.set_te import SetTeResult
+from gearfmu.stage.run.te import TeResult
 
 POSITION = np.arange(16) / 16
 TORQUE = np.array([50.0, 200.0])

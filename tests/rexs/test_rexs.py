@@ -15,7 +15,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.model import read_rexs
-from gearfmu.spec.new import write_drafted
+from gearfmu.spec.proposals.new import write_drafted
 from gearfmu.spec.stage import load_pair, load_stage
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "rexs"

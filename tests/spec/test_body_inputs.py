@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, RootRelief, Wobble
-from gearfmu.spec.gear import BodySpec
-from gearfmu.spec.lead import EndRelief, LeadSpec, Misalignment
+from gearfmu.spec.forms.body import body_hash, body_inputs
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, RootRelief, Wobble
+from gearfmu.spec.tables.gear import BodySpec
+from gearfmu.spec.tables.lead import EndRelief, LeadSpec, Misalignment
 
 STAGE = load_stage("fzg_c")
 

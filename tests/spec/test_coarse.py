@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gearfmu.body import body_hashes
-from gearfmu.spec.coarse import SCALE, coarse_stage
-from gearfmu.spec.new import new_stage
+from gearfmu.spec.proposals.coarse import SCALE, coarse_stage
+from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.stage import load_stage
 
 

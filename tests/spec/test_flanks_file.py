@@ -9,10 +9,10 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.library import find_stage
-from gearfmu.spec.new import new_stage
+from gearfmu.spec.proposals.new import new_stage
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.topography import read_topography
+from gearfmu.spec.tables.topography import read_topography
 
 BASE = f'base = "{find_stage("fzg_c").as_posix()}"\nname = "other"\n'
 PINION = PairGeometry.of(load_stage("fzg_c")).gears[0]

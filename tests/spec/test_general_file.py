@@ -9,9 +9,9 @@ import pytest
 
 from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError, SpecError
-from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.forms.body import body_hash, body_inputs
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_pair, load_stage
 
 TEXT = find_stage("two_stage").read_text(encoding="utf-8")

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.spec.base import read_toml
-from gearfmu.spec.body import body_inputs
-from gearfmu.spec.expand import as_general, motion_problems
-from gearfmu.spec.library import find_stage
-from gearfmu.spec.new import new_stage
+from gearfmu.spec.forms.body import body_inputs
+from gearfmu.spec.forms.expand import as_general, motion_problems
+from gearfmu.spec.proposals.new import new_stage
+from gearfmu.spec.reading.base import read_toml
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.schema import set_schema
 from gearfmu.spec.stage import load_pair, load_stage
 

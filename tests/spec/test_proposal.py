@@ -11,7 +11,7 @@ import pytest
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.planetary import PlanetaryGeometry
-from gearfmu.spec.proposal import Wish, draft_of, new_from_numbers
+from gearfmu.spec.proposals.numbers import Wish, draft_of, new_from_numbers
 from gearfmu.spec.stage import load_stage
 
 PAIR = Wish((31, 73), 2.5e-3, 30e-3, center=141e-3, helix=math.radians(22))

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.base import read_toml
-from gearfmu.spec.checks import at_most, largest_half_width
-from gearfmu.spec.gear import Bearing
-from gearfmu.spec.library import find_stage, model_folder, shipped_stages
-from gearfmu.spec.new import stage_text
+from gearfmu.spec.forms.pair_checks import at_most, largest_half_width
+from gearfmu.spec.proposals.new import stage_text
+from gearfmu.spec.reading.base import read_toml
+from gearfmu.spec.reading.library import find_stage, model_folder, shipped_stages
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import Bearing
 
 RAW = read_toml(find_stage("fzg_c"))
 Write = Callable[[dict[str, Any]], Path]

@@ -22,14 +22,14 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
-from gearfmu.spec.expand import spread
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.expand import spread
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.assembly import mount_sets
-from gearfmu.stage.groups import SPIN, Group
-from gearfmu.stage.layout import stage_layout
+from gearfmu.stage.build.assembly import mount_sets
+from gearfmu.stage.build.groups import SPIN, Group
+from gearfmu.stage.build.layout import stage_layout
 
 HARD = 5e19  # Pa: the local compliance stays above the least that a model may have
 TORQUE = PortSpec(kind="torque")

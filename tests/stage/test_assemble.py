@@ -7,15 +7,15 @@ import pytest
 from flank_reader import full_tables
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.assembly import general_sections, mount_sets
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.compact import residual_sections
-from gearfmu.stage.fields import GEAR_NUMBERS, SIZES
-from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.tables import ROLLS, blend, resampling
+from gearfmu.stage.build.assembly import general_sections, mount_sets
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.compact import residual_sections
+from gearfmu.stage.build.fields import GEAR_NUMBERS, SIZES
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.build.tables import ROLLS, blend, resampling
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.blob import ENTRY, HEADER, blob_hash, read_blob, rounded_hash, seal, write_blob
+from gearfmu.stage.build.blob import ENTRY, HEADER, blob_hash, read_blob, rounded_hash, seal, write_blob
 
 SAMPLE = {
     "name": "fzg_c µm",

@@ -16,9 +16,9 @@ from gearfmu.body import ReducedBody
 from gearfmu.commands.effects import effects_page
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.scene import Effects
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
 

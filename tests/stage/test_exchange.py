@@ -9,8 +9,8 @@ import pytest
 
 import gearfmu as gf
 from gearfmu import cli
-from gearfmu.stage.exchange import WRITERS, matlab_names
-from gearfmu.stage.trace import TraceError
+from gearfmu.stage.run.exchange import WRITERS, matlab_names
+from gearfmu.stage.run.trace import TraceError
 
 STEP = 1 / 51200  # s: a step that six digits do not hold
 

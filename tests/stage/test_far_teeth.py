@@ -11,7 +11,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN, LinearModel
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.build.blob import read_blob, write_blob
 
 RIGID, FAST, STANDARD, FULL = 0.0, 1.0, 2.0, 3.0
 TORQUE = 600.0

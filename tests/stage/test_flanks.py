@@ -18,14 +18,14 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.relief import ReliefCurve
 from gearfmu.kernel import Kernel
-from gearfmu.spec.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
-from gearfmu.spec.gear import GearSpec
-from gearfmu.spec.lead import EndRelief, LeadSpec, Misalignment
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
+from gearfmu.spec.tables.gear import GearSpec
+from gearfmu.spec.tables.lead import EndRelief, LeadSpec, Misalignment
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.run.te import statics_of
 
 NO_CORNERS = {"effect.tip_contact": 0.0}
 PROFILES: dict[str, dict[str, Any]] = {

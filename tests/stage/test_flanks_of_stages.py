@@ -12,18 +12,18 @@ import pytest
 import gearfmu as gf
 from gearfmu.body import load_bodies
 from gearfmu.geometry.planetary import planet_angles
-from gearfmu.spec.expand import expand_set
-from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.shapes import gear_shape
+from gearfmu.spec.forms.expand import expand_set
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
 from gearfmu.stage import assemble
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.flanks import FlankField
-from gearfmu.stage.meshes import tooth_phases
-from gearfmu.stage.place import place_of
-from gearfmu.stage.set_te import set_te
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.flanks import FlankField
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.set_te import set_te
+from gearfmu.stage.run.te import statics_of
 
 TORQUE = 600.0
 

@@ -18,12 +18,12 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.scenes.rattle import CONSERVING, FreePair, Rattle, energies, free_pair, started
-from gearfmu.spec.ports import FrictionSpec, PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.efficiency import loss_factor, mesh_efficiency
-from gearfmu.stage.fields import GEAR_NUMBERS
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.fields import GEAR_NUMBERS
+from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
 EM = 2.0

@@ -12,13 +12,14 @@ import pytest
 
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import EngagementSpec, GeneralStage, PlacedPort, RotorSpec, SupportSpec
-from gearfmu.stage.assembly import MODEL_VERSION, general_sections
-from gearfmu.stage.fields import order_sections
-from gearfmu.stage.groups import mount
-from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.meshes import mesh_geometry, tooth_phases
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
+from gearfmu.stage.build.fields import order_sections
+from gearfmu.stage.build.groups import mount
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.build.meshes import tooth_phases
 
 A = 0.0915
 SHAFT = {
@@ -30,7 +31,7 @@ SHAFT = {
 
 
 @pytest.fixture(scope="module")
-def train(spec) -> GeneralStage:
+def train(spec) -> Stage:
     """Twice the FZG pair in series, the second stage at 50 degrees, on three shafts."""
     pair = expand_pair(spec)
     gears = {
@@ -49,7 +50,7 @@ def train(spec) -> GeneralStage:
     ]
     common = {"backlash": 1e-4, "damping": 2e5, "speed_max": 600.0}
     out = (A + A * math.cos(math.radians(50)), A * math.sin(math.radians(50)))
-    return GeneralStage(
+    return Stage(
         name="train",
         source=spec.source,
         bodies=gears | {name: SHAFT for name in ("in", "mid", "out")},
@@ -123,7 +124,7 @@ def test_teeth_touch_in_every_engagement_at_angle_zero(train):
         ),
     )).wheel_phase  # fmt: skip
     for mesh in train.engagements:
-        pair = mesh_geometry(train, mesh)
+        pair = mesh_shape(train, mesh)
         a, b = pair.gears
         (x, y), (u, v) = (train.rotors[train.rotor_of(gear)].axis for gear in mesh.gears)
         t = math.atan2(v - y, u - x) - pair.alpha_wt

@@ -11,8 +11,8 @@ import pytest
 
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
 from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 

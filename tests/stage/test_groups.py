@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gearfmu.spec.expand import expand_pair
-from gearfmu.stage.assembly import assemble, general_sections
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.compact import ground_rows
-from gearfmu.stage.free import read_tables, turn_tables
-from gearfmu.stage.groups import SPIN, mount
-from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.tables import OFFSETS, blend, resampling, symmetric_functions
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.stage.build.assembly import assemble, general_sections
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.compact import ground_rows
+from gearfmu.stage.build.free import read_tables, turn_tables
+from gearfmu.stage.build.groups import SPIN, mount
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.build.tables import OFFSETS, blend, resampling, symmetric_functions
 
 LOADS = [
     (0, 0, 5, 0),

@@ -14,11 +14,11 @@ from gearfmu.body import ReducedBody
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.gear import BodySpec, MeshSpec
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.members import members
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 STAGE = Path(__file__).parents[2] / "benchmarks" / "calculix" / "internal" / "stage.toml"
@@ -30,11 +30,11 @@ COARSE = BodySpec(
 )  # fmt: skip
 
 
-def stage_at(beta: float) -> GeneralStage:
+def stage_at(beta: float) -> Stage:
     """The spur pair with a helix of the same transverse section (but for the rack's rounding), both gears held along
     the axis and against tilting."""
     spur, cosine = load_stage(STAGE), math.cos(beta)
-    assert isinstance(spur, GeneralStage)
+    assert isinstance(spur, Stage)
     angles = {"normal_module": MODULE * cosine, "pressure_angle": math.atan(math.tan(ANGLE) * cosine)}
     common = angles | {"helix_angle": beta, "body": COARSE}
     pinion, ring = spur.bodies["pinion"], spur.bodies["ring"]

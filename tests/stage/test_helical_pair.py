@@ -13,12 +13,12 @@ import pytest
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.lead import LeadSpec, Misalignment
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.lead import LeadSpec, Misalignment
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.fields import change_gear
+from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.build.fields import change_gear
 
 TORQUE, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}

@@ -16,7 +16,7 @@ from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.set_te import SetTeResult, set_te
+from gearfmu.stage.run.set_te import SetTeResult, set_te
 
 BETA, TORQUE, SLICES, WIDTH = math.radians(20), 300.0, 6, 30e-3
 SUPPORTS = ("bearing.sun", "bearing.ring", "bearing.carrier")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import small_gear
 
-from gearfmu.reduction.modal import elastic_modes
-from gearfmu.spec.expand import as_general
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.inertia import gear_inertia, largest_speeds
+from gearfmu.stage.run.inertia import gear_inertia, largest_speeds
 
 
 def test_speeds_are_those_of_the_fastest_the_stage_may_turn() -> None:

@@ -19,13 +19,13 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.gear import BodySpec, MeshSpec
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.members import members
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.meshes import tooth_phases
+from gearfmu.stage.build.meshes import tooth_phases
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,7 +43,7 @@ DRIVE, COAST = 0, 1
 
 
 @pytest.fixture(scope="module")
-def stage() -> GeneralStage:
+def stage() -> Stage:
     """Pinion 18 in a ring 54, on coarse meshes."""
     spec = load_stage(STAGE)
     coarse = {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}
@@ -51,19 +51,19 @@ def stage() -> GeneralStage:
 
 
 @pytest.fixture(scope="module")
-def mesh(stage: GeneralStage) -> RingMesh:
+def mesh(stage: Stage) -> RingMesh:
     found = mesh_shape(stage, stage.engagements[0])
     assert isinstance(found, RingMesh)
     return found
 
 
 @pytest.fixture(scope="module")
-def bodies(stage: GeneralStage) -> list[ReducedBody]:
+def bodies(stage: Stage) -> list[ReducedBody]:
     return [reduced_gear(member, "0" * 64) for member in members(stage).values()]
 
 
 @pytest.fixture(scope="module")
-def model(stage: GeneralStage, bodies: list[ReducedBody]) -> StageModel:
+def model(stage: Stage, bodies: list[ReducedBody]) -> StageModel:
     return assemble(stage, bodies)
 
 
@@ -77,7 +77,7 @@ def rolling(mesh: RingMesh, phi: float, lead: float = 0.0) -> np.ndarray:
     return np.array([0.0, 0.0, phi, 0.0, 0.0, (mesh.planet.r_b * phi + lead) / mesh.ring.r_b])
 
 
-def flank_of(stage: GeneralStage, mesh: RingMesh, which: int, pose: np.ndarray, place: tuple[int, int]):
+def flank_of(stage: Stage, mesh: RingMesh, which: int, pose: np.ndarray, place: tuple[int, int]):
     """Point (2,) m on a flank at a roll (m), in the stage: of gear `which` (0 pinion, 1 ring) at a pose. place: flank
     and number of tooth or space."""
     gear, name = mesh.gears[which], stage.gears[which].name
@@ -97,7 +97,7 @@ def past(mesh: RingMesh, place, which: int) -> bool:
 
 
 @pytest.mark.parametrize("flank", [DRIVE, COAST])
-def test_gap_is_the_distance_of_two_involutes(stage: GeneralStage, mesh: RingMesh, inner: Inner, flank: int) -> None:
+def test_gap_is_the_distance_of_two_involutes(stage: Stage, mesh: RingMesh, inner: Inner, flank: int) -> None:
     """At displaced axes and any angle; open flanks, so that the shortest distance is along the common normal. Thinner
     teeth, which the declared backlash means, are an allowance on the coast side (docs/theory.md, 2.1)."""
     rng, worst, count = np.random.default_rng(4), 0.0, 0
@@ -154,7 +154,7 @@ def edge_centre(mesh: RingMesh, which: int) -> np.ndarray:
 
 @pytest.mark.parametrize("edge", EDGES)
 def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
-    stage: GeneralStage, mesh: RingMesh, inner: Inner, edge: str
+    stage: Stage, mesh: RingMesh, inner: Inner, edge: str
 ) -> None:
     """The gap is the shortest distance of the arc's centre from the other flank, less the radius; open flanks."""
     c, o, worst, count = EDGES[edge], 1 - EDGES[edge], 0.0, 0
@@ -268,14 +268,14 @@ def test_no_interference_over_a_pitch(mesh: RingMesh) -> None:
             off = np.abs(there - 2 * math.pi / ring.z * np.round(there * ring.z / (2 * math.pi)))
             form = float(involute.radius_at_roll(ring.s_form, ring.r_b))
             inside = (radius > ring.r_a + ring.tip_edge) & (radius < form)
-            over = (off[inside] - ring.space_angle(radius[inside])) * radius[inside]
+            over = (off[inside] - ring.thickness_angle(radius[inside])) * radius[inside]
             deepest = max(deepest, float(over.max(initial=-1.0)))
             assert radius.max() < ring.r_f
     print(f"deepest {deepest:.2e} m")
     assert deepest < 1e-9
 
 
-def test_pinion_and_ring_turn_alike_by_the_ratio_of_teeth(stage: GeneralStage, mesh: RingMesh, model) -> None:
+def test_pinion_and_ring_turn_alike_by_the_ratio_of_teeth(stage: Stage, mesh: RingMesh, model) -> None:
     assert model.shafts.ratio == pytest.approx(54 / 18)
     kernel = model.kernel(level=0.0)
     kernel.prepare()

@@ -11,7 +11,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
 from gearfmu.stage import StageModel, Steady, Trace, loaded_te, simulate
-from gearfmu.stage.limits import beyond_limits, largest_speed, largest_torque
+from gearfmu.stage.run.limits import beyond_limits, largest_speed, largest_torque
 
 FAST = {"level": 1.0}
 TORQUE, SPEED, JUMP = 32, 64, 128

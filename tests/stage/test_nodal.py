@@ -13,10 +13,10 @@ import pytest
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
-from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.nodal import flank_nodes, mesh_penalty
+from gearfmu.stage.build.nodal import flank_nodes, mesh_penalty
 
 PAPER, LINE, NODAL = 4, 1, 2
 SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion

@@ -24,11 +24,11 @@ from gearfmu.cli import outcome
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.geometry import PairGeometry
 from gearfmu.ranges import Range, all_ranges, kernel_limits, range_of
-from gearfmu.spec.base import Quantity, Spec, Whole, metadata_of, validate
-from gearfmu.spec.lead import Misalignment
-from gearfmu.spec.profile import read_profile
+from gearfmu.spec.reading.base import Quantity, Spec, Whole, metadata_of, validate
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.steady import DRIVE_RANGES, PARAMETER_RANGES
+from gearfmu.spec.tables.lead import Misalignment
+from gearfmu.spec.tables.profile import read_profile
+from gearfmu.stage.run.steady import DRIVE_RANGES, PARAMETER_RANGES
 
 Annotation = Quantity | Whole
 FILE = "some.toml"
@@ -237,7 +237,7 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
 
 
 def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file(tmp_path: Path) -> None:
-    from gearfmu.spec.general_checks import general_problems
+    from gearfmu.spec.forms.general_checks import general_problems
 
     stage = gf.load("two_stage")
     many = stage.model_copy(update={"engagements": stage.engagements[:1] * 13})

@@ -16,13 +16,13 @@ from gearfmu.body.mounted import turned_rows
 from gearfmu.errors import ModelError
 from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.groups import MOTIONS
-from gearfmu.stage.meshes import tooth_phases
-from gearfmu.stage.observed import MODE, MOTION
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.groups import MOTIONS
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.build.observed import MODE, MOTION
 
 TORQUE, SLICES = 600.0, 5
 FAST, FULL = 1.0, 3.0
@@ -46,7 +46,7 @@ def observed(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
 def started(model: StageModel, level: float) -> Kernel:
     """The pair wound up by some 300 N·m."""
     kernel = model.kernel(level=level)
-    pinion = model.pair.ports["pinion"]
+    pinion = model.spec.ports["pinion"]
     assert pinion.k is not None
     kernel.set("pinion.phi", 300.0 / pinion.k)
     kernel.initialize()

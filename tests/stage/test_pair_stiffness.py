@@ -18,10 +18,10 @@ import scipy.sparse.linalg as sla
 
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.reduction.flank import Points, ToothFlank
-from gearfmu.reduction.sector import SectorBody
-from gearfmu.spec.gear import GearSpec
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.gear import GearSpec
 from gearfmu.stage import StageModel
 
 LINE_LOAD = 300e3  # N/m

@@ -12,8 +12,8 @@ from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 
 PITCH = 2 * math.pi / 24  # rad, of the wheel

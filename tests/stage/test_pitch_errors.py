@@ -16,11 +16,11 @@ from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.forms.body import body_hash, body_inputs
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.build.blob import read_blob, write_blob
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
 DEVIATION = 50e-6

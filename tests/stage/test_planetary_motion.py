@@ -8,8 +8,8 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}

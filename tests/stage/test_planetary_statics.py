@@ -19,13 +19,13 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
 from gearfmu.modes.linear import linearised
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.turning import turns, with_ports
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.turning import turns, with_ports
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.place import place_of
-from gearfmu.stage.set_te import SetTeResult, set_te
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.set_te import SetTeResult, set_te
+from gearfmu.stage.run.te import statics_of
 
 TORQUE = 600.0  # N·m on the carrier, driving
 R_SUN = 1.25e-3 * 18 * math.cos(math.radians(20))  # base radius of sun and planets, m
@@ -271,7 +271,7 @@ def test_statics_find_their_equilibrium_at_level_fast(model: StageModel) -> None
 
 def test_a_pair_is_no_set(model: StageModel) -> None:
     with pytest.raises(ModelError, match="is no planetary set"):
-        set_te(replace(model, spec=model.stage), [TORQUE], 2)
+        set_te(replace(model, spec=load_stage("fzg_c")), [TORQUE], 2)
 
 
 @pytest.mark.full

@@ -21,12 +21,12 @@ from scipy.integrate import cumulative_trapezoid
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.modes.linear import linearised
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
-from gearfmu.stage.place import place_of
-from gearfmu.stage.set_te import SetTeResult, set_te
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.set_te import SetTeResult, set_te
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02

@@ -12,8 +12,8 @@ from gearfmu import cli
 from gearfmu.body import load_bodies
 from gearfmu.body.bodies import expected_hash
 from gearfmu.errors import BodyError, SpecError
-from gearfmu.spec.bores import with_bores
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.bores import with_bores
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 
 ROOT = Path(__file__).parents[2]

@@ -11,8 +11,8 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import ChainSpec
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 LOAD = 302.0  # N·m on the pinion

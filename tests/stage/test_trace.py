@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from gearfmu.hdf5 import seal
-from gearfmu.stage.trace import Channel, Trace, TraceError
+from gearfmu.stage.run.trace import Channel, Trace, TraceError
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -146,7 +146,7 @@ def test_every_truncation_is_refused(tmp_path: Path) -> None:
 
 WRITER = """
 import sys, numpy as np
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 big = Trace(np.arange(200_000.0), {f"c{i}": Channel(np.random.default_rng(i).normal(size=200_000)) for i in range(20)})
 print("ready", flush=True)
 while True:

@@ -13,16 +13,16 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.spec.base import read_toml
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import GeneralStage, RotorSpec
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import RotorSpec, Stage
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.spec.forms.turning import shafts_of, turns
+from gearfmu.spec.reading.base import read_toml
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.turning import shafts_of, turns
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.steady import Drive, steady_run
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.run.steady import Drive, steady_run
+from gearfmu.stage.run.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
@@ -51,7 +51,7 @@ def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
-def side_by_side(pair: GeneralStage) -> GeneralStage:
+def side_by_side(pair: Stage) -> Stage:
     """The pair twice in one stage, far apart; names of the second begin with "b_"."""
 
     def named(name: str) -> str:
@@ -98,7 +98,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
         assert np.ptp(alone["mesh.force"]) > 10
 
 
-def turned(stage: GeneralStage, angle: float) -> GeneralStage:
+def turned(stage: Stage, angle: float) -> Stage:
     """The whole stage about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     rotors = {
@@ -145,7 +145,7 @@ def test_torque_comes_through_a_train_by_its_ratio(two_stage) -> None:
     for number, (mesh, torque) in enumerate(zip(stage.engagements, (TORQUE, TORQUE * 61 / 25), strict=True)):
         forces = kernel.transmission(0.0, TORQUE, number).forces
         carried = sum(sum(slices) for slices in forces.values())
-        gear = mesh_geometry(stage, mesh).gears[0]
+        gear = mesh_shape(stage, mesh).gears[0]
         assert carried == pytest.approx(torque / (gear.r_b * math.cos(gear.beta_b)), rel=1e-5), mesh.name
     found = at_rest(two_stage)
     assert -found["output.tau"] / found["input.tau"] == pytest.approx(shafts.ratio, rel=0.01)
@@ -161,7 +161,7 @@ def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
     found = at_rest(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
     pushed = {}
     for mesh, gear, index, torque in (("stage1", "wheel1", 1, TORQUE), ("stage2", "pinion2", 0, TORQUE * 61 / 25)):
-        shape = mesh_geometry(two_stage.stage, next(m for m in two_stage.stage.engagements if m.name == mesh))
+        shape = mesh_shape(two_stage.stage, next(m for m in two_stage.stage.engagements if m.name == mesh))
         first = shape.gears[0]
         pushed[gear] = torque / (first.m_t * first.z / 2) * math.tan(abs(first.beta))
         assert abs(found[f"seat.{gear}.fz"]) == pytest.approx(pushed[gear], rel=5e-3), gear
@@ -239,7 +239,7 @@ def test_a_pair_written_as_a_general_stage_is_the_same_model(tmp_path: Path, bod
     path = tmp_path / "stage.toml"
     path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in tables.items()), encoding="utf-8")
     spec = load_stage(path)
-    assert isinstance(spec, GeneralStage)
+    assert isinstance(spec, Stage)
     assert load_bodies(spec, find_stage("fzg_c").parent)[0].input_hash == bodies[0].input_hash
     assert assemble(spec, bodies).hash == plain.hash
 

@@ -10,9 +10,9 @@ import pytest
 import scipy.linalg as sl
 
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
-from gearfmu.stage.free import FreeBody, free_gear, free_shaft, read_tables
-from gearfmu.stage.groups import Layout, Support, mount, node_directions
-from gearfmu.stage.tables import OFFSETS, resampling
+from gearfmu.stage.build.free import FreeBody, free_gear, free_shaft, read_tables
+from gearfmu.stage.build.groups import Layout, Support, mount, node_directions
+from gearfmu.stage.build.tables import OFFSETS, resampling
 
 STEEL = Steel(206e9, 0.3, 7850.0)
 SHAFTS = [

@@ -11,7 +11,7 @@ import pytest
 from gearfmu import cli
 from gearfmu.commands.study import set_table
 from gearfmu.report.study import write_chart
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.study.sets import DURATION, SETTLE, SetRow, at_speed, ladder, window, with_planets

@@ -1,0 +1,1 @@
+"""Reduction of gears meshed here, by one sector of their cyclic symmetry."""

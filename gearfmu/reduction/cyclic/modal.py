@@ -1,0 +1,220 @@
+"""Elastic modes of a free gear body: all nodal diameters, both mid-width parities, as real mass-normalised modes.
+
+The sector of a helical gear is not its own mirror image: there is one family for each nodal diameter, of parity 0.
+
+A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same frequency, its real and its imaginary part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.fem.cyclic import SectorSpace
+from gearfmu.fem.harmonic import Harmonic
+from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.fem.low_fields import LowFields
+from gearfmu.fem.refined import refined_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.spin import FamilySpin, Spin, family_spin, join_spin
+
+_SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
+_SAMPLED = 1e-4  # residual of their modes
+_BESIDE = 3  # modes of a family beyond its share that join the space
+_SPACE_SHARE = 0.4  # of the time, for the space
+_SHAPES = 4  # lowest shapes of each family kept for pictures
+COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Modes:
+    """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
+
+    frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
+    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are
+    none, kg^-½: like flank_rows, along the profile. shapes : index of a mode → (3N,) sector
+    displacement in kg^-½, complex for a pair's first mode. surface (n, P, 3) or None, kg^-½: displacement of chosen
+    points of sector 0 in every mode, the second of a pair its imaginary part. spin : what they feel when the body
+    turns; None where that was not made.
+    """
+
+    frequency: np.ndarray
+    nodal_diameter: np.ndarray
+    part: np.ndarray
+    parity: np.ndarray
+    flank_rows: np.ndarray
+    bore_rows: np.ndarray
+    patch_rows: np.ndarray
+    shapes: dict[int, np.ndarray]
+    tangent_rows: np.ndarray | None = None
+    surface: np.ndarray | None = None
+    spin: Spin | None = None
+
+
+@dataclass(frozen=True)
+class _FamilyModes:
+    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), lowest shapes (3N, k
+    at most) for pictures, displacement (k, P, 3) of the chosen points, complex for weight 2; what they feel when the
+    body turns."""
+
+    weight: int
+    complete: bool
+    squared: np.ndarray
+    flank_rows: np.ndarray
+    bore_rows: np.ndarray
+    shapes: np.ndarray
+    surface: np.ndarray
+    spin: FamilySpin | None
+
+
+def elastic_modes(
+    body: SectorBody, count: int, progress: Progress | None = None, sample: sp.csr_array | None = None
+) -> Modes:
+    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
+
+    sample (P, N) : points of sector 0 from its nodes, whose displacement is kept in every mode (`Modes.surface`).
+
+    A few families are solved first and tell, by a small space that holds their modes (`LowFields`), how many modes of
+    each family are wanted, and near where they are. A family whose highest frequency does not lie above the last mode
+    kept is solved again for more: no mode is missed. Raises ModesError when the eigensolver fails.
+    """
+    chosen = sp.csr_array((0, len(body.mesh.nodes))) if sample is None else sample
+    lows = [_low_fields(body, space, count, progress) for space in body.spaces]
+    families = [(s, nu) for s in range(len(body.spaces)) for nu in body.diameters()]
+    wanted = _expected(body, lows, count)
+    found: dict[tuple[int, int], _FamilyModes] = {}
+    while True:
+        open_families = [
+            key
+            for key in families
+            if key not in found or not found[key].complete and len(found[key].squared) < wanted[key]
+        ]
+        number = 0
+        for index, low in enumerate(lows):
+            for mine in refined_modes(low, {nu: wanted[s, nu] for s, nu in open_families if s == index}):
+                nu = mine[0].nodal_diameter
+                if progress:
+                    done = number / len(open_families)
+                    progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
+                found[index, nu] = _made(body, index, mine, chosen)
+                number += 1
+        limit = _limit(found.values(), count)
+        again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
+        if not again:
+            modes = _assembled(body, found, count)
+            return modes if sample is not None else replace(modes, surface=None)
+        for key in again:
+            wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
+
+
+def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress | None) -> LowFields:
+    """The space of the modes of a few nodal diameters; low ones have the most modes in a band."""
+    low, last = LowFields(space), body.diameters()[-1]
+    diameters = sorted({round(part * last) for part in _SAMPLES})
+    for number, nu in enumerate(diameters):
+        if progress:
+            progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
+        harmonic, wide = space.harmonic(nu), 2 - 1.5 * nu / last
+        low.add(harmonic, lowest_modes(harmonic, int(wide * _share(body, count)) + _BESIDE, _SAMPLED)[1])
+    return low
+
+
+def _share(body: SectorBody, count: int) -> int:
+    """Modes that a family has among the `count` lowest, and some more."""
+    mean = count / (body.teeth * len(body.spaces))
+    return int(np.ceil(mean + np.sqrt(mean))) + 1
+
+
+def _expected(body: SectorBody, lows: list[LowFields], count: int) -> dict[tuple[int, int], int]:
+    """How many modes of every family to look for: those among the `count` lowest and one more."""
+    most, near = 2 * _share(body, count) + _BESIDE, {}
+    for index, (space, low) in enumerate(zip(body.spaces, lows, strict=True)):
+        for nu in body.diameters():
+            squared = low.modes(space.harmonic(nu), most)[0]
+            near[index, nu] = np.repeat(squared, 1 if nu == 0 or 2 * nu == body.teeth else 2), squared
+    every = np.sort(np.concatenate([repeated for repeated, _ in near.values()]))
+    limit = every[min(count, len(every)) - 1]
+    return {key: max(1, int((squared <= limit).sum()) + 1) for key, (_, squared) in near.items()}
+
+
+def _limit(found: Iterable[_FamilyModes], count: int) -> float:
+    """ω² of the `count`-th real mode among those found."""
+    squared = np.sort(np.concatenate([np.repeat(m.squared, m.weight) for m in found]))
+    return squared[min(count, len(squared)) - 1]
+
+
+def _made(
+    body: SectorBody, index: int, modes: tuple[Harmonic, np.ndarray, np.ndarray], sample: sp.csr_array
+) -> _FamilyModes:
+    harmonic, squared, shapes = modes
+    family = body.family_of(index, harmonic)
+    shapes = shapes * np.sqrt(family.weight / body.teeth)
+    fields = body.spaces[index].to_nodes @ harmonic.expand(shapes)
+    flank = np.zeros((body.load_matrix.shape[0], len(squared)), shapes.dtype)
+    flank[family.columns] = body.load_matrix[family.columns] @ fields
+    gauge = _gauge(flank[: body.profile_loads])
+    fields, flank = fields * gauge, flank * gauge
+    bore = body.teeth * (family.bore_parts.conj().T @ (family.moments @ fields))
+    surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
+    for k in range(len(squared) if sample.shape[0] else 0):
+        surface[k] = sample @ fields[:, k].reshape(-1, 3)
+    spin = family_spin(body, harmonic.nodal_diameter, family.weight, fields) if body.knows_stress else None
+    pictures = fields[:, :_SHAPES].copy()
+    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
+
+
+def _gauge(rows: np.ndarray) -> np.ndarray:
+    """Factors that fix the free sign, or the free phase of a pair: the real part dominates the flank rows, its largest
+    entry is positive. Modes that leave the flanks at rest keep their sign."""
+    square = (rows**2).sum(axis=0)
+    moving = np.abs(square) > 1e-20 * (np.abs(rows) ** 2).sum(axis=0).max(initial=1e-300)
+    turn = np.where(moving, np.exp(-0.5j * np.angle(square)), 1.0)
+    turned = (rows * turn).real
+    largest = turned[np.abs(turned).argmax(axis=0), np.arange(rows.shape[1])]
+    turn = turn * np.where(largest < 0, -1.0, 1.0)
+    return turn if np.iscomplexobj(rows) else turn.real.round()
+
+
+def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], count: int) -> Modes:
+    entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
+    entries.sort(key=lambda entry: entry[0])
+    columns: dict[str, list] = {name: [] for name in COLUMNS}
+    spins: list[tuple[FamilySpin, int, int]] = []  # none where the body does not know them
+    shapes: dict[int, np.ndarray] = {}
+    for squared, key, k in entries:
+        modes = found[key]
+        pair = modes.weight == 2
+        if len(columns["part"]) + (2 if pair else 1) > count:
+            break
+        if k < modes.shapes.shape[1]:
+            shapes[len(columns["part"])] = modes.shapes[:, k]
+        for part in (1, 2) if pair else (0,):
+            columns["frequency"].append(np.sqrt(squared) / (2 * np.pi))
+            columns["diameter"].append(key[1])
+            columns["part"].append(part)
+            if modes.spin is not None:
+                spins.append((modes.spin, k, part))
+            columns["parity"].append(body.spaces[key[0]].parity)
+            columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
+            columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
+            columns["surface"].append(modes.surface[k].imag if part == 2 else modes.surface[k].real)
+    numbers, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
+    flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [body.flank_count, body.profile_loads])
+    return Modes(
+        np.array(columns["frequency"]),
+        numbers,
+        parts,
+        parities,
+        flank,
+        np.stack(columns["bore"], 1),
+        patch,
+        shapes,
+        tangent,
+        np.array(columns["surface"]),
+        join_spin(body, spins) if spins else None,
+    )

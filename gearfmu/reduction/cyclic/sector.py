@@ -1,0 +1,212 @@
+"""The full-order gear body on one sector, with everything that loads it: tooth flanks and bore; of an internal gear
+tooth flanks, rim (in place of the bore) and the sector's own patch of the rim, where a mount may hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.fem import hex20, surface
+from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
+from gearfmu.fem.cyclic import Sector, sector_spaces
+from gearfmu.fem.harmonic import Harmonic
+from gearfmu.fem.spinning import growth, stress_stiffness
+from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
+
+
+@dataclass(frozen=True)
+class Family:
+    """One harmonic of one mirror parity with its loads.
+
+    harmonic : nodal diameter ν of a parity.
+    columns : which loads of a tooth (flat index over side, roll, function; then the patch; then side, roll, function of
+    the loads along the profile) this parity sees. rows : all loads of a tooth, (m, 3N). moments : (6, 3N) share of the
+    bore. bore_parts : (6, 6) Fourier coefficient of the unit loads on the bore node (force x, y, z, moment x, y, z in
+    the body frame) in `moments`: f_j = Σ_ν momentsᵀ bore_parts_ν e^{iθ_ν j} over ν and −ν.
+    weight : 2 for 0 < ν < z/2 (ν and −ν together), else 1.
+    """
+
+    harmonic: Harmonic
+    columns: np.ndarray
+    rows: sp.csr_array
+    moments: np.ndarray
+    bore_parts: np.ndarray
+
+    @property
+    def weight(self) -> int:
+        return 1 if self.harmonic.is_real else 2
+
+    @property
+    def flank(self) -> np.ndarray:
+        """Force of the loads `columns` on one tooth, (size, c)."""
+        return self.loads(self.columns)
+
+    def loads(self, chosen: np.ndarray) -> np.ndarray:
+        """Force of some loads of one tooth, (size, k)."""
+        return self._reduced(self.rows[chosen].toarray().T)
+
+    @property
+    def bore(self) -> np.ndarray:
+        """Force of the unit loads on the bore node, (size, 6)."""
+        return self._reduced(self.moments.T) @ self.bore_parts
+
+    def _reduced(self, nodal: np.ndarray) -> np.ndarray:
+        return self.harmonic.reduce(self.harmonic.space.from_nodes @ nodal)
+
+
+class SectorBody:
+    """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
+
+    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
+    flank : ToothFlank. points : where the flanks are loaded. rigid_bore : the surface of the bore (of a ring: of the
+    rim) moves as one rigid body, as on a stiff shaft; else it deforms about its mean motion.
+    Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
+    """
+
+    def __init__(
+        self, mesh: Any, material: hex20.Material, flank: ToothFlank, points: Points, rigid_bore: bool = False
+    ):
+        self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
+        stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
+        self.stiffness, self.internal = stiffness, "rim" in mesh.sets
+        sector = Sector(
+            mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
+            bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
+        )  # fmt: skip
+        self.material, self.spaces = material, sector_spaces(sector)
+
+    def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
+        """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
+        both = [
+            flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points, direction)
+            for s in (0, 1)
+        ]
+        return sp.csr_array(sp.vstack([sp.csr_array(rows.reshape(-1, self.mesh.nodes.size)) for rows in both]))
+
+    @property
+    def flank_count(self) -> int:
+        """Number 2·R·A of flank loads of a tooth."""
+        return 2 * len(self.points.rolls) * self.points.functions
+
+    @property
+    def flank_rows(self) -> np.ndarray:
+        """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
+        return self.load_matrix[: self.flank_count].toarray()
+
+    @property
+    def tangent_rows(self) -> np.ndarray:
+        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
+        return self.load_matrix[self.profile_loads :].toarray()
+
+    @cached_property
+    def patch_rows(self) -> np.ndarray:
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
+        if not self.internal:
+            return np.zeros((0, self.mesh.nodes.size))
+        return averaging_rows_at(self.mesh.nodes, self._held_faces, self.patch_point)[:3]
+
+    @property
+    def patch_point(self) -> np.ndarray:
+        """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
+        return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
+
+    @cached_property
+    def load_matrix(self) -> sp.csr_array:
+        """All loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows."""
+        parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
+        return sp.csr_array(sp.vstack(parts))
+
+    @property
+    def load_rows(self) -> np.ndarray:
+        """`load_matrix`, dense."""
+        return self.load_matrix.toarray()
+
+    @property
+    def profile_loads(self) -> int:
+        """Number of the first load along the profile in `load_matrix`."""
+        return self.flank_count + len(self.patch_rows)
+
+    @property
+    def _held_faces(self) -> np.ndarray:
+        return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
+
+    @cached_property
+    def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """One sector's share of the bore's (ring: rim's) averaging node: b (6, 3N), and g (6, 6) of all of it."""
+        moments, gram = surface_moments(self.mesh.nodes, self._held_faces)
+        return moments, turned_sum(gram, self.teeth)
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """Mass matrix of the whole rigid body about the origin, (6, 6): kg, kg·m, kg·m²."""
+        fields = rigid_modes(self.mesh.nodes)
+        return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
+
+    @property
+    def knows_stress(self) -> bool:
+        """Whether stresses of the spinning body can be told from its mesh, and so what its modes feel."""
+        return True
+
+    @cached_property
+    def growth(self) -> np.ndarray:
+        """Displacement (3N,) of the sector under centrifugal load per square of the speed, m·s²."""
+        return growth(self.spaces[0], self.mesh.nodes, self.mass_matrix)
+
+    @cached_property
+    def stress_stiffness(self) -> sp.csr_array:
+        """K_σ (N, N) of the stresses of that load, kg, the same for each component."""
+        return stress_stiffness(self.mesh.nodes, self.mesh.elements, self.material, self.growth)
+
+    def rigid_rows(self) -> np.ndarray:
+        """Flank rows of the six rigid motions: (2·R·A, 6)."""
+        return self.load_matrix[: self.flank_count] @ rigid_modes(self.mesh.nodes)
+
+    def diameters(self) -> range:
+        """Nodal diameters 0 … z/2."""
+        return range(self.teeth // 2 + 1)
+
+    def family(self, space_index: int, nodal_diameter: int) -> Family:
+        """Loads and operators of one nodal diameter of one parity."""
+        return self.family_of(space_index, self.spaces[space_index].harmonic(nodal_diameter))
+
+    def family_of(self, space_index: int, harmonic: Harmonic) -> Family:
+        """`family` of a harmonic that is there already."""
+        space = self.spaces[space_index]
+        parts = self._bore_parts(harmonic.nodal_diameter)
+        parts = parts.real if harmonic.is_real else parts
+        return Family(harmonic, self.seen_loads(space.parity), self.load_matrix, self.bore_moments[0], parts)
+
+    def _bore_parts(self, nodal_diameter: int) -> np.ndarray:
+        parts, h = np.zeros((6, 6), complex), np.linalg.inv(self.bore_moments[1])
+        if nodal_diameter == 0:
+            parts[[2, 5]] = h[[2, 5]]
+        elif nodal_diameter == 1:
+            parts[0:2], parts[3:5] = 0.5 * _rotating(h[0:2]), 0.5 * _rotating(h[3:5])
+        return parts
+
+    def seen_loads(self, parity: int) -> np.ndarray:
+        """Numbers of the loads of a tooth that fields of this parity see."""
+        function = np.tile(np.arange(self.points.functions), 2 * len(self.points.rolls))
+        odd = np.concatenate([function % 2, [0, 0, 1][: len(self.patch_rows)], function % 2])
+        odd = odd[: self.load_matrix.shape[0]]
+        return np.flatnonzero({1: odd == 0, -1: odd == 1, 0: odd >= 0}[parity])
+
+
+def _rotating(h: np.ndarray) -> np.ndarray:
+    """x and y components (2, 6) of body-fixed vectors as amplitudes of e^{iα} in the turning sector frames."""
+    amplitude = h[0] - 1j * h[1]
+    return np.stack([amplitude, 1j * amplitude])
+
+
+def turned_sum(matrix: np.ndarray, teeth: int) -> np.ndarray:
+    """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
+    total = np.zeros((6, 6))
+    for angle in 2 * np.pi * np.arange(teeth) / teeth:
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+        total += turn @ matrix @ turn.T
+    return total

@@ -1,0 +1,151 @@
+"""Static compliance of a free gear body between tooth flanks and bore: C = Pᵀ K⁺ P, inertia relief, mean-axis gauge.
+
+Each harmonic contributes Fᴴ C_ν F; tooth offset m is their Fourier sum. For a body that is its own mirror image about
+mid-width, loads of even and odd width functions do not see each other: those entries are zero exactly. Loads along the
+profile (friction) are answered on the own tooth only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gearfmu.reduction.cyclic.condensed import CondensedLoads
+from gearfmu.reduction.cyclic.modal import Progress
+from gearfmu.reduction.cyclic.sector import SectorBody
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Static compliance, conventions of `body.ReducedBody`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
+    1/N; C_bb (6, 6), m/N … 1/(N·m). pictures : (p, z, 3N) displacement of all sectors, in sector frames, under the
+    unit flank loads asked for, m/N. Of a ring also static_fp (2, z, R, A, 3), flank row of tooth 0 per unit force x, y,
+    z (sector frame) on the rim patch of sector m, and static_pp (z, 3, 3), m/N; empty (last index 0) of a gear.
+    static_nt, static_tt (2, 2, R, R, A, A), m/N: displacement along the normal and along the profile at (tooth 0, flank
+    f, roll i, function a) per load along the profile at (tooth 0, g, j, b); None where there are no such rows."""
+
+    static_ff: np.ndarray
+    static_fb: np.ndarray
+    static_bb: np.ndarray
+    static_fp: np.ndarray
+    static_pp: np.ndarray
+    pictures: np.ndarray
+    static_nt: np.ndarray | None = None
+    static_tt: np.ndarray | None = None
+
+
+def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress | None = None) -> Statics:
+    """Compliance of all flank points and the bore for every tooth offset.
+
+    picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
+    """
+    size, every, z = body.profile_loads, body.load_matrix.shape[0], body.teeth
+    ff, fb, bb = np.zeros((z, size, size)), np.zeros((every, 6)), np.zeros((6, 6))
+    own = np.zeros((every, every))
+    pictures = np.zeros((len(picture_loads), z, body.mesh.nodes.size))
+    for index, space in enumerate(body.spaces):
+        loads = CondensedLoads(body, space)
+        seen, normal = loads.columns, np.flatnonzero(loads.columns < size)
+        shown = [load for load in picture_loads if load in seen]
+        rest = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
+        table = np.zeros((z, len(normal), len(normal)))
+        for m in range(z):
+            table[m] = loads.parts[:, normal].T @ rest.kernels[m] @ loads.parts[:, normal]
+        inner = loads.gram[: loads.count, : loads.count]
+        table[0] += inner[np.ix_(normal, normal)]
+        own[np.ix_(seen, seen)] += inner + loads.parts.T @ rest.kernels[0] @ loads.parts
+        for nu in (0, 1):
+            family = body.family(index, nu)
+            product = loads.compliance(family.harmonic, loads.tooth, loads.tooth) - inner
+            own[np.ix_(seen, seen)] += family.weight / z * product.real
+            turn = family.weight / z * np.exp(-2j * np.pi * nu * np.arange(z) / z)
+            for m in range(z):
+                table[m] += (turn[m] * product[np.ix_(normal, normal)]).real
+            bore = loads.bore @ family.bore_parts
+            fb[seen] += family.weight * loads.compliance(family.harmonic, loads.tooth, bore).real
+            bb += z * family.weight * loads.compliance(family.harmonic, bore, bore).real
+        ff[np.ix_(np.arange(z), seen[normal], seen[normal])] += table
+        for number, load in enumerate(shown):
+            pictures[picture_loads.index(load)] += _picture(body, index, load, rest.moved[:, :, [number]])
+    shaped = _shaped(body, ff, fb[:size], bb, pictures)
+    return replace(shaped, **_along_profile(body, 0.5 * (own + own.T)))
+
+
+@dataclass(frozen=True)
+class _Diameters:
+    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `CondensedLoads.kernel` by tooth offset, and
+    moved (ν, c, p), the cut's displacement under the loads that are shown."""
+
+    kernels: np.ndarray
+    moved: np.ndarray
+
+
+def _all_diameters(
+    body: SectorBody, index: int, loads: CondensedLoads, shown: np.ndarray, progress: Progress | None
+) -> _Diameters:
+    z, found = body.teeth, []
+    diameters = np.arange(2, z // 2 + 1)
+    for nu in diameters:
+        if progress:
+            progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+        harmonic = body.spaces[index].harmonic(nu)
+        moved, kernel = loads.kernel(harmonic)
+        found.append((moved @ loads.parts[:, shown], kernel))
+    turn = _weights(z, diameters) * np.exp(2j * np.pi * np.multiply.outer(np.arange(z), diameters) / z)
+    rank = loads.patterns.shape[1]
+    if not found:
+        return _Diameters(np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown))))
+    stacked = np.array([kernel for _, kernel in found]).reshape(len(found), -1)
+    kernels = turn.real @ stacked.real + turn.imag @ stacked.imag
+    return _Diameters(kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found]))
+
+
+def _weights(z: int, diameters: np.ndarray) -> np.ndarray:
+    """Share of each ν in a sum over all: ν and −ν together where both are there."""
+    return np.where(2 * diameters % z, 2, 1) / z
+
+
+def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.ndarray:
+    """Displacement (z, 3N) of all sectors under a load of tooth 0; moved (ν, c, 1): that of the cut, ν = 2, 3, …"""
+    space, z = body.spaces[index], body.teeth
+    diameters = np.arange(2, z // 2 + 1)
+    turn = _weights(z, diameters)[:, None] * np.exp(2j * np.pi * np.multiply.outer(diameters, np.arange(z)) / z)
+    expand = [space.harmonic(nu).expand_border(cut) for nu, cut in zip(diameters, moved, strict=True)]
+    border = np.zeros((len(space.factor.schur), z))
+    for shape, around in zip(expand, turn, strict=True):
+        border += (shape * around).real
+    force = space.from_nodes @ body.load_matrix[[load]].toarray().T
+    inner, _ = space.factor.forward(force[: space.interior])
+    inside = space.factor.backward(inner * turn.real.sum(axis=0), border)
+    total = (space.to_nodes @ np.concatenate([inside, border])).T
+    for nu in (0, 1):
+        family = body.family(index, nu)
+        response = space.to_nodes @ family.harmonic.expand(family.harmonic.flexibility(family.loads(np.array([load]))))
+        around = family.weight / z * np.exp(2j * np.pi * nu * np.arange(z) / z)
+        total += np.multiply.outer(around, response[:, 0]).real
+    return total
+
+
+def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
+    """Tables of loads along the profile from the compliance (every, every) of all loads of one tooth."""
+    points, first = body.flank_count, body.profile_loads
+    if first == len(own):
+        return {}
+    shape = (2, len(body.points.rolls), body.points.functions)
+    blocks = {"static_nt": own[:points, first:], "static_tt": own[first:, first:]}
+    return {
+        name: np.ascontiguousarray(block.reshape(*shape, *shape).transpose(0, 3, 1, 4, 2, 5))
+        for name, block in blocks.items()
+    }
+
+
+def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
+    rolls, functions, z = len(body.points.rolls), body.points.functions, body.teeth
+    back = ff[(-np.arange(z)) % z].transpose(0, 2, 1)
+    both, flank = 0.5 * (ff + back), 2 * rolls * functions
+    shaped = both[:, :flank, :flank].reshape(z, 2, rolls, functions, 2, rolls, functions)
+    static_ff = np.ascontiguousarray(shaped.transpose(1, 4, 0, 2, 5, 3, 6))
+    static_fp = both[:, :flank, flank:].reshape(z, 2, rolls, functions, -1).transpose(1, 0, 2, 3, 4)
+    static_fb = fb[:flank].reshape(2, rolls, functions, 6)
+    return Statics(static_ff, static_fb, 0.5 * (bb + bb.T), static_fp, both[:, flank:, flank:], pictures)

@@ -1,0 +1,1 @@
+"""Finite elements made elsewhere before reduction: gears, rings, carriers."""

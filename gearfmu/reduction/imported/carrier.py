@@ -1,0 +1,98 @@
+"""A carrier made elsewhere before reduction: its mesh in the set's frame, its bore and bolts as node sets.
+
+A carrier has no flanks by which it could be placed. It must lie where the set has it, and that is checked: the axes of
+bore and bolts, each found as the circle that fits its nodes best (Kåsa, IEEE Trans. Instrum. Meas. 25 (1976)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.reduction.couplings import Elements, Judgement, full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
+from gearfmu.spec.forms.members import Form, carrier_of
+
+_OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
+
+
+@dataclass(frozen=True)
+class ImportedCarrier:
+    """An imported carrier before reduction, and plain facts about its mesh."""
+
+    full: FullOrder
+    facts: dict[str, Any]
+
+
+def imported_carrier(spec: Form) -> ImportedCarrier:
+    """The imported carrier of a planetary set: interfaces bolt0 … and bore, each coupled as the file says.
+
+    Masters lie on the bolts' axes at z = 0 and on the set's axis in the middle of the bore. MeshError lists every node
+    set that does not lie where the set has it, and says what is wrong with mesh or matrices.
+    """
+    geometry, carrier = (member := carrier_of(spec)).geometry, member.part
+    source = carrier.imported
+    assert source is not None
+    mesh = sound_mesh(source)
+    with naming(Path(source.file)):
+        require_memory(whole_need(mesh.nodes.size, 3 * carrier.modes, CARRIER_FACTORS), MESH_COARSER)
+        names = {f"bolt{k}": name for k, name in enumerate(source.bolts)} | {"bore": source.bore}
+        members = {interface: mesh.node_set(name) for interface, name in names.items()}
+        points = _points(mesh, members, names, geometry)
+        matrices = ready_matrices(source, mesh, np.eye(3), carrier.material)
+        matrices = matrices or Matrices(*solids.assemble(mesh.nodes, mesh.elements, carrier.material))
+        faces = solids.boundary(mesh.elements)
+        couplings = [
+            set_coupling(mesh, faces, SetInterface(names[i], carrier.coupling_of(i), points[i]), i) for i in names
+        ]
+        body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
+        full = full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))
+    dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
+    return ImportedCarrier(full, mesh_facts(mesh) | {"method": "whole body"} | dofs)
+
+
+def _points(
+    mesh: ImportedMesh, members: dict[str, np.ndarray], names: dict[str, str], geometry: CarrierGeometry
+) -> dict[str, np.ndarray]:
+    """Where the masters are: bolts as the set has them, the bore in its own middle. MeshError for sets elsewhere."""
+    points, problems = {}, []
+    for interface, own in members.items():
+        nodes = mesh.nodes[own]
+        low, high = nodes[:, 2].min(), nodes[:, 2].max()
+        bolt = interface != "bore"
+        points[interface] = geometry.bolt_axis(int(interface[4:])) if bolt else np.array([0, 0, 0.5 * (low + high)])
+        centre, meant = circle_centre(nodes[:, :2]), points[interface][:2]
+        if np.linalg.norm(centre - meant) > _OFF * geometry.a:
+            where = " and ".join(f"({1e3 * x:.4g}, {1e3 * y:.4g})" for x, y in (centre, meant))
+            whose = f"'{names[interface]}' ({interface})"
+            problems.append(f"the axis of {whose} and that of the set lie apart, at {where} mm")
+        elif bolt and not low < 0 < high:
+            span = f"z = {1e3 * low:.4g} … {1e3 * high:.4g} mm"
+            problems.append(f"'{names[interface]}' ({interface}) at {span} is not where the planet sits, about z = 0")
+    if problems:
+        frame = "axis z through the origin, z = 0 at the planets' mid-width, bolt 0 on +x, bolts counter-clockwise"
+        raise MeshError("; ".join(problems) + f". Model the carrier in the set's frame: {frame}")
+    return points
+
+
+def circle_centre(points: np.ndarray) -> np.ndarray:
+    """(2,) centre of the circle that fits points (P, 2) best; exact for any points of one circle. MeshError for points
+    in one line."""
+    middle = points.mean(axis=0)
+    local = points - middle
+    size = max(float(np.abs(local).max()), 1e-300)
+    system = np.column_stack([2 * local / size, np.ones(len(local))])
+    if np.linalg.matrix_rank(system, tol=1e-6) < 3:
+        raise MeshError("the nodes of a bore or bolt lie in one line: name the node set of its surface")
+    found = np.linalg.lstsq(system, (local**2).sum(axis=1) / size**2, rcond=None)[0]
+    return middle + size * found[:2]

@@ -1,0 +1,84 @@
+"""The files of an imported body: a sound mesh along z, ready-made matrices in SI and in the frame of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.fem.hex20 import Material
+from gearfmu.fem.matrices import read_matrix, read_unknowns
+from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
+from gearfmu.femesh.imported import ImportedMesh, read_mesh
+from gearfmu.reduction.imported.couplings import Matrices
+
+_AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
+
+
+def sound_mesh(source: Any) -> ImportedMesh:
+    """The mesh of a FilesSpec in metres, its axis along z. MeshError lists what is wrong with it."""
+    file = Path(source.file)
+    mesh = read_mesh(file, source.length, tuple(source.ignore))
+    mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])
+    if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
+        raise MeshError(f"{file}: " + "; ".join(problems))
+    return mesh
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """MeshErrors begin with the name of a file: this one, when they name none beside it."""
+    try:
+        yield
+    except MeshError as error:
+        raise MeshError(str(error) if str(error).startswith(str(file.parent)) else f"{file}: {error}") from error
+
+
+def mesh_facts(mesh: ImportedMesh) -> dict[str, Any]:
+    """Plain facts about an imported mesh: sizes and quality of its elements."""
+    quality = np.concatenate(
+        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
+    )
+    return {
+        "file": mesh.source.name,
+        "nodes": len(mesh.nodes),
+        "elements": {kind: len(block) for kind, block in mesh.elements.items()},
+        "raised_to_quadratic": mesh.raised,
+        "scaled_jacobian_min": float(quality.min()),
+        "scaled_jacobian_mean": float(quality.mean()),
+    }
+
+
+def ready_matrices(source: Any, mesh: ImportedMesh, turn: np.ndarray, material: Material) -> Matrices | None:
+    """Ready-made matrices of a FilesSpec, checked against mesh and material; None without files.
+
+    mesh : in the frame of the body. turn (3, 3) : from directions along z (`sound_mesh`) to those of that frame.
+    MeshError for matrices that are not of this mesh, this material, these units, or not of a free body.
+    """
+    if not source.stiffness:
+        return None
+    if mesh.raised:
+        raise MeshError("matrices of linear elements (hex8) do not go with quadratic faces: mesh with C3D20 or C3D10")
+    unknowns = read_unknowns(Path(source.unknowns)) if source.unknowns else None
+    units = source.force_unit / source.length, source.mass_unit
+    node_turn = sp.csr_array(turn @ np.eye(3)[_AXES[source.axis]])
+    turned = sp.kron(sp.identity(len(mesh.nodes)), node_turn, format="csr")
+    stiffness, mass = (
+        sp.csr_array(turned @ (factor * read_matrix(Path(name), unknowns, mesh.labels)) @ turned.T)
+        for factor, name in zip(units, (source.stiffness, source.mass), strict=True)
+    )
+    own = solids.assemble(mesh.nodes, mesh.elements, material)[1]
+    problems = matrix_problems(stiffness, mass, mesh.nodes, float(own.sum()) / 3)
+    if not problems:
+        speed = np.sqrt(material.youngs_modulus / material.density)
+        problems = speed_problem(stiffness, mass, mesh.nodes, speed)
+    if problems:
+        raise MeshError("; ".join(problems))
+    return Matrices(stiffness, mass)

@@ -1,0 +1,225 @@
+"""From a mesh file (and matrix files) to a gear body that can be reduced: checked, fitted, in the frame of the gear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
+from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.geometry.involute_fit import InvoluteFit
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
+from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.flank import FitRange, fit_flanks, tooth_loads
+from gearfmu.reduction.imported.mean_tooth import WholeGear
+from gearfmu.reduction.imported.sector import ImportedSector
+from gearfmu.reduction.memory import MESH_COARSER, Need, ReductionSize, require_memory, sector_need, whole_need
+
+BORE = "bore"
+_ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
+_WIDTH = 2e-3  # relative difference of face width, base radius and tooth thickness to the stage file
+_HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibration of a solid body
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The gear that the stage file describes: teeth, flank and its load points, radius (m) of the bore (internal: of
+    the rim), material, number of modes that will be stored."""
+
+    teeth: int
+    flank: ToothFlank
+    points: Points
+    bore_radius: float
+    material: Any
+    modes: int
+
+
+@dataclass(frozen=True)
+class ImportedGear:
+    """An imported gear ready to be reduced: its body, on one sector or whole; the nodes (N, 3), m, of the whole file in
+    the frame of the gear; plain facts about mesh and fit."""
+
+    body: ImportedSector | WholeGear
+    nodes: np.ndarray
+    facts: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class CheckedGear:
+    """An imported gear that has been read, checked, fitted and placed: its mesh in the frame of the gear, ready-made
+    matrices or None, its sector or None, plain facts."""
+
+    mesh: ImportedMesh
+    matrices: Matrices | None
+    cut: CyclicCut | None
+    facts: dict[str, Any]
+
+
+def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
+    """Read, check, fit and place the finite elements of a gear.
+
+    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, is reduced by
+    cyclic symmetry; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore by the mean tooth.
+    MeshError lists what is wrong with the files.
+    """
+    file = Path(source.file)
+    mesh = sound_mesh(source)
+    with naming(file):
+        fit = _fit(mesh, source, wanted)
+        placed = replace(mesh, nodes=fit.in_gear_frame(mesh.nodes))
+        _same_gear(placed, fit, wanted)
+        placed.sets[BORE] = _bore_nodes(placed, source.bore, wanted)
+        matrices = ready_matrices(source, placed, fit.turn(), wanted.material)
+        whole, cut = is_whole(placed.nodes, wanted.teeth), None
+        if source.bore_coupling == "averaging" and (matrices is None or not whole):
+            cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
+        if cut is None and wanted.flank.internal:
+            raise MeshError(
+                "a ring is taken by sectors only, for the sake of its mounts: give one sector that holds a whole tooth "
+                "space, with its matrices if they are ready-made, or a whole mesh that repeats itself from space to "
+                "space"
+            )
+        if cut is None and not whole:
+            raise MeshError(
+                'a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear'
+            )
+        method = "mean tooth" if cut is None else "cyclic"
+        dofs = 3 * (len(mesh.nodes) if cut is None else wanted.teeth * (len(cut.nodes) - len(cut.cut_plus)))
+        facts = _facts(placed, fit) | {"method": method, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
+        return CheckedGear(placed, matrices, cut, facts)
+
+
+def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
+    """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
+    found = checked_gear(source, wanted)
+    with naming(Path(source.file)):
+        require_memory(_need(found, wanted), MESH_COARSER)
+        body: ImportedSector | WholeGear
+        if found.cut is None:
+            body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
+        else:
+            bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
+            ready = found.matrices
+            elastic = wanted.material if ready is None else (ready.stiffness, ready.mass)
+            body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
+    return ImportedGear(body, found.mesh.nodes, found.facts)
+
+
+def _need(found: CheckedGear, wanted: Wanted) -> Need:
+    """Memory that the reduction of checked finite elements takes."""
+    sized = ReductionSize(wanted.teeth, wanted.modes, 2 * len(wanted.points.rolls) * wanted.points.functions)
+    if found.cut is not None:
+        return sector_need(found.cut, sized)
+    return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads, 1)
+
+
+def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
+    flank = wanted.flank
+    middle = (
+        mesh.nodes[mesh.node_set(source.bore)].mean(axis=0)
+        if source.bore and _around(mesh, source.bore)
+        else np.zeros(3)
+    )
+    search = FitRange(wanted.teeth, flank, source.flank_tolerance)
+    fit = fit_flanks(mesh.nodes - middle, solids.boundary(mesh.elements), search)
+    return replace(fit, origin=fit.origin + middle)
+
+
+def _around(mesh: ImportedMesh, name: str) -> bool:
+    """Whether a set surrounds its own middle, as a whole bore does and that of a sector does not."""
+    points = mesh.nodes[mesh.node_set(name)]
+    around = np.sort(np.arctan2(*(points - points.mean(axis=0))[:, [1, 0]].T))
+    return bool(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi / 2)
+
+
+def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
+    """MeshError when the fitted gear is not the one of the stage file."""
+    flank = wanted.flank
+    width = 2 * float(np.abs(mesh.nodes[:, 2][_flank_nodes(mesh, wanted)]).max())
+    pairs = {
+        "base radius": (1e3 * fit.r_b, 1e3 * flank.r_b, "mm"),
+        "half tooth thickness at the base circle": (1e3 * fit.psi_b * fit.r_b, 1e3 * flank.psi_b * flank.r_b, "mm"),
+        "face width": (1e3 * width, 1e3 * flank.face_width, "mm"),
+    }
+    slack = {"half tooth thickness at the base circle": 0.05}
+    wrong = [
+        f"{name} {own:.5g} {unit} instead of {meant:.5g} {unit}"
+        for name, (own, meant, unit) in pairs.items()
+        if abs(own - meant) > slack.get(name, _WIDTH) * meant
+    ]
+    if wrong:
+        raise MeshError(
+            f"this is not the gear of the stage file: {', '.join(wrong)}; correct one of them, or the unit `length`"
+        )
+
+
+def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
+    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
+    low, high = (np.hypot(wanted.flank.r_b, s) for s in wanted.flank.roll_range)
+    return (radius > low) & (radius < high)
+
+
+def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
+    if name:
+        return mesh.node_set(name)
+    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
+    found = np.flatnonzero(np.abs(radius - wanted.bore_radius) < _ON_BORE * wanted.bore_radius)
+    faces = solids.boundary(mesh.elements).within(found)
+    if len(faces.nodes) == 0:
+        where = "rim" if wanted.flank.internal else "bore"
+        raise MeshError(
+            f"no face lies on the {where} of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the {where} in "
+            f"`{where}`, or correct {where}_diameter"
+        )
+    return faces.nodes
+
+
+def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
+    return mesh_facts(mesh) | {
+        "teeth": fit.teeth,
+        "fit": {
+            "base_radius_m": fit.r_b,
+            "half_tooth_angle_rad": fit.psi_b,
+            "residual_rms_um": 1e6 * fit.rms,
+            "residual_max_um": 1e6 * fit.worst,
+            "points": len(fit.residual),
+        },
+    }
+
+
+def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted: Wanted) -> WholeGear:
+    if matrices is None:
+        matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
+    body = full_order(mesh, matrices, [SetInterface(BORE, coupling, np.zeros(3))], (BORE,), wanted.flank.r_b)
+    faces = solids.boundary(mesh.elements)
+    angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
+    rows = (tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles)
+    if coupling == "rigid":
+        kept = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.sets[BORE])
+        pick = (3 * kept[:, None] + np.arange(3)).ravel()
+        rows = (_padded(row[:, pick], body.size) for row in rows)
+    return WholeGear(body, tuple(rows), wanted.points)
+
+
+def _padded(rows: sp.csr_array, size: int) -> sp.csr_array:
+    return sp.csr_array(sp.hstack([rows, sp.csr_array((rows.shape[0], size - rows.shape[1]))]))
+
+
+def hinge_problem(space: Elastic, first_squared: float) -> str | None:
+    """Why a body whose lowest elastic mode has ω² = first_squared cannot be one solid, or None."""
+    stiffest = float((space.stiffness.diagonal() / space.mass_matrix.diagonal()).max())
+    if first_squared > _HINGE**2 * stiffest:
+        return None
+    return (
+        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: "
+        "connect it, or "
+        "export it without mechanisms"
+    )

@@ -1,0 +1,293 @@
+"""A stage of any kind: bodies, rotors on parallel axes, engagements, supports and ports.
+
+All axes are parallel to z. A place on an axis is its z in the stage; a gear's own place is its mid-width, a shaft's its
+beginning.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, RingSpec
+from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.tables.gear import (
+    Backlash,
+    Bearing,
+    Diameter,
+    GearSpec,
+    HelixAngle,
+    Length,
+    Material,
+    ModalDamping,
+    Module,
+    PressureAngle,
+    Ratio,
+    SurfaceCoupling,
+)
+from gearfmu.spec.tables.lead import Misalignment
+from gearfmu.spec.tables.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, PortSpec
+
+Place = Annotated[float, Quantity("place")]
+Axis = Annotated[float, Quantity("axis")]
+RadialSpring = Annotated[float, Quantity("bearing_stiffness", words=("rigid",))]
+AxialSpring = Annotated[float, Quantity("axial_stiffness", words=("rigid",))]
+TiltSpring = Annotated[float, Quantity("tilt_stiffness", words=("rigid",))]
+
+
+class GearBody(GearSpec):
+    """A toothed body: a GearSpec with its basic rack's module and angles; what holds it stands in `supports`."""
+
+    kind: Literal["gear"] = Field(default="gear", description="kind of body")
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
+    helix_angle: HelixAngle = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed gear, whose "
+        "mate is left-handed",
+    )
+    bearing: Bearing | None = Field(default=None, description="not here: write [[supports]]")  # type: ignore[assignment]
+
+    @field_validator("bearing")
+    @classmethod
+    def _held_elsewhere(cls, value: Any) -> Any:
+        if value is not None:
+            raise refuse("a body of a general stage has no bearing of its own: write it under [[supports]]")
+        return value
+
+
+class RingBody(RingSpec):
+    """An internal gear: a RingSpec with its basic rack's module and angles. Its one node is the mean
+    motion of its rim; what holds it stands in `supports`, and a port holds its spin."""
+
+    name: Name
+    kind: Literal["ring"] = Field(description="kind of body")
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
+    helix_angle: HelixAngle = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed ring, whose "
+        "mate is right-handed too",
+    )
+    mounts: MountsSpec | None = Field(default=None, description="not here: write [[supports]]")
+    rim_coupling: SurfaceCoupling = Field(
+        default="averaging",
+        description="how the rim meets its node: averaging (RBE3, the rim may deform) or rigid (RBE2, a stiff housing)",
+    )
+
+    @model_validator(mode="after")
+    def _own_mesh(self) -> RingBody:
+        if self.imported is not None and self.rigid_bore:
+            raise refuse('finite elements made elsewhere have an averaging rim only: write rim_coupling = "averaging"')
+        return self
+
+    @property
+    def rigid_bore(self) -> bool:
+        """Whether the rim's surface, in place of the bore, moves as one rigid body."""
+        return self.rim_coupling == "rigid"
+
+    @field_validator("mounts")
+    @classmethod
+    def _held_elsewhere(cls, value: Any) -> Any:
+        if value is not None:
+            raise refuse("a ring of a general stage has no mounts of its own: write it under [[supports]]")
+        return value
+
+
+ToothedBody = GearBody | RingBody
+
+
+class ShaftSection(Spec):
+    """A cylinder of a shaft."""
+
+    length: Length = Field(description="length along the axis")
+    outer_diameter: Diameter = Field(description="outer diameter")
+    bore_diameter: Annotated[float, Quantity("bore")] = Field(default=0.0, description="diameter of the bore; 0: solid")
+
+    @model_validator(mode="after")
+    def _hollow(self) -> ShaftSection:
+        if self.bore_diameter >= self.outer_diameter:
+            raise refuse("the bore is not smaller than the outer diameter: make it smaller")
+        return self
+
+
+class ShaftBody(Spec):
+    """A shaft: a Timoshenko beam of cylinders, from its place in +z."""
+
+    name: Name = Field(description="name of the shaft")
+    kind: Literal["shaft"] = Field(description="kind of body")
+    sections: Annotated[tuple[ShaftSection, ...], Field(min_length=1)] = Field(description="cylinders, in order")
+    material: Material = Field(description="material")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
+    stored_to: Annotated[float, Quantity("stored_to")] = Field(
+        default=150e3, description="modes below are stored, the others are static"
+    )
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return sum(section.length for section in self.sections)
+
+
+class CarrierBody(CarrierSpec):
+    """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
+    planetary_set."""
+
+    name: Name = Field(description="name of the carrier")
+    kind: Literal["carrier"] = Field(description="kind of body")
+
+
+class RotorSpec(Spec):
+    """Bodies that turn together about one axis."""
+
+    axis: tuple[Axis, Axis] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
+    offset: tuple[Place, Place] = Field(
+        default=(0.0, 0.0), description="deviation of the axis from that place: teeth stand as if there were none"
+    )
+    carried_by: Name | None = Field(
+        default=None,
+        description="rotor in whose axes this one and its supports stand, a planet carrier's; the ground when absent",
+    )
+    stands: bool = Field(default=False, description="it does not turn: supports with torsion hold it")
+    bodies: Annotated[dict[Name, Place], Field(min_length=1)] = Field(
+        description="place of every body along the axis: mid-width of a gear, beginning of a shaft"
+    )
+
+
+class EngagementSpec(Spec):
+    """Two gears in mesh; a ring is gear B."""
+
+    name: Name = Field(description="name of the mesh")
+    gears: tuple[Name, Name] = Field(description="gear A, gear B (the ring where there is one)")
+    backlash: Backlash = Field(
+        description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
+    )
+    damping: Annotated[float, Quantity("contact_damping")] = Field(
+        description="contact damping per metre of face width"
+    )
+    torque_max: Annotated[float, Quantity("mesh_torque_max")] = Field(description="largest torque on gear A")
+    speed_max: Annotated[float, Quantity("mesh_speed_max")] = Field(description="largest speed of gear A")
+    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
+    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
+    misalignment: Misalignment | None = Field(
+        default=None,
+        description="parallelism errors of the axes, B's seen from A's; parallel when the table is absent",
+    )
+
+
+class SupportSpec(Spec):
+    """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
+    free."""
+
+    name: Name = Field(description="name of the support")
+    body: Name = Field(description="body that is held")
+    to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
+    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
+    radial: RadialSpring | None = Field(default=None, description="stiffness along x and y")
+    axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
+    tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
+    torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
+    damping_ratio: Ratio = Field(
+        default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
+    )
+
+    @model_validator(mode="after")
+    def _holds(self) -> SupportSpec:
+        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion)):
+            raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
+        return self
+
+
+class PlacedPort(PortSpec):
+    """A port and where it meets its rotor."""
+
+    body: Name = Field(description="body whose node is the port")
+    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
+
+
+class Stage(Spec):
+    """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file."""
+
+    name: Name = Field(description="name of the stage, also of its FMU")
+    description: Text = Field(default="", description="one line about the stage")
+    source: Path
+    kind: Literal["general"] = Field(default="general", description="kind of stage")
+    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
+    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
+    bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody, Field(discriminator="kind")]] = Field(
+        description="bodies by name"
+    )
+    rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
+    engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
+    supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
+    ports: dict[Name, PlacedPort] = Field(description="ports by name")
+    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @field_validator("bodies", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {
+            name: {"kind": "gear"} | body | {"name": name} if isinstance(body, dict) else body
+            for name, body in value.items()
+        }
+
+    @property
+    def limits(self) -> Limits:
+        """None of the stage: every engagement has its own."""
+        return ()
+
+    @property
+    def gears(self) -> tuple[ToothedBody, ...]:
+        """Toothed bodies in the order of the file: the kernel's gear numbers."""
+        return tuple(body for body in self.bodies.values() if isinstance(body, ToothedBody))
+
+    @property
+    def planar(self) -> bool:
+        """Whether nothing tilts or moves along the axis: every rotor one spur gear, held radially at its mid-width."""
+        alone = all(isinstance(body, ToothedBody) and body.helix_angle == 0 for body in self.bodies.values())
+        alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
+        places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
+        return alone and all(
+            s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
+            for s in self.supports
+        )
+
+    @property
+    def even(self) -> bool:
+        """Whether everything is symmetric about mid-width: planar, flanks even across the width, axes aligned."""
+        return (
+            self.planar
+            and not any(gear.uneven for gear in self.gears)
+            and all(mesh.misalignment is None for mesh in self.engagements)
+        )
+
+    @property
+    def carriers(self) -> tuple[CarrierBody, ...]:
+        """Planet carriers in the order of the file."""
+        return tuple(body for body in self.bodies.values() if isinstance(body, CarrierBody))
+
+    def carrier_of(self, rotor: str) -> str | None:
+        """Name of the rotor in whose axes a rotor stands; None: the ground."""
+        return self.rotors[rotor].carried_by
+
+    def frame_of(self, mesh: EngagementSpec) -> str | None:
+        """Name of the rotor in whose axes an engagement rolls; None: the ground."""
+        return self.carrier_of(self.rotor_of(mesh.gears[0]))
+
+    def rotor_of(self, body: str) -> str:
+        """Name of the rotor that a body belongs to."""
+        return next(name for name, rotor in self.rotors.items() if body in rotor.bodies)
+
+    def internal(self, mesh: EngagementSpec) -> bool:
+        """Whether gear B of an engagement is a ring."""
+        return isinstance(self.bodies[mesh.gears[1]], RingBody)
+
+    def place(self, body: str, at: float | None) -> float:
+        """Place of a node on a body: as said, or the body's own."""
+        return self.rotors[self.rotor_of(body)].bodies[body] if at is None else at

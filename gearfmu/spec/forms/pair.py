@@ -1,0 +1,52 @@
+"""What a stage file of kind external_pair says: one gear pair with its contact, ports and levels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from gearfmu.spec.reading.base import Name, Quantity, Spec, Text, refuse
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
+
+
+class StageSpec(Spec):
+    """A gear stage as its file gives it; SI floats. `source` is that file."""
+
+    name: Name = Field(description="name of the stage, also of its FMU")
+    description: Text = Field(default="", description="one line about the stage")
+    source: Path
+    kind: Literal["external_pair"] = Field(default="external_pair", description="kind of stage")
+    torque_max: Annotated[float, Quantity("torque_max")] = Field(
+        description="largest pinion torque the model is made for"
+    )
+    speed_max: Annotated[float, Quantity("speed_max")] = Field(description="largest pinion speed the model is made for")
+    pair: PairSpec = Field(description="the pair")
+    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel")
+    contact: ContactSpec = Field(description="tooth contact")
+    ports: dict[str, PortSpec] = Field(description="one port a shaft")
+    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @property
+    def limits(self) -> Limits:
+        """Torque and speed of the pinion that the model is made for."""
+        return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
+
+    @field_validator("gears", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        if len(value) != 2 or not all(isinstance(table, dict) for table in value.values()):
+            raise refuse("a pair has two gears: write the tables [gears.pinion] and [gears.wheel]")
+        return tuple(table | {"name": name} for name, table in value.items())
+
+    @model_validator(mode="after")
+    def _ports_of_shafts(self) -> StageSpec:
+        names = {gear.name for gear in self.gears}
+        if set(self.ports) != names:
+            tables = ", ".join(f"[ports.{name}]" for name in sorted(names))
+            raise refuse(f"every shaft needs its port and every port its shaft: write {tables}")
+        return self

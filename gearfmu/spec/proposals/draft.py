@@ -1,0 +1,101 @@
+"""A stage in the making: tables of a stage file, and where each of their values comes from."""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from gearfmu.errors import Problem
+from gearfmu.spec.reading.layers import read_layers
+from gearfmu.spec.reading.library import find_stage
+
+LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
+PITCH_SPEED = 20.0  # m/s at the pitch circle
+BACKLASH_PER_MODULE = 0.02
+STRIP_PER_MODULE = 0.12
+
+
+@dataclass(frozen=True)
+class Unread:
+    """An attribute of the REXS file that no stage file has a place for, or that is not understood."""
+
+    component: str
+    attribute: str
+    value: str
+    unit: str
+
+
+@dataclass
+class Draft:
+    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; problems: what could not be read;
+    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from."""
+
+    tables: dict[str, Any]
+    marks: dict[str, str] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    unread: tuple[Unread, ...] = ()
+    notes: list[str] = field(default_factory=list)
+    like: str = ""
+
+    @classmethod
+    def after(cls, stage: str, word: str = "assumed") -> Draft:
+        """A draft that assumes (or does what `word` says) of everything what the shipped `stage` says."""
+        draft = cls(copy.deepcopy(read_layers(find_stage(stage)).tables), like=stage)
+        draft._mark((), draft.tables, f"{word}, as in {stage}")
+        return draft
+
+    def put(self, place: str, value: Any, origin: str) -> None:
+        """Write a value, or a whole table, and where it is from."""
+        *way, key = place.split(".")
+        table = self.tables
+        for step in way:
+            table = table.setdefault(step, {})
+        table[key] = value
+        self._mark(tuple(place.split(".")), value, origin)
+
+    def assume(self, place: str, value: Any, why: str) -> None:
+        """`put` for a value that the file does not give."""
+        self.put(place, value, f"assumed: {why}")
+
+    def at(self, place: str) -> Any:
+        """The value or table at a place."""
+        found: Any = self.tables
+        for step in place.split("."):
+            found = found[step]
+        return found
+
+    def drop(self, place: str) -> None:
+        """Take a field or table out."""
+        *way, key = place.split(".")
+        table = self.tables
+        for step in way:
+            table = table.get(step, {})
+        table.pop(key, None)
+
+    def assumptions(self) -> dict[str, str]:
+        """Places of assumed values that a reader should look at, with the reason."""
+        return {place: mark for place, mark in self.marks.items() if mark.startswith("assumed: ")}
+
+    def _mark(self, place: tuple[str, ...], value: Any, origin: str) -> None:
+        self.marks[".".join(place)] = origin
+        if isinstance(value, dict):
+            for key, inner in value.items():
+                self._mark((*place, key), inner, origin)
+
+
+def millimetres(value: float) -> str:
+    """A length in m as text for a stage file, to a nanometre."""
+    return f"{round(1e3 * value, 6):.10g} mm"
+
+
+def degrees(angle: float) -> str:
+    """An angle in rad as text for a stage file."""
+    return f"{round(math.degrees(angle), 9):.10g} deg"
+
+
+def usual_torque(diameter: float, ratio: float, width: float) -> float:
+    """Torque (N·m) on a gear of reference diameter d₁ (m) and face width b (m), its mate u times as large, at the usual
+    load K: K b d₁² u / (2 (u + 1))."""
+    return LOAD_PER_FACE * width * diameter**2 * ratio / (ratio + 1) / 2

@@ -1,0 +1,1 @@
+"""Tables of scene files: drivetrain, loads on shafts, deformation."""

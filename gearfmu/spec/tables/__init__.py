@@ -1,0 +1,1 @@
+"""Tables that stage files have in common: gears, flanks, imports, contact, ports, levels."""

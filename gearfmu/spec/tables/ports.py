@@ -1,0 +1,126 @@
+"""What a stage says besides its gears: tooth contact, ports and cut frequencies of the levels (SI floats)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias, cast
+
+from pydantic import Field, model_validator
+
+from gearfmu.spec.reading.base import Count, Quantity, Spec, Whole, refuse
+
+Stiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("torsional_damping")]
+Inertia = Annotated[float, Quantity("inertia")]
+Cut = Annotated[float, Quantity("cut")]
+Limits: TypeAlias = tuple[tuple[float | None, str], ...]  # largest values that a stage is made for, with units
+
+
+class NodalSpec(Spec):
+    """Nodal contact with a penalty stiffness: flank nodes against the deformed flank of the other gear."""
+
+    along: Annotated[Count, Whole("nodes")] | None = Field(
+        default=None,
+        description="nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent",
+    )
+    across: Annotated[Count, Whole("nodes")] | None = Field(
+        default=None,
+        description="nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent",
+    )
+    penalty: Annotated[float, Quantity("penalty", words=("hertz",))] = Field(
+        default=cast(Any, "hertz"),  # the assembly puts the stiffness in its place
+        description='stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
+    )
+    nodes_of: Literal["both", "a", "b"] = Field(
+        default="both", description="gear whose nodes are in contact; of both each has half of the penalty"
+    )
+
+
+class FrictionSpec(Spec):
+    """Friction of the flanks along the profile."""
+
+    law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
+        default="constant", description="what the coefficient of friction follows"
+    )
+    coefficient: Annotated[float, Quantity("friction_coefficient")] = Field(
+        default=0.05, description="coefficient of friction of law constant"
+    )
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth, of the other laws"
+    )
+    roughness: Annotated[float, Quantity("flank_roughness")] = Field(
+        default=0.4e-6, description="mean roughness Ra of both flanks, of the other laws"
+    )
+
+
+class FilmSpec(Spec):
+    """Squeeze film of oil between flanks that approach."""
+
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth"
+    )
+    roughness: Annotated[float, Quantity("film_roughness")] = Field(
+        default=1e-6, description="oil left between flanks that touch by their roughness, added to every gap"
+    )
+
+
+class ContactSpec(Spec):
+    """Tooth contact."""
+
+    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
+    damping: Annotated[float, Quantity("contact_damping")] = Field(
+        description="contact damping per metre of face width"
+    )
+    law: Literal["line"] = Field(default="line", description="contact law")
+    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
+    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
+    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
+
+
+class ChainSpec(Spec):
+    """Inertia, clutch and shaft compiled into a port."""
+
+    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
+    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
+    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
+    shaft_c: Damping = Field(description="damping of that shaft")
+
+
+class PortSpec(Spec):
+    """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
+
+    kind: Literal["spring", "torque", "fixed"] = Field(
+        default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed"
+    )
+    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
+    c: Damping | None = Field(default=None, description="damping of the port spring")
+    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    @property
+    def no_spring(self) -> str:
+        """Why the port cannot be a spring that is turned from outside, and the remedy; empty where it can."""
+        if self.chain is not None:
+            return "a port with a clutch is driven in a scene: use 'gearfmu run'"
+        if self.kind == "fixed":
+            return "a fixed port does not turn: make it a spring or torque port with k and c"
+        return "" if self.k is not None and self.c is not None else "write k and c of its shaft into this table"
+
+    @model_validator(mode="after")
+    def _complete(self) -> PortSpec:
+        if self.kind == "spring" and (self.k is None or self.c is None):
+            raise refuse('a spring port needs k and c: add them, e.g. k = "20e3 N*m/rad", c = "0.1 N*m*s/rad"')
+        if self.kind != "spring" and self.chain is not None:
+            raise refuse('a chain hangs on a port spring: write kind = "spring" or leave the chain away')
+        return self
+
+
+class LevelSpec(Spec):
+    """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
+
+    fast_cut: Cut = Field(default=50e3, description="cut frequency of level fast")
+    standard_cut: Cut = Field(default=120e3, description="cut frequency of level standard")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LevelSpec:
+        if self.fast_cut > self.standard_cut:
+            raise refuse("fast_cut must not lie above standard_cut")
+        return self

@@ -1,0 +1,1 @@
+"""A stage and its bodies → StageModel, the blob that the kernel runs."""

@@ -1,0 +1,278 @@
+"""A stage and its reduced bodies → the general model blob: every array of gearfmu/kernel/src/model/gk_fields.inc, by
+name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.errors import ModelError
+from gearfmu.spec.forms.expand import as_general, spread
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.stage.build.blob import write_blob
+from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
+from gearfmu.stage.build.far import far_sections
+from gearfmu.stage.build.fields import order_sections
+from gearfmu.stage.build.film import film_starts
+from gearfmu.stage.build.flanks import deviation_sections
+from gearfmu.stage.build.free import Flank
+from gearfmu.stage.build.friction import friction_starts
+from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
+from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
+from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
+from gearfmu.stage.build.meshes import stage_sections, tooth_phases
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.build.nodal import nodal_sections
+from gearfmu.stage.build.observed import observed_number, observed_sections
+from gearfmu.stage.build.spinning import turn_rates
+from gearfmu.stage.build.tables import ROLLS, stored_points
+from gearfmu.stage.build.teeth import gear_section, mismatches
+from gearfmu.stage.build.whirls import whirl_rows
+
+MODEL_VERSION = 4
+PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
+FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
+
+
+def assemble(
+    spec: Form,
+    bodies: Sequence[Any],
+    rolls: int = ROLLS,
+    observe: Sequence[str] = (),
+) -> StageModel:
+    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; of a set its sun, planet,
+    ring and carrier; rolls: of the even grid along a flank; observe: names of gears whose rigid motion and modal
+    amplitudes are outputs.
+
+    ModelError when a body does not belong to its gear, and for a name in `observe` that is no gear of the stage.
+    """
+    sections = order_sections(general_sections(spec, bodies, rolls, observe))
+    hashes = tuple(body.input_hash for body in bodies)
+    model = StageModel(spec, write_blob(sections), hashes)
+    starts = friction_starts(model.stage) | film_starts(model.stage)
+    return model.with_starts(starts) if starts else model
+
+
+def general_sections(
+    spec: Form,
+    bodies: Sequence[Any],
+    rolls: int = ROLLS,
+    observe: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Every section of the blob of `assemble`, by name."""
+    stage, bodies, carriers = _parted(spec, bodies)
+    shapes = [gear_shape(gear) for gear in stage.gears]
+    problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
+    if problems:
+        raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
+    flanks = [stored_points(body, s.s_form, s.s_tip, rolls) for body, s in zip(bodies, shapes, strict=True)]
+    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks])
+    nodes = port_nodes(stage, carriers)
+    groups = mount_sets(layout)
+    degrees = width_degrees(stage, bodies)
+    sections = stage_sections(stage) | nodal_sections(stage) | _port_sections(stage, groups[0], nodes)
+    sections |= {
+        "counts": np.array(
+            [MODEL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
+             len(stage.ports), len(layout.support_names()), groups[0].damper.size, degrees.size, rolls, len(groups)],
+            np.int32,
+        ),
+        "support_names": "|".join(layout.support_names()),
+        "displacement_names": "|".join(layout.displacement_names()),
+        "degrees": degrees.astype(np.int32),
+        "inertia": np.array([layout.inertia(r) for r in range(len(layout.rotors))]),
+    }  # fmt: skip
+    sections |= _carried_sections(layout)
+    phases = tooth_phases(stage)
+    for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
+        place = stage.place(gear.name, None)
+        sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
+        sections |= deviation_sections(i, gear, shape)
+        sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
+    for s, group in enumerate(groups):
+        sections |= set_sections(s, group, nodes)
+    lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
+    for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
+        if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
+            sections |= far_sections(i, sections, shape, gear.face_width, len(groups), lowest)
+    for name in observe:
+        sections |= observed_sections(observed_number(stage, name), bodies, groups)
+    return sections
+
+
+def stage_group(spec: Form, bodies: Sequence[Any]) -> Group:
+    """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    stage, bodies, carriers = _parted(spec, bodies)
+    return mount(stage_layout(stage, bodies, carriers=carriers))
+
+
+def _parted(spec: Form, bodies: Sequence[Any]) -> tuple[Stage, Sequence[Any], dict[str, InterfaceBody]]:
+    """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
+    stage, found = as_general(spec), spread(spec, bodies)
+    return stage, [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
+
+
+def _carried_sections(layout: Layout) -> dict[str, Any]:
+    """Bodies in turning axes and their places; nothing where there are none."""
+    bodies = layout.in_turning_axes
+    if not bodies:
+        return {}
+    roots = [math.sqrt(layout.bodies[body].mass[0, 0]) for body, *_ in bodies]
+    turn = [
+        2 * layout.frame_of(support.first[0]) + (direction in (1, 4))
+        if support.second is None and direction in (0, 1, 3, 4)
+        else -1
+        for support in layout.supports
+        for direction in support.directions
+    ]
+    return {
+        "support_turn": np.array([max(entry, -1) for entry in turn], np.int32),
+        "carried": np.array([frame for _, frame, *_ in bodies], np.int32),
+        "carried_place": np.array([[m * x, m * y] for m, (*_, x, y) in zip(roots, bodies, strict=True)]),
+    }
+
+
+def mount_sets(layout: Layout) -> list[Group]:
+    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there."""
+    held = replace(layout, supports=[support.hold() for support in layout.supports])
+    try:
+        return [mount(layout), mount(held)]
+    except RigidSupportError:
+        return [mount(layout)]
+
+
+def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """Kinds, numbers and static compliances of the ports, in the order of the stage."""
+    rotors = list(stage.rotors)
+    numbers = [_port_numbers(port) for port in stage.ports.values()]
+    kinds = [
+        [rotors.index(stage.rotor_of(port.body)), *own[:2]]
+        for port, own in zip(stage.ports.values(), numbers, strict=True)
+    ]
+    return port_compliances(group, nodes) | {
+        "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
+        "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
+    }
+
+
+def _port_numbers(port: PortSpec) -> np.ndarray:
+    chain = port.chain
+    k = port.k if port.k is not None else FIXED_K if port.kind == "fixed" else 1.0
+    numbers = [PORT_KINDS[port.kind], float(chain is not None), k, port.c or 0.0]
+    return np.array(
+        numbers + ([chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0])
+    )
+
+
+def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Static compliance of the ports' bore angles among each other and to the supports."""
+    residual = np.zeros((len(nodes), len(nodes)))
+    for i, (body, node) in enumerate(nodes):
+        for j, (other, there) in enumerate(nodes):
+            if body == other:
+                residual[i, j] = group.layout.bodies[body].residual[6 * node + SPIN, 6 * there + SPIN]
+    return {
+        "port_residual": residual,
+        "port_support": np.array([group.node_supports(*node, SPIN) for node in nodes]).reshape(
+            len(nodes), len(group.support_rows)
+        ),
+    }
+
+
+def _gear_sections(
+    stage: Stage,
+    index: int,
+    body: Any,
+    groups: Sequence[Group],
+    nodes: Sequence[tuple[int, int]],
+    degrees: np.ndarray,
+) -> dict[str, Any]:
+    """Sections of gear `index`, of its scope and in every set of ground oscillators."""
+    flank = groups[0].layout.bodies[index].flank
+    assert flank is not None
+    name, chosen = stage.gears[index].name, flank.chosen
+    meshes = sum(name in mesh.gears for mesh in stage.engagements)
+    tables = flank_sections(index, groups, nodes, degrees)
+    rates = turn_rates(body, chosen)
+    turning = {} if rates is None else {f"turn_rate{index}": rates}
+    rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
+    size = [rotor, body.teeth, chosen.size, reads, meshes > 1, *flank_sizes(flank, degrees)]
+    return tables | turning | mode_sections(index, body, flank) | {f"size{index}": np.array(size, np.int32)}
+
+
+def mode_sections(index: int, body: Any, flank: Flank) -> dict[str, np.ndarray]:
+    """What the kernel knows of the modes that turn with gear `index`, but for their rows."""
+    chosen = flank.chosen
+    return {
+        f"omega{index}": 2 * np.pi * body.frequency[chosen],
+        f"zeta{index}": body.damping_ratio[chosen],
+        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
+        f"member{index}": body.part[chosen].astype(np.int32),
+        f"level_modes{index}": np.searchsorted(flank.level, (RIGID, FAST, STANDARD), "right").astype(np.int32),
+    }
+
+
+def flank_sizes(flank: Flank, degrees: np.ndarray) -> tuple[int, int, bool]:
+    """The last of "size": points that are stored, ground modes, whether flank 1 is the image of flank 0."""
+    return flank.residual.shape[3], flank.low.size, is_mirrored(flank, degrees)
+
+
+def flank_sections(
+    index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]], degrees: np.ndarray
+) -> dict[str, np.ndarray]:
+    """What the flanks of gear `index` read: of its gear group and in every set of ground oscillators. nodes: (body,
+    node) of every port."""
+    layout = groups[0].layout
+    flank = layout.bodies[index].flank
+    assert flank is not None
+    port = np.zeros((*flank.node.shape[1:4], len(nodes)))
+    port[..., [p for p, (own, _) in enumerate(nodes) if own == index]] = flank.node[0][..., SPIN, None]
+    family = families(layout)[index]
+    reads = [np.flatnonzero(group.owner == family) for group in groups]
+    assert len({read.size for read in reads}) == 1
+    found = flank_tables(index, flank, degrees) | {
+        f"node_support{index}": node_directions(layout, index).T,
+        f"port_residual{index}": port,
+    }
+    for s, (group, read) in enumerate(zip(groups, reads, strict=True)):
+        found |= ground_tables(index, s, group, read)
+    return found
+
+
+def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
+    carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
+    rotors, whirls = whirl_rows(group)
+    whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
+    return (
+        carried
+        | whirling
+        | {
+            f"omega_ground{number}": group.omega,
+            f"zeta_ground{number}": group.zeta,
+            f"rigid_share{number}": group.rigid_share,
+            f"damper_rows{number}": group.damper_rows,
+            f"damper{number}": group.damper,
+            f"support_rows{number}": group.support_rows,
+            f"support_compliance{number}": np.diag(group.support_compliance),
+            f"kappa{number}": group.kappa,
+            f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
+                len(nodes), group.omega.size
+            ),
+        }
+    )
+
+
+def port_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> list[tuple[int, int]]:
+    """(body, node) of every port, in the order of the stage. carriers: reduced, by name."""
+    nodes = stage_nodes(stage, carriers)
+    return [nodes.find(stage, port.body, port.at, port.node) for port in stage.ports.values()]

@@ -1,0 +1,64 @@
+"""Squeeze film between open flanks: what a stage file says → starts of the kernel's parameters, and what a film can
+stop."""
+
+from __future__ import annotations
+
+import math
+
+from gearfmu.errors import ModelError
+from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.spec.forms.shapes import face_width, mesh_shape
+
+REACH = 100e-6  # m: of the kernel, GK_FILM_REACH
+NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
+
+
+def film_starts(stage: Stage) -> dict[str, float]:
+    """Parameter → start. Empty where no engagement says anything about a film; else it is on, and an engagement that
+    says nothing has oil of next to no viscosity.
+
+    ModelError where friction and film of an engagement name two viscosities: there is one oil."""
+    if not any(mesh.film for mesh in stage.engagements):
+        return {}
+    starts = {"effect.film": 1.0}
+    for mesh in stage.engagements:
+        prefix = f"{mesh.name}." if len(stage.engagements) > 1 else ""
+        rubs = mesh.friction is not None and mesh.friction.law != "constant"
+        if mesh.film is None:
+            if not rubs:
+                starts[f"{prefix}oil_viscosity"] = NEXT_TO_NONE
+            continue
+        if rubs and mesh.friction is not None and mesh.friction.viscosity != mesh.film.viscosity:
+            raise ModelError(
+                f"engagement {mesh.name}: friction says oil of {mesh.friction.viscosity:g} Pa·s, film of "
+                f"{mesh.film.viscosity:g} Pa·s; state the same viscosity in both"
+            )
+        starts |= {f"{prefix}oil_viscosity": mesh.film.viscosity, f"{prefix}film_roughness": mesh.film.roughness}
+    return starts
+
+
+def film_resistance(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:
+    """c of f = −c ḋ (N·s/m) at a gap (m) of two flanks of relative radius of curvature and width (m), docs/theory.md
+    (8q); 0 from REACH on."""
+    if gap >= REACH:
+        return 0.0
+    ends = (gap + roughness) ** -1.5 - (REACH + roughness) ** -1.5
+    return 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5 * ends
+
+
+def film_stop(stage: Stage, mesh: EngagementSpec) -> float:
+    """`film_impulse` of an engagement with a film from REACH on, spur teeth at the pitch point."""
+    assert mesh.film is not None
+    pair, internal = mesh_shape(stage, mesh), stage.internal(mesh)
+    a, b = (gear.r_b for gear in pair.gears)
+    first, second = (pair.length * r_b / (b - a if internal else a + b) for r_b in (a, b))
+    radius = first * second / (second - first if internal else first + second)
+    return film_impulse(REACH, mesh.film.viscosity, mesh.film.roughness, radius, face_width(stage, mesh))
+
+
+def film_impulse(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:
+    """∫ c dd from flanks that touch to a gap (m), N·s: momentum that the film takes on the way, docs/theory.md (8r)."""
+    gap = min(gap, REACH)
+    factor = 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5
+    far = (REACH + roughness) ** -1.5
+    return factor * (2 * roughness**-0.5 - 2 * (gap + roughness) ** -0.5 - gap * far)

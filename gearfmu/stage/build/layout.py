@@ -1,0 +1,173 @@
+"""Stage and reduced gears → the layout of its ground group: free bodies, rotors, springs between nodes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.spec.forms.general import ShaftBody, Stage, SupportSpec, ToothedBody
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.stage.build.free import FreeBody, free_carrier, free_gear, free_shaft
+from gearfmu.stage.build.groups import Layout, Support
+from gearfmu.stage.build.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
+
+SAME_PLACE = 1e-9  # m
+STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
+SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Where bodies are held and driven. numbers: name of a body → its number, gears first in the order of the stage,
+    then shafts and carriers; places: name of a shaft → places (K,) m of its nodes in the stage, ascending; names: of a
+    carrier → names of its nodes."""
+
+    numbers: dict[str, int]
+    places: dict[str, list[float]]
+    names: dict[str, list[str]]
+
+    def find(self, stage: Stage, body: str, at: float | None, node: str | None = None) -> tuple[int, int]:
+        """(body, node) at a place; a gear has one node, its bore or its rim, a carrier those that have names."""
+        if body in self.names:
+            return self.numbers[body], self.names[body].index(node or "bore")
+        if body not in self.places:
+            return self.numbers[body], 0
+        wanted = stage.place(body, at)
+        return self.numbers[body], int(np.argmin(np.abs(np.array(self.places[body]) - wanted)))
+
+
+def stage_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> Nodes:
+    """The nodes of all bodies: those that supports and ports name. carriers: reduced, by name."""
+    shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
+    ordered = [body.name for body in (*stage.gears, *shafts, *stage.carriers)]
+    places: dict[str, list[float]] = {}
+    for shaft in shafts:
+        wanted = [place_of(stage, s) for s in stage.supports if shaft.name in (s.body, s.to)]
+        wanted += [stage.place(shaft.name, port.at) for port in stage.ports.values() if port.body == shaft.name]
+        places[shaft.name] = _distinct(wanted)
+    names = {name: [str(i["name"]) for i in body.interfaces] for name, body in carriers.items()}
+    return Nodes({name: i for i, name in enumerate(ordered)}, places, names)
+
+
+def place_of(stage: Stage, support: SupportSpec) -> float:
+    """Place of a support along the axis: as said, or where its gear lies."""
+    if support.at is not None:
+        return support.at
+    names = [name for name in (support.body, support.to) if name]
+    gears = [name for name in names if isinstance(stage.bodies[name], ToothedBody)]
+    return stage.place((gears or names)[0], None)
+
+
+def width_degrees(stage: Stage, bodies: Sequence[Any]) -> np.ndarray:
+    """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width."""
+    count = min(body.width_functions for body in bodies)
+    return symmetric_functions(count) if stage.even else np.arange(min(count, MOST_FUNCTIONS))
+
+
+def stage_layout(
+    stage: Stage,
+    bodies: Sequence[Any],
+    carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
+    points: Sequence[np.ndarray] | None = None,
+) -> Layout:
+    """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
+    `carriers`. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read; the even
+    grid of ROLLS where None."""
+    nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
+    points = even_grids(stage, bodies, ROLLS) if points is None else points
+    free: list[FreeBody] = []
+    for i, gear in enumerate(stage.gears):
+        same = next((k for k in range(i) if bodies[k] is bodies[i] and np.array_equal(points[k], points[i])), None)
+        free.append(_gear(stage, bodies[i], degrees, points[i]) if same is None else free[same])
+        free[i] = replace(free[i], name=gear.name)  # a body's file may come from another stage
+    shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
+    free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
+    free += [replace(free_carrier(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
+    names = list(stage.rotors)
+    bare = Layout(
+        free,
+        [tuple(nodes.numbers[name] for name in rotor.bodies) for rotor in stage.rotors.values()],
+        [],
+        stage.planar,
+        frozenset(r for r, rotor in enumerate(stage.rotors.values()) if rotor.stands),
+        {
+            r: (names.index(rotor.carried_by), *rotor.axis)
+            for r, rotor in enumerate(stage.rotors.values())
+            if rotor.carried_by is not None
+        },
+    )
+    return replace(bare, supports=[_support(stage, nodes, bare, support) for support in stage.supports])
+
+
+def even_grids(stage: Stage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
+    """(rolls, R) of every gear: weights of its body's rolls on the even grid."""
+    shapes = [gear_shape(gear) for gear in stage.gears]
+    return [resampling(body.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
+
+
+def _gear(stage: Stage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
+    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
+    return free_gear(body, chosen, degrees, weights, stage.levels)
+
+
+def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
+    """Modes that flanks or bore see, pairs whole."""
+    rows = np.abs(body.flank_rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
+    bore = np.abs(body.bore_rows)
+    seen = (rows > SEEN) | (bore > SEEN * bore.max(axis=1, keepdims=True)).any(axis=0)
+    second = np.flatnonzero(body.part == 2)
+    seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
+    return np.flatnonzero(seen)
+
+
+def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
+    m, origin = shaft.material, stage.place(shaft.name, None)
+    sections = [Section(s.length, s.outer_diameter, s.bore_diameter) for s in shaft.sections]
+    steel = Steel(m.youngs_modulus, m.poisson_ratio, m.density)
+    beam = reduce_shaft(Shaft(sections, steel, [place - origin for place in places]), shaft.stored_to)
+    return free_shaft(shaft.name, beam, shaft.modal_damping)
+
+
+def _support(stage: Stage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
+    at, directions, compliance, damping = place_of(stage, support), [], [], []
+    first = nodes.find(stage, support.body, at, support.node if support.to is None else None)
+    for field, own in STIFFNESS.items():
+        stiffness = getattr(support, field)
+        if stiffness is None:
+            continue
+        rigid = stiffness == "rigid"
+        for direction in own:
+            mass = layout.mass(first[0], direction)
+            directions.append(direction)
+            compliance.append(0.0 if rigid else 1 / stiffness)
+            damping.append(0.0 if rigid else 2 * support.damping_ratio * math.sqrt(stiffness * mass))
+    return Support(
+        name=f"{_kind(stage, support)}.{support.name}",
+        first=first,
+        second=None if support.to is None else nodes.find(stage, support.to, at, support.node),
+        directions=tuple(directions),
+        compliance=np.diag(compliance),
+        damping=np.array(damping),
+    )
+
+
+def _kind(stage: Stage, support: SupportSpec) -> str:
+    """What a support is called: a bearing on the ground, a pin between a carrier and what it carries, else a seat."""
+    if support.to is None:
+        return "bearing"
+    return "pin" if stage.rotor_of(support.body) != stage.rotor_of(support.to) else "seat"
+
+
+def _distinct(places: Sequence[float]) -> list[float]:
+    result: list[float] = []
+    for place in sorted(places):
+        if not result or place - result[-1] > SAME_PLACE:
+            result.append(place)
+    return result

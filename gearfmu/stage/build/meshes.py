@@ -1,0 +1,154 @@
+"""The engagements of a stage for the model blob: positions, backlash, limits, and how the teeth stand at φ = 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.planetary import RingMesh
+from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
+
+EXTERNAL, INTERNAL = 1, -1
+H_MAX = 7.5e-6  # s: largest default step
+SAME_ANGLE = 1e-9  # rad
+
+
+def mesh_axes(stage: Stage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Positions (x, y) m of A and B, in the axes of what carries them, where their teeth are as they should be."""
+    a, b = (stage.rotors[stage.rotor_of(name)].axis for name in mesh.gears)
+    return a, b
+
+
+def _axes_as_they_are(stage: Stage, mesh: EngagementSpec) -> list[float]:
+    """`mesh_axes` one after the other, with the deviations of the axes."""
+    rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
+    return [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
+
+
+def tooth_phases(stage: Stage) -> dict[str, float]:
+    """Angle (rad) of tooth 0 of every gear at φ = 0: in every engagement the drive flanks of tooth 0 of both gears
+    touch; of a ring it is the flanks of space 0.
+
+    A gear that no engagement before has placed has its tooth 0 on +x. With γ the direction from A to B, rolling both
+    gears by equal lengths r_bA dα = −r_bB dβ from the pair by itself gives φ_B = γ + φ_B⁰ − (φ_A − γ) r_bA/r_bB.
+    ModelError where a gear with several engagements cannot have all of them so: its axes do not fit its teeth.
+    """
+    return _placed(stage)[0]
+
+
+def _placed(stage: Stage) -> tuple[dict[str, float], list[int]]:
+    """`tooth_phases`, and of every engagement the tooth of B whose drive flank touches that of A's tooth 0: not 0 where
+    engagements close a loop, as those of sun, planets and ring."""
+    phases: dict[str, float] = {}
+    shifts = []
+    for mesh in stage.engagements:
+        pair = mesh_shape(stage, mesh)
+        gamma = direction_of(pair, *mesh_axes(stage, mesh))
+        a, b = mesh.gears
+        if b in phases and a not in phases:
+            phases[a] = _phase_of_a(pair, phases[b], gamma)
+        first = phases.setdefault(a, 0.0)
+        fitting = _phase_of_b(pair, first, gamma)
+        pitch = 2 * math.pi / pair.gears[1].z
+        apart = phases.setdefault(b, fitting) - fitting
+        off = math.remainder(apart, pitch)
+        shifts.append(round((off - apart) / pitch))
+        if abs(off) > SAME_ANGLE:
+            raise ModelError(
+                f"engagement '{mesh.name}': with {a} and {b} where their other engagements put them, flanks "
+                f"miss each other by {1e3 * off * pair.gears[1].r_b:.3g} mm: move an axis"
+            )
+    return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}, shifts
+
+
+def direction_of(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
+    """Angle (rad, in (−π, π]) from A's axis to B's; of a ring from its own to A's: the branch that the kernel takes."""
+    sense = -1 if isinstance(pair, RingMesh) else 1
+    return math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
+
+
+def _phase_of_b(pair: MeshShape, first: float, gamma: float) -> float:
+    """Angle (rad) of B that fits the angle `first` of A; gamma: `direction_of`."""
+    if isinstance(pair, RingMesh):
+        return pair.ring_phase(first, gamma)
+    return gamma + pair.wheel_phase - (first - gamma) * pair.gears[0].r_b / pair.gears[1].r_b
+
+
+def _phase_of_a(pair: MeshShape, second: float, gamma: float) -> float:
+    """The inverse of `_phase_of_b`."""
+    if isinstance(pair, RingMesh):
+        return pair.planet_angle(second, gamma)
+    return gamma - (second - gamma - pair.wheel_phase) * pair.gears[1].r_b / pair.gears[0].r_b
+
+
+def stage_sections(stage: Stage) -> dict[str, Any]:
+    """Sections of names, limits and engagements."""
+    gears = [gear.name for gear in stage.gears]
+    engaged, numbers, periods = [], [], []
+    for mesh in stage.engagements:
+        pair, (a, b) = mesh_shape(stage, mesh), mesh_axes(stage, mesh)
+        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
+        force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
+        place = _axes_as_they_are(stage, mesh)
+        numbers.append([*place, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
+        periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
+    shifts = _placed(stage)[1]
+    looped = {"tooth_shift": np.array(shifts, np.int32)} if any(shifts) else {}
+    return (
+        looped
+        | _frame_section(stage)
+        | {
+            "name": stage.name,
+            "rotor_names": "|".join(stage.rotors),
+            "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
+            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
+            "engaged": np.array(engaged, np.int32),
+            "engagement": np.array(numbers),
+        }
+    )
+
+
+def _frame_section(stage: Stage) -> dict[str, Any]:
+    """Rotors in whose axes the others stand; nothing where all stand on the ground."""
+    rotors, carriers = list(stage.rotors), [rotor.carried_by for rotor in stage.rotors.values()]
+    if not any(carriers):
+        return {}
+    return {"frame": np.array([-1 if name is None else rotors.index(name) for name in carriers], np.int32)}
+
+
+def _tilt(mesh: EngagementSpec, a: Sequence[float], b: Sequence[float]) -> tuple[float, float]:
+    """Angles (rad) about x and y of B's axis against A's: f_Sigma delta along the line of the centres, f_Sigma beta
+    across it, both over the span (ISO/TR 10064-3)."""
+    if mesh.misalignment is None:
+        return 0.0, 0.0
+    along, across = (f / mesh.misalignment.span for f in (mesh.misalignment.in_plane, mesh.misalignment.out_of_plane))
+    gamma = math.atan2(b[1] - a[1], b[0] - a[0])
+    x, y = along * math.cos(gamma) - across * math.sin(gamma), along * math.sin(gamma) + across * math.cos(gamma)
+    return -y, x  # the axis e_z + (x, y) is e_z turned by (-y, x)
+
+
+def kind_of(pair: MeshShape) -> int:
+    """The kernel's number of a kind of engagement."""
+    return INTERNAL if isinstance(pair, RingMesh) else EXTERNAL
+
+
+def _coast_shift(geometry: MeshShape) -> int:
+    """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal
+    backlash. In a ring tooth 0 stands in space 0."""
+    if not isinstance(geometry, PairGeometry):
+        return 0
+    a, b = geometry.gears
+    t = geometry.alpha_wt
+    gaps = {
+        shift: geometry.length
+        + a.r_b * (-a.psi_b - t)
+        + b.r_b * (geometry.wheel_phase + shift * 2 * math.pi / b.z - b.psi_b - t - math.pi)
+        for shift in (-1, 0, 1)
+    }
+    return min(gaps, key=lambda shift: abs(gaps[shift]))

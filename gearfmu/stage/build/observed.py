@@ -1,0 +1,62 @@
+"""Gears whose own motion is an output of the model: rigid motion and amplitudes of the free body's modes.
+
+The displacement of the body in its own axes is x + θ × r + √m Σ q̂_k φ_k(r), with the mode shapes φ_k, kg^-½, of the
+body's file. q̂_k = q_k/√m, m, is the root-mean-square displacement, by mass, of the body in that mode alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+from gearfmu.spec.forms.expand import as_general, spread
+from gearfmu.spec.forms.general import Stage
+from gearfmu.stage.build.free import NODE_MEMBERS
+from gearfmu.stage.build.groups import Group, families
+from gearfmu.stage.build.model import StageModel
+
+MOTION, MODE = ".motion.", ".mode_"
+
+
+def observed_number(stage: Stage, name: str) -> int:
+    """Number of a gear in the stage. ModelError for any other body."""
+    names = [gear.name for gear in stage.gears]
+    if name not in names:
+        raise ModelError(f"stage {stage.name}: no gear '{name}' whose motion could be an output; {', '.join(names)}")
+    return names.index(name)
+
+
+def observed_sections(index: int, bodies: Sequence[Any], groups: Sequence[Group]) -> dict[str, Any]:
+    """Sections of the blob that make the motion of gear `index` outputs. bodies: reduced gears of the stage."""
+    layout, body = groups[0].layout, bodies[index]
+    flank, family = layout.bodies[index].flank, families(layout)[index]
+    assert flank is not None
+    found: dict[str, Any] = {
+        f"observed{index}": layout.bodies[index].name,
+        f"own_number{index}": np.concatenate([-1 - np.arange(6), flank.low + 1]).astype(np.int32),
+        f"own_member{index}": np.concatenate([NODE_MEMBERS, body.part[flank.low]]).astype(np.int32),
+        f"mode_number{index}": (flank.chosen + 1).astype(np.int32),
+        f"mode_scale{index}": np.array([1 / math.sqrt(body.mass)]),
+    }
+    for s, group in enumerate(groups):
+        read = np.flatnonzero(group.owner == family)
+        elastic = group.shapes[group.at[index]][len(layout.freedoms(index)) :]
+        rows = np.vstack([group.rigid(index), elastic / math.sqrt(body.mass)])
+        found[f"own_rows{index}_{s}"] = np.ascontiguousarray(rows[:, read])
+    return found
+
+
+def gear_bodies(spec: Any, bodies: Sequence[Any]) -> dict[str, Any]:
+    """One of `bodies` (or what stands for them, such as their hashes) for every gear of a stage by name: of a set its
+    sun, planet, ring and carrier are given."""
+    found = spread(spec, bodies)
+    return {gear.name: found[gear.name] for gear in as_general(spec).gears}
+
+
+def gear_hashes(model: StageModel) -> dict[str, str]:
+    """Hash of the reduced body of every gear of a model."""
+    return gear_bodies(model.spec, model.body_hashes)

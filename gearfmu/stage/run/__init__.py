@@ -1,0 +1,1 @@
+"""A StageModel at rest and in motion: transmission error, simulation, traces."""

@@ -1,0 +1,72 @@
+"""What a stage is made for: torques and speeds of its input that bring no engagement beyond its torque_max and
+speed_max, and what to say where a run or a position goes beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from gearfmu.errors import SimulationError
+from gearfmu.spec.forms.turning import meshings, turns
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.place import MeshPlace, place_of
+
+RPM = 30 / np.pi
+
+
+def places_of(model: StageModel) -> list[MeshPlace]:
+    """The engagements that turn with the ports."""
+    turning = turns(model.stage, model.shafts.input)
+    return [place_of(model, name) for name, meshing in meshings(model.stage).items() if meshing.rotor in turning]
+
+
+def largest_torque(model: StageModel) -> float:
+    """Torque on the input (N·m) that brings no engagement beyond its torque_max."""
+    return min(place.most for place in places_of(model))
+
+
+def engagements_per_turn(model: StageModel) -> list[float]:
+    """(E,): tooth engagements of every mesh in one revolution of the input, 0 where it does not turn with it."""
+    turning = turns(model.stage, model.shafts.input)
+    found = meshings(model.stage).values()
+    return [abs(float(m.relative(turning))) * m.teeth if m.rotor in turning else 0.0 for m in found]
+
+
+def largest_speed(model: StageModel) -> float:
+    """Speed of the input (rad/s) that brings no engagement beyond its speed_max."""
+    cycles, known = engagements_per_turn(model), meshings(model.stage)
+    meshes = zip(model.stage.engagements, cycles, strict=True)
+    return min(mesh.speed_max * known[mesh.name].teeth / each for mesh, each in meshes if each)
+
+
+def beyond_limits(model: StageModel, torque: float, speed: float = 0.0) -> list[str]:
+    """In words, where a torque (N·m) or a speed (rad/s) of the input lies beyond what the stage is made for."""
+    most, fastest, name = largest_torque(model), largest_speed(model), model.shafts.input
+    found = []
+    if abs(torque) > most * (1 + 1e-9):
+        found.append(
+            f"{abs(torque):g} N·m on the {name} is beyond torque_max, {most:g} N·m: the local contact law and the load "
+            "patch of the bodies are made for less"
+        )
+    if abs(speed) > fastest * (1 + 1e-9):
+        found.append(
+            f"{abs(speed) * RPM:.6g} rpm of the {name} is beyond speed_max, {fastest * RPM:.6g} rpm: the internal step "
+            "is made for a slower mesh"
+        )
+    return found
+
+
+@contextmanager
+def limit_named(model: StageModel, torque: float) -> Iterator[None]:
+    """A SimulationError(no_equilibrium) from inside says the torque (N·m on the input), and its limit."""
+    try:
+        yield
+    except SimulationError as error:
+        if error.outcome != "no_equilibrium":
+            raise
+        beyond = "; ".join(beyond_limits(model, torque)) or "within torque_max: look at backlash, relief and ports"
+        raise SimulationError(
+            f"{model.name}: no static equilibrium under {torque:g} N·m ({beyond})", error.outcome, error.time
+        ) from None

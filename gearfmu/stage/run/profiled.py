@@ -1,0 +1,87 @@
+"""Inputs of a stage whose torque and speed follow straight lines over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.simulate import Steady
+
+BETWEEN = 8  # largest part of the range of torques between two of them whose winding is computed: 1/BETWEEN
+BACKLASH = 0.02  # of the largest torque: within it a torque that changes its sign passes the backlash
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight lines through points (n,), constant outside: value, slope and integral at a time."""
+
+    time: np.ndarray
+    values: np.ndarray
+
+    @cached_property
+    def _areas(self) -> np.ndarray:
+        steps = 0.5 * (self.values[1:] + self.values[:-1]) * np.diff(self.time)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, slope and integral from the first point on. The slope at a corner is that behind it."""
+        k = int(np.searchsorted(self.time, time, side="right")) - 1
+        since = time - self.time[max(k, 0)]
+        if k < 0 or k == self.time.size - 1:
+            value = float(self.values[max(k, 0)])
+            return value, 0.0, float(self._areas[max(k, 0)]) + value * since
+        slope = float(self.values[k + 1] - self.values[k]) / float(self.time[k + 1] - self.time[k])
+        first = float(self.values[k])
+        return first + slope * since, slope, float(self._areas[k]) + (first + 0.5 * slope * since) * since
+
+
+@dataclass(frozen=True)
+class Profiled:
+    """Inputs of a stage whose input follows a speed over time (Line, rad/s) while shafts and meshes are wound up by a
+    torque over time (Line, N·m, on the input), as `Steady` does for constant ones. For spring ports without a chain.
+
+    What the stage takes up under a torque, its mean over a pitch, is computed at the torques of the points and between
+    them at eighths of their range, and follows straight lines over the torque.
+    """
+
+    model: StageModel
+    torque: Line
+    speed: Line
+
+    @cached_property
+    def winding(self) -> Line:
+        """Angle of the input (rad) over the torque on it (N·m, in place of the time)."""
+        torques = winding_torques(self.torque.values)
+        still = Steady(self.model, 0.0, 0.0)
+        return Line(torques, np.array([replace(still, torque=float(torque)).winding for torque in torques]))
+
+    def __call__(self, time: float) -> Mapping[str, float]:
+        shafts, values = self.model.shafts, {}
+        torque, growing, _ = self.torque.at(time)
+        speed, rate, angle = self.speed.at(time)
+        taken, yielding, _ = self.winding.at(torque)
+        for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
+            stiffness = self.model.stage.ports[port].k
+            assert stiffness is not None, "the port is a spring"
+            driven = port == shafts.input
+            wound = (1.0 if driven else -1.0) / turn / stiffness
+            values[f"{port}.phi"] = wound * torque + (taken if driven else 0.0) + turn * angle
+            values[f"{port}.w"] = wound * growing + (yielding * growing if driven else 0.0) + turn * speed
+            values[f"{port}.a"] = turn * rate
+        return values
+
+
+def winding_torques(values: np.ndarray) -> np.ndarray:
+    """Torques (m,), ascending, at which to compute what a stage takes up: those given (n,), others between them, and
+    both sides of the backlash where the sign changes."""
+    low, high = float(values.min()), float(values.max())
+    found = set(values.tolist()) if values.size <= 4 * BETWEEN else {low, high}
+    found |= set(np.linspace(low, high, BETWEEN + 1).tolist()) if high > low else set()
+    most = BACKLASH * max(abs(low), abs(high))
+    if low < 0 < high:
+        found = {torque for torque in found if abs(torque) > most} | {-most, most}
+    return np.array(sorted(found))

@@ -1,0 +1,171 @@
+"""The standalone solver at a constant load, in a run-up or along a profile, and settings of the kernel by name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError, Problem, SpecError, near_or_all
+from gearfmu.kernel import Variable
+from gearfmu.ranges import Range, range_of, range_problems
+from gearfmu.spec.forms.turning import require_driven
+from gearfmu.spec.tables.profile import Profile
+from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.run.limits import beyond_limits, limit_named
+from gearfmu.stage.run.profiled import Line, Profiled
+from gearfmu.stage.run.simulate import Inputs, Steady, simulate
+from gearfmu.stage.run.trace import Trace
+
+DURATION = 0.1  # s, of a run whose profile says none
+DRIVE_RANGES = {
+    "torque": "torque",
+    "speed": "speed",
+    "end_speed": "speed",
+    "duration": "duration",
+    "step": "step",
+    "settle": "time",
+}
+PARAMETER_RANGES = {
+    "contact_damping": "contact_damping",
+    "backlash": "backlash_parameter",
+    "contact_penalty": "penalty",
+    "friction_coefficient": "friction_coefficient",
+    "oil_viscosity": "oil_viscosity",
+    "flank_roughness": "flank_roughness",
+    "film_roughness": "film_roughness",
+    "w_start": "speed",
+    "h": "internal_step",
+    "slices": "slices",
+}
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A run of a stage alone: torque (N·m) and speed (rad/s) of the input; duration (s), None for that of the profile
+    or 0.1; time between samples (s); time from which on results are taken (s); end_speed (rad/s), which the speed grows
+    or falls to, None: it stays; profile: torque, speed or both over time, in their place. SpecError with all that is
+    missing or said twice."""
+
+    torque: float | None = None
+    speed: float | None = None
+    duration: float | None = None
+    step: float = 20e-6
+    settle: float = 0.02
+    end_speed: float | None = None
+    profile: Profile | None = None
+
+    def __post_init__(self) -> None:
+        if problems := list(_drive_problems(self)):
+            raise SpecError(problems)
+
+    @property
+    def length(self) -> float:
+        """Simulated time, s."""
+        if self.duration is not None:
+            return self.duration
+        return DURATION if self.profile is None else self.profile.duration
+
+    def lines(self) -> tuple[Line, Line]:
+        """Torque (N·m) and speed (rad/s) over time."""
+        profile = self.profile or Profile(np.array([0.0, self.length]))
+        ends = (self.torque, self.torque), (self.speed, self.speed if self.end_speed is None else self.end_speed)
+        torque, speed = (
+            Line(np.array([0.0, self.length]), np.array(given)) if own is None else Line(profile.time, own)
+            for own, given in zip((profile.torque, profile.speed), ends, strict=True)
+        )
+        return torque, speed
+
+    @property
+    def scene(self) -> str:
+        """What the run is, in words."""
+        if self.profile is not None:
+            return "torque and speed over time"
+        return "constant speed and load" if self.end_speed is None else "run-up under constant torque"
+
+
+def _drive_problems(drive: Drive) -> Iterator[Problem]:
+    profile, given = drive.profile, {field: getattr(drive, field) for field in DRIVE_RANGES}
+    yield from range_problems({field: (value, range_of(DRIVE_RANGES[field])) for field, value in given.items()})
+    for name in ("torque", "speed"):
+        in_profile, given = profile is not None and getattr(profile, name) is not None, getattr(drive, name)
+        if given is None and not in_profile:
+            remedy = f"the run needs a {name}: give it" + ("" if profile is None else ", or a column in the profile")
+            yield Problem("", name, "", remedy)
+        if given is not None and in_profile:
+            yield Problem("", name, f"{given:g}", f"the profile has a {name} too: leave one of them away")
+    if drive.end_speed is not None and profile is not None and profile.speed is not None:
+        yield Problem("", "end_speed", f"{drive.end_speed:g} rad/s", "the profile has a speed: leave one of them away")
+
+
+def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
+    """Kernel parameters (docs/variables.md) as numbers, from {"level": "fast", "slices": 10, "effect.hertz": False} or
+    the same as text. ModelError, naming what there is, for a name or value that the model does not know; SpecError
+    with every number that is out of range, in the words in which a stage file with that number is refused."""
+    known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
+    unknown = [name for name in settings if name not in known]
+    if unknown:
+        raise ModelError(f"'{unknown[0]}' is no parameter: {near_or_all(unknown[0], known, 'there are', cutoff=0.6)}")
+    found = {name: _number(known[name], value) for name, value in settings.items()}
+    if problems := range_problems({name: (value, _range(known[name])) for name, value in found.items()}):
+        raise SpecError(problems)
+    return found
+
+
+def steady_run(
+    model: StageModel,
+    drive: Drive,
+    settings: Mapping[str, float] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trace:
+    """Trace of the model under this drive (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
+    numbers (`parameters`); progress is called with the part done, 0 … 1. Torque ports are driven through springs
+    (`StageModel.driven_by_springs`); SpecError where that cannot be."""
+    require_driven(model.stage, (model.shafts.input, model.shafts.output), "simulate")
+    model = model.driven_by_springs()
+    torque, speed = drive.lines()
+    inputs = _inputs(model, drive, torque, speed)
+    most, fastest = (float(max(line.values, key=abs)) for line in (torque, speed))
+    with limit_named(model, most):
+        trace = simulate(model, inputs, drive.length, drive.step, settings, progress)
+    trace.meta["warnings"] = [*beyond_limits(model, most, fastest), *trace.meta["warnings"]]
+    trace.meta.update(
+        settle=drive.settle,
+        scene=drive.scene,
+        torque=drive.torque,
+        speed=drive.speed,
+        end_speed=drive.end_speed,
+    )
+    return trace
+
+
+def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Inputs:
+    if drive.profile is not None:
+        return Profiled(model, torque, speed)
+    return Steady(model, float(speed.values[0]), float(torque.values[0]), speed.at(0.0)[1])
+
+
+def _range(variable: Variable) -> Range:
+    """The range of a parameter, with the remedy of the stage file's field where it is the same number."""
+    last = variable.name.rpartition(".")[2]
+    if not variable.name.startswith("effect.") and last in PARAMETER_RANGES:
+        return range_of(PARAMETER_RANGES[last])
+    return Range(variable.unit, variable.minimum, variable.maximum)
+
+
+def _number(variable: Variable, value: Any) -> float:
+    """Value of an enumeration by its item, of a boolean by true or false, else a number in SI."""
+    boolean = variable.type == "Boolean"
+    words = {"true": 1.0, "false": 0.0} if boolean else {item: float(i) for i, item in enumerate(variable.items)}
+    if value in words:
+        return words[value]
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        near = difflib.get_close_matches(str(value), words, n=1)
+        expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise ModelError(f"{variable.name} = {value}: expected {expected}{hint}") from None
