@@ -136,7 +136,7 @@ def _numbers(stage: str) -> dict[str, str]:
     return {
         "elastic": f"{stored} stored modes",
         "modes": modes,
-        "residual": "of what is not dynamic",
+        "residual": "of all modes that are not dynamic",
         "hertz": f"local law up to {_listed(f'{mesh.torque_max:g} N·m' for mesh in meshes)}",
         "slices": f"{spec.slices} over {_listed(f'{1e3 * width:g} mm' for width in widths)}",
         "coast_flank": _listed(f"{1e6 * mesh_geometry(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
