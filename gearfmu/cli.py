@@ -35,7 +35,7 @@ VERBS = {
     ),
     "efficiency": (
         "gearfmu.commands.efficiency:efficiency",
-        "What the mesh of a pair loses to friction of its flanks.",
+        "Loss of every mesh to friction of its flanks.",
     ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),
@@ -50,13 +50,13 @@ VERBS = {
     "convert": ("gearfmu.commands.convert:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
-    "study": ("gearfmu.commands.study:study", "What accuracy costs: error against time of the fidelity levels."),
+    "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),
     "stability": (
         "gearfmu.commands.stability:stability",
         "Run the hard cases at every level; exit code = number of failures.",
     ),
-    "effects": ("gearfmu.commands.effects:effects", "What effects there are, what each costs, how to switch it."),
-    "inspect": ("gearfmu.commands.files:inspect", "Say what one of our files holds."),
+    "effects": ("gearfmu.commands.effects:effects", "Effects: price of each, how to switch it."),
+    "inspect": ("gearfmu.commands.files:inspect", "Show the contents of a stage, scene, body, trace or FMU."),
     "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; tables of variables, effects."),
 }
 

@@ -107,7 +107,7 @@ def _hash_of_rest(file: BinaryIO) -> bytes:
 
 def _check_format(file: h5py.File, kind: Format) -> None:
     if file.attrs.get("format") != kind.name:
-        raise kind.error(f"not a {kind.name.replace('-', ' ')}; 'gearfmu inspect' says what it is")
+        raise kind.error(f"not a {kind.name.replace('-', ' ')}; 'gearfmu inspect' shows its kind")
     version = int(file.attrs["format_version"])
     if version != kind.version:
         raise kind.error(f"{kind.noun} format {version}, this gearfmu reads {kind.version}")

@@ -216,7 +216,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "frequency": ("Hz", 1e-6, 1e9, _CHECK),
     "amplitude": ("N*m", 0, 1e9, _CHECK),
     "control_damping": ("N*m*s/rad", 1e-12, 1e12, "torque per deviation of the speed"),
-    "peak": ("", 1, 1e3, "a dry clutch holds 1 to 1.3 times what it transmits when it slips"),
+    "peak": ("", 1, 1e3, "a dry clutch holds 1 to 1.3 times the torque that it transmits when it slips"),
     "gear_ratio": ("", 1e-4, 1e4, "speed in over speed out"),
     "wheel_radius": ("m", 1e-3, 10, "a passenger car's is about 0.3 m"),
     "tyre_stiffness": ("N", 1e-9, 1e12, "a passenger car's is about 1e5 N"),

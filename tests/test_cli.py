@@ -134,7 +134,7 @@ def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path) -> None:
     again = process("new", "my_pair", cwd=tmp_path)
     assert again.returncode == 1 and "exists" in again.stderr
     assert (tmp_path / "my_pair" / "stage.toml").read_bytes() == before
-    assert b"made like fzg_c; say here" in before and b"FZG type C" not in before, "a description of its own"
+    assert b"made like fzg_c; describe it here" in before and b"FZG type C" not in before, "a description of its own"
     shown = process("inspect", "my_pair", "--json", cwd=tmp_path)
     assert json.loads(shown.stdout)["derived"]["contact_ratio"] > 1
 

@@ -32,7 +32,7 @@ COUPLED = (
 @click.option(
     "--torque",
     type=Quantity("torque"),
-    help='Without --body: torque on the input, "302 N*m"; default: what torque_max allows.',
+    help='Without --body: torque on the input, "302 N*m"; default: the largest that torque_max allows.',
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
@@ -50,7 +50,7 @@ def modes(stage: str, name: str | None, count: int, torque: float | None, out: P
                 raise click.BadParameter(f"goes with --body {which}", param_hint=f"--{option}")
         return _of_stage(stage, torque, count, out)
     if torque is not None:
-        raise click.BadParameter("a body's modes know no torque: leave it away", param_hint="--torque")
+        raise click.BadParameter("modes of a free body have no torque: leave it out", param_hint="--torque")
     body = _shapes(stage, name, count, (how["mounted"], how["uncoupled"]))
     for line in table(body):
         click.echo(line)

@@ -15,7 +15,7 @@ from gearfmu.commands.shared import Quantity, progress_bar
 @click.argument("scene")
 @click.option(
     "--output", "outputs", multiple=True, required=True,
-    help="What is judged: te, bearing.pinion.fx, bearing.pinion, mesh.force …; may repeat.",
+    help="Judged outputs: te, bearing.pinion.fx, bearing.pinion, mesh.force …; may repeat.",
 )  # fmt: skip
 @click.option("--band", nargs=2, required=True, metavar="LOW HIGH", help='Where it is judged, "200 Hz" "5 kHz".')
 @click.option("--budget", help='Largest error of the levels in the band, "1 dB".')

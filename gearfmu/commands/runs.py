@@ -171,7 +171,7 @@ def report(path: Path, stage: str | None, out: Path | None, sound: str | None) -
 @click.command()
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True), metavar="TRACE…")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="The page; comparison.html by default.")
-@click.option("--name", "names", multiple=True, help="What a trace is called on the page; once for each.")
+@click.option("--name", "names", multiple=True, help="Name of a trace on the page; once for each.")
 def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -> None:
     """Compare two or more traces (files, or folders that hold trace.h5) with the first of them, in one page."""
     from gearfmu.api.results import compare as write

@@ -37,7 +37,7 @@ class StepSize(Quantity):
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="Table (CSV), with the facts beside it (JSON); a later call goes on with it.",
+    help="Table (CSV), with the statistics beside it (JSON); a later call continues it.",
 )
 @click.option(
     "--jobs",

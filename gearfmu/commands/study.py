@@ -24,7 +24,7 @@ SET_ERRORS = (
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="Folder of the CSV files and charts; a study that is there goes on.",
+    help="Folder of the CSV files and charts; an existing study is continued.",
 )
 @click.option(
     "--table",

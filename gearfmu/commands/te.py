@@ -109,7 +109,7 @@ def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
 def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     if where["rigid_bearings"]:
         raise click.BadParameter(
-            "a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings"
+            "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
         )
     from gearfmu.report.te import write_set_plot
     from gearfmu.stage.run.set_te import set_te

@@ -180,7 +180,7 @@ class CoupledRun:
         """Go on where another run of the same scene stands that has just made a step, its stage with other settings.
         ModelError where the kernel cannot. Units of the kernel only."""
         stage, old = self.cut.stage, other.cut.stage
-        assert isinstance(stage, KernelUnit) and isinstance(old, KernelUnit), "FMUs know states of their own kind only"
+        assert isinstance(stage, KernelUnit) and isinstance(old, KernelUnit), "FMUs take states of their own kind only"
         self.at = other.at
         stage.adopt(old)
         self.master.restore(other.master.save())

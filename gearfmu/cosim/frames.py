@@ -50,7 +50,7 @@ class FrameRecorder:
         missing = [gear for gear in plan.gears if f"{gear}{MOTION}x" not in known]
         if missing:
             raise CouplingError(
-                f"the stage does not tell how {', '.join(missing)} moves: take an FMU exported with --observe "
+                f"the stage does not report how {', '.join(missing)} moves: take an FMU exported with --observe "
                 f"{missing[0]}, or none"
             )
         self.plan = plan

@@ -150,7 +150,7 @@ def _most_common(values: np.ndarray) -> float:
     out (tip and root lands, bore)."""
     values = np.sort(values[values > 0.2 * values.max(initial=0.0)])
     if len(values) == 0:
-        raise FitError("no face stands like a flank: is the gear's axis z?")
+        raise FitError("no face has the direction of a flank: is the gear's axis z?")
     last = np.searchsorted(values, 1.03 * values, side="right")
     first = int(np.argmax(last - np.arange(len(values))))
     return float(np.median(values[first : last[first]]))

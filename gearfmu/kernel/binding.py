@@ -94,7 +94,7 @@ def load(path: Path | None = None) -> ctypes.CDLL:
         function.restype, function.argtypes = result, arguments
     if library.gk_abi() != ABI:
         raise ModelError(
-            f"{path or library_path()} speaks version {library.gk_abi()} of the kernel interface, this Python {ABI}: "
+            f"{path or library_path()} has version {library.gk_abi()} of the kernel interface, this Python {ABI}: "
             "reinstall gearfmu"
         )
     return library

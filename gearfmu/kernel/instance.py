@@ -209,12 +209,12 @@ class Kernel:
         its static place, contacts begin anew. Inputs are taken too. ModelError where that cannot be: another model,
         an explicit integrator, bearings on in one of them only."""
         if self.hash != other.hash:
-            raise ModelError(f"{self.name} cannot go on from a state of {other.name}: another model")
+            raise ModelError(f"{self.name} cannot continue from a state of {other.name}: another model")
         self.prepare()
         states = (other._setup, other._work, other._data, self._setup, self._data)
         if self._lib.gk_adopt(self._model, *states):
             raise ModelError(
-                f"{self.name} cannot go on from this state: both need an implicit integrator and the same "
+                f"{self.name} cannot continue from this state: both need an implicit integrator and the same "
                 "effect.bearings, and the other must have made a step"
             )
 

@@ -115,7 +115,7 @@ def _named(model: StageModel, name: str, known: set[str]) -> Iterator[Output]:
 def _band(scene: SceneSpec, band: Sequence[str | float], problems: list[Problem]) -> tuple[float, float]:
     edges = [_frequency(value, problems) for value in band]
     if len(edges) != 2:
-        remedy = "overall levels hide what is heard behind the slow cycle of the torque: name a band, 200 Hz and 5 kHz"
+        remedy = "overall levels hide audible bands behind the slow cycle of the torque: name a band, 200 Hz and 5 kHz"
         problems.append(Problem(WHERE, "--band", "", remedy))
         return 0.0, 0.0
     low, high = (float("nan") if f is None else f for f in edges)

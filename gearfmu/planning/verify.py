@@ -111,7 +111,7 @@ class SpotChecks:
 
     def trial(self, spot: Spot, choice: Choice) -> Measured:
         """A set over the window of a check, from its state."""
-        assert spot.full is not None, "only what was judged is looked at again"
+        assert spot.full is not None, "only judged parts are checked again"
         found = self._run(choice, self.road.again(spot.mark.choice, spot.mark.before), spot.first, spot.last)
         values = Signals({}, self.step) if found is None else self._signals(found)
         trial = Trial(choice, "stopped" if found is None else OK, signals=values)

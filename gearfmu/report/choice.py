@@ -34,7 +34,7 @@ def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
         return made, [*gaps, *missing]
     made, missing = _made(_of_meshes(run, deformed))
     if not run.angles:
-        missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
+        missing.append("No mesh orders: the trace has no gear speed or no tooth numbers.")
     return made, [*gaps, *missing]
 
 

@@ -194,7 +194,7 @@ def order_map(
     """
     steps, interval = np.diff(angle), sample_step(time)
     if np.any(steps <= 0):
-        raise MetricsError("the shaft stands or turns round: there are no orders of it")
+        raise MetricsError("the shaft is at rest or reverses: it has no orders")
     if angle[-1] - angle[0] < 2 * np.pi * turns:
         held = (angle[-1] - angle[0]) / (2 * np.pi)
         raise MetricsError(f"the record holds {held:.1f} revolutions, an order map needs {turns}; record a longer run")

@@ -38,7 +38,7 @@ WHOLE = {
     "energy.stored": "Stored energy",
     "energy.work": "Work of the ports",
     "energy.dissipated": "Dissipated energy",
-    "energy.residual": "What the energy balance leaves",
+    "energy.residual": "Error of the energy balance",
 }
 DIRECTIONS = {"f": "force", "m": "moment"}
 

@@ -36,8 +36,8 @@ def _section(segment: Mapping[str, Any], plan: Mapping[str, Any]) -> str:
         page.table(HEADER, [_row(line) for line in segment["lines"]], text=(0, 3, 4)),
         f"<figure>{_chart(segment)}</figure>",
         page.note(
-            "Left: work–precision, every set that was tried, the dashed line what is allowed. Middle: what a step down "
-            "of an effect changes. Right: what a step of the stage spends on it."
+            "Left: work–precision of every set tried; dashed: the allowed error. Middle: change by a step down of an "
+            "effect. Right: its share of a step of the stage."
         ),
         page.table(("", "budgets"), _numbers(segment, plan["checks"])),
     ]

@@ -17,7 +17,7 @@ CROSSED = " Circles: where an order meets a natural frequency of the stage, line
 CROSSED += "transmission error drives."
 MARKED = " Ticks at the top, in the colour of the order: where it meets a natural frequency of the linearised stage."
 BESIDE = "; dotted the orders beside it that are marked in the order map, together"
-PASSING = " and, light, what the passing of the planets makes beside them"
+PASSING = " and, light, the side bands of passing planets"
 
 
 def frequency_maps(run: RunUp) -> Plot:
@@ -43,7 +43,7 @@ def frequency_maps(run: RunUp) -> Plot:
     chart = Chart(tuple(panels), along, "speed", x_limits=(float(ends[0]), float(ends[1])))
     caption = (
         f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. {_rays(run)} "
-        f"What lies level is a resonance."
+        f"Horizontal lines are resonances."
         f"{CROSSED if run.resonances else ''}{_about_pickup(run)}"
     )
     data = {"speed_[rpm]": np.repeat(speed, kept.sum()), "frequency_[Hz]": np.tile(first.frequency[kept], speed.size)}
@@ -63,7 +63,7 @@ def order_maps(run: RunUp) -> Plot:
     passing = PASSING if any(own.sides for own in run.signals.values()) else ""
     caption = (
         f"Orders per revolution of the {run.shaft}, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked "
-        f"by dotted lines: {_families(run)}{passing}.{_shafts(run)} What stands upright goes with the speed; a "
+        f"by dotted lines: {_families(run)}{passing}.{_shafts(run)} Vertical lines are orders; a "
         "resonance lies on a hyperbola, frequency over speed."
     )
     data = {"speed_[rpm]": np.repeat(first.speed * RPM, first.order.size)}

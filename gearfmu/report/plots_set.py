@@ -222,7 +222,7 @@ def energy(trace: Trace) -> Plot | None:
     left_over = Curve(trace.time, trace["energy.residual"], "stored − work + dissipated since the start", "J")
     panels = (
         Panel("energy in J", channels(trace, (*works, "energy.stored", "energy.dissipated")), height=190),
-        Panel("what the balance leaves in J", (left_over,), height=120),
+        Panel("error of the balance in J", (left_over,), height=120),
     )
     through = sum(float(np.ptp(trace[name])) for name in works)
     if works == ["energy.work"]:  # of all ports together: what came in and what went out is told by the run

@@ -30,7 +30,7 @@ WORDS = {  # key of a result: words, channel of the mesh, unit
 NOT_GIVEN = "not given"
 FACTOR_WORDS = (
     "Dynamic factor: largest mesh force over the static one, in the sense of K_v of ISO 6336-1 (there by rating "
-    "methods; here of what was simulated). "
+    "methods, here of the simulation). "
 )
 
 
@@ -218,7 +218,7 @@ def accuracy(run: Run) -> list[str]:
     prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
     if prices:
         parts += [
-            "<h3>What the fidelity levels of this stage cost and how far they are off</h3>",
+            "<h3>Price and error of the fidelity levels of this stage</h3>",
             page.table(HEADER, shown_rows(prices, str(summary.get("level")))),
             page.note(PRICES),
         ]
@@ -280,5 +280,5 @@ def channels(trace: Trace) -> str:
         f"<td>{escape(own.description)}</td></tr>"
         for name, own in trace.channels.items()
     ]
-    head = "<tr><th></th><th>name</th><th>unit</th><th>what it is</th></tr>"
+    head = "<tr><th></th><th>name</th><th>unit</th><th>meaning</th></tr>"
     return f'<h3>Channels in trace.h5</h3><div class="scroll"><table>{head}{"".join(rows)}</table></div>'

@@ -184,7 +184,7 @@ def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:
         return
     if nominal > BACKLASH_PER_MODULE * module:
         text = millimetres(rounded_up(nominal, 3))
-        draft.assume("pair.backlash", text, "what profile shifts and centre distance give")
+        draft.assume("pair.backlash", text, "as profile shifts and centre distance give")
     if width > STRIP_PER_MODULE * module:
         for name in NAMES:
             text = millimetres(rounded_up(width, 2))

@@ -121,7 +121,7 @@ def _put_planets(
         return
     if any(abs(step - round(step)) > _STEP_TOLERANCE for step in steps):
         shown = ", ".join(f"{360 * step / teeth:.3f} deg" for step in steps)
-        draft.notes.append(f"the planets stand at {shown}, where teeth do not fit: the nearest places are taken")
+        draft.notes.append(f"the planets are at {shown}, where teeth do not fit: the nearest places are taken")
     draft.put("set.positions", [round(step) % teeth for step in steps], "REXS rotating_angle_around_neg_u_axis")
 
 
@@ -147,7 +147,7 @@ def _put_shifts(draft: Draft, gears: list[RexsGear], distance: float) -> None:
         return
     inwards = abs(-ring.x - fitting) <= abs(ring.x - fitting)
     ring.x = (-ring.x if inwards else ring.x) + 0.0
-    side = f", there positive {'inwards' if inwards else 'outwards'}, as the centre distance tells" if ring.x else ""
+    side = f", there positive {'inwards' if inwards else 'outwards'}, as the centre distance shows" if ring.x else ""
     draft.put("ring.profile_shift", ring.x, f"{ring.origin}, its flanks{side}")
 
 

@@ -93,10 +93,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="elastic bodies",
         formula="m ẍ = F, J φ̈ = M and q̈ + 2ζω q̇ + ω² q = Σ Nλ; C_static",
         equation="1 (eqs. 1, 2)",
-        matters=(
-            "always, except for estimates of rigid-body motion: with held axes rigid gears deflect by a tenth (fzg_c, "
-            "302 N·m)"
-        ),
+        matters="always, except for estimates of rigid-body motion: rigid gears on held axes deflect by a tenth",
         off="rigid gears; contacts have their local law alone, bearings and ports as before",
         code="gk_choose.c (gk_choose): no modes, no tables of compliance",
         kept="a stage consists of its bodies",
@@ -106,11 +103,8 @@ EFFECTS: tuple[Effect, ...] = (
         title="number of dynamic modes",
         formula="modes below the cut are states, those above are compliance; cut in the widest gap within 15 %",
         equation="1 (eq. 2)",
-        matters=(
-            "where body resonances lie in the band of interest, or mesh harmonics reach the tooth modes (40–60 "
-            "kHz on fzg_c)"
-        ),
-        off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
+        matters="where body resonances lie in the band, or mesh harmonics reach the tooth modes (40–60 kHz on fzg_c)",
+        off="level `rigid`: bodies follow their loads statically",
         code=(
             "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
             "correct_damped)"
@@ -127,10 +121,10 @@ EFFECTS: tuple[Effect, ...] = (
         title="residual",
         formula="C_res = C_static − Σ N Nᵀ/ω² over the dynamic modes",
         equation="1 (eq. 2)",
-        matters="always: beside 400 modes a gear it is a fifth of the pair's compliance (fzg_c)",
-        off="truncated modes, as in the paper; allowed at level `paper` alone, with a warning",
+        matters="always: a fifth of the compliance of fzg_c beside 400 modes a gear",
+        off="truncated modes, as in the paper",
         code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
-        switch="level `paper`; `effect.residual` = false is refused at every other level",
+        switch="level `paper` alone",
         off_setting={"level": 4.0, "integrator": 2.0},
         on_setting={"level": 3.0, "integrator": 2.0},
         build="residual",
@@ -142,10 +136,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="load-dependent local compliance",
         formula="δ(λ) = λ(c − ½ a ln βλ)",
         equation="2.4 (eqs. 7, 8)",
-        matters=(
-            "when the load changes much: light load, rattle, engagement; the compliance of fzg_c is 8 % higher at 80 "
-            "than at 600 N·m, 17 % at 8"
-        ),
+        matters="light load, rattle, engagement: fzg_c yields 8 % more at 80 than at 600 N·m, 17 % more at 8",
         off="its secant at `torque_max`: a linear law",
         code="gk_law.c; the balance of closed steps in gk_balance.c",
     ),
@@ -154,10 +145,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="slices across the face width",
         formula="tₐ = (2a + 1) × mean of P_a over the slice; one force a slice (mirrored slices: one row)",
         equation="1 (load patch and slices)",
-        matters=(
-            "distribution of the load over the width (ends of fzg_c: 5 % less than the mean); its transmission "
-            "error moves by 0.02 %"
-        ),
+        matters="load over the width (ends of fzg_c: 5 % less than the mean); transmission error by 0.02 %",
         off="1 slice: load uniform over the width",
         code="gk_strips.c, gk_form.c (list_contacts)",
         switch="parameter `slices` (1 … 10); `[contact] slices` in stage.toml, `[stage] slices` in a scene",
@@ -172,7 +160,7 @@ EFFECTS: tuple[Effect, ...] = (
         formula="g of sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt; of sg = +1 in meshes that a torque "
         "in +z on the first port drives by sg = −1",
         equation="2.1 (eq. 4)",
-        matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
+        matters="rattle, reversal, engagement, every start; not where drive flanks stay closed",
         off="teeth pass through the backlash",
         code="gk_flank.c (gk_flank_find), gk_kinematics.c (gk_kinematics_carrying)",
         indicator="coast_flank",
@@ -182,8 +170,8 @@ EFFECTS: tuple[Effect, ...] = (
         title="contact damping",
         formula="F = max(0, F_c + min(F_c, F_d)), F_d = c b × rate of the deflection of the contact's own path",
         equation="2.5, 3.4",
-        matters="level of the mesh resonance and its side bands; never leave it out to save time",
-        off="the mesh mode is damped by modal damping, bearings and ports alone",
+        matters="level of the mesh resonance and its side bands",
+        off="modal damping, bearings and ports alone damp the mesh",
         code="gk_compliance.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
         kept=DISSIPATION,
     ),
@@ -205,7 +193,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="whenever a loaded pair reaches the end of a flank: without relief always",
         off=(
             "flanks end at their tip roll. Exact while no loaded pair gets there (fzg_c_relief: up to about 100 N·m); "
-            "else a loaded pair vanishes, the energy balance loses percents, and status bit 16 is set"
+            "else energy is lost and status bit 16 is set"
         ),
         code="gk_flank.c (corner_contact)",
     ),
@@ -214,7 +202,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="bearings",
         formula="λ/k at the bore node in x and y, c = 2D √(k m)",
         equation="3.9",
-        matters="bearing forces, and the mesh mode itself: on fzg_c more than half of the static compliance",
+        matters="bearing forces and the mesh mode: more than half of the static compliance of fzg_c",
         off="bores held on their axes; bearing forces are reactions",
         code="gk_setup.c (fill_base), gk_step.c (damp_supports)",
         kept="without it bearing forces are reactions, another output",
@@ -234,8 +222,8 @@ EFFECTS: tuple[Effect, ...] = (
         title="motion of the contact along the flanks",
         formula="places, rows, stiffness, normals and curvatures at the rolls of the moment",
         equation="3.3",
-        matters="always; a switch for conservation tests, because a moving mesh does work of its own",
-        off="all of it stays as at the start, gaps are linear in the coordinates",
+        matters="always; a switch for conservation tests: a moving mesh does work",
+        off="places and rows of the start, linear gaps",
         code="gk_engage.c",
         kept="a switch for conservation tests",
     ),
@@ -258,10 +246,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="flank modifications and deviations",
         formula="g → g + d_A(tooth, z, s_A) + d_B(tooth, z, s_B): cubics through tables, slope in the gradient",
         equation="2.2 (eqs. 5a to 5f)",
-        matters=(
-            "wherever flanks are corrected or measured: slopes and crownings of a few micrometres are as large as the "
-            "transmission error; different teeth give shaft orders and side bands"
-        ),
+        matters="corrected or measured flanks: micrometres are as large as the transmission error",
         off="involutes with parabolic tip relief; leads too are left out",
         code="gk_deviation.c (gk_deviation_at), gk_flank.c (depth_of), gk_strips.c (fill_deviations)",
         test="tests/stage/test_flanks.py::test_unloaded_te_is_the_gap_of_the_modified_profile",
@@ -272,10 +257,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="eccentricity and wobble",
         formula="axis of the toothing at C + e (cos, sin)(φ + ψ), tilted by θ about (−sin, cos)(φ + χ)",
         equation="2.1 (eqs. 4c, 4d)",
-        matters=(
-            "shaft orders: transmission error of amplitude e once a turn; side bands of the mesh; wobble moves the "
-            "load across the face width"
-        ),
+        matters="shaft orders, side bands of the mesh; wobble moves the load across the face width",
         off="teeth run true",
         code="gk_deviation.c (gk_runout_move, gk_runout_turn)",
         test="tests/stage/test_flanks.py::test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn",
@@ -286,10 +268,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="Coriolis forces in a carrier's axes",
         formula="v̇ = −2Ω Pᵀ J P v on the rigid masses that a carrier carries, and its own",
         equation="3.10 (eq. 17f)",
-        matters=(
-            "in fast sets: without it the ripple of transmission error and mesh forces errs by 0.1 and 0.3 % at 85 "
-            "rad/s of the carrier, by 0.4 and 3.2 % at 300 (planetary54, `gearfmu study planetary_paper`)"
-        ),
+        matters="fast sets: 0.3 % of the mesh forces' ripple at 85 rad/s of the carrier, 3.2 % at 300",
         off="masses move as in fixed axes",
         code="gk_frame.c (gk_frame_turn)",
         test="tests/stage/test_planetary_theory.py::test_a_sun_in_free_flight_moves_straight_on",
@@ -301,10 +280,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="centrifugal load on planets",
         formula="F = Ω² Σ m a on the places of the planets",
         equation="3.10 (eq. 17g)",
-        matters=(
-            "pin forces and meshes: 60 N a planet at 85 rad/s, 750 N at 300; without it the ripple of transmission "
-            "error and mesh forces errs by 1.1 and 2.6 %, by 14 and 26 %"
-        ),
+        matters="pin forces and meshes: 60 N a planet at 85 rad/s (2.6 % of the ripple), 750 N at 300 (26 %)",
         off="pins carry mesh forces alone",
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
         test="tests/stage/test_planetary_motion.py::test_pins_hold_the_planets_against_their_centrifugal_load",
@@ -317,9 +293,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="v̇ = −2 (Ω H + Ω_f Q) v; of tilts H = −½ J_p J: moment J_p Ω θ̇",
         equation="3.11 (eqs. 17j to 17l)",
         matters=(
-            "fast bodies that tilt or bend: Δω/ω of the size of Ω J_p/(2 J_t ω). At speed_max frequencies below 15 kHz "
-            "move by 2 % (helical_demo), 5 % (two_stage), 4 % (planetary54); elastic patterns alone by Ωg/ω, 0.4 % on "
-            "fzg_c"
+            "fast bodies that tilt or bend: at speed_max frequencies below 15 kHz move by 2 % (helical_demo), 5 % "
+            "(two_stage), 4 % (planetary54), 0.4 % (fzg_c)"
         ),
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
@@ -332,8 +307,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="p = −µ λ sgn v along the profile, fading below 2 % of the largest sliding speed; sticks at standstill",
         equation="2.8, 3.12 (eqs. 8k to 8n, 17m to 17o)",
         matters=(
-            "forces across the line of action: they jump by 2 µ F at the pitch point; losses; damping of rattle. "
-            "Off unless the stage says `[contact] friction = {…}`"
+            "forces across the line of action (a jump by 2 µ F at the pitch point), losses, damping of rattle. Off "
+            "unless the stage says `[contact] friction = {…}`"
         ),
         off="flanks slide without resistance",
         code="gk_friction.c, gk_glide.c, gk_lubrication.c, gk_flank.c (glide), gk_residual.c (gk_residual_store_along)",
@@ -347,9 +322,8 @@ EFFECTS: tuple[Effect, ...] = (
         "H = 100 µm",
         equation="2.9, 3.13 (eqs. 8q to 8s, 17q to 17s)",
         matters=(
-            "light-load rattle, reversal, engagement: it takes the momentum ∫ c dd of an approach, and flanks that "
-            "bring less do not touch (`gearfmu effects` prints it); nothing where flanks stay closed. Off "
-            "unless the stage says `[contact] film = {…}`"
+            "light-load rattle, reversal, engagement: it takes momentum from an approach; nothing where flanks stay "
+            "closed. Off unless the stage says `[contact] film = {…}`"
         ),
         off="dry flanks meet with the speed they have",
         code="gk_film.c, gk_solve.c (dashpots_and_sums), gk_tangent.c, gk_balance.c",

@@ -80,7 +80,7 @@ def test_a_train(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("planetary54", "--body", "pinion"), 100, "the stage has sun, planet, ring, carrier"),
         (("planetary54", "--body", "sun", "--mounted"), 100, "only the ring of a planetary set has mounts"),
         (("fzg_c", "--mounted"), 100, "goes with --body ring"),
-        (("fzg_c", "--body", "pinion", "--torque", "1 N*m"), 100, "know no torque"),
+        (("fzg_c", "--body", "pinion", "--torque", "1 N*m"), 100, "have no torque"),
         (("fzg_c", "--torque", "0 N*m"), 100, "must not be 0"),
         (("fzg_c", "--torque", "302"), 100, "--torque"),
     ],

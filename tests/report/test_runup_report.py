@@ -53,7 +53,7 @@ def test_orders_that_the_sampling_cannot_tell_are_left_out() -> None:
 
 
 def test_no_orders_of_a_shaft_that_stands_or_turns_round_or_hardly_turns() -> None:
-    with pytest.raises(MetricsError, match="stands or turns round"):
+    with pytest.raises(MetricsError, match="at rest or reverses"):
         order_map(TIME, ANGLE, np.sin(ANGLE), 10.0)
     with pytest.raises(MetricsError, match="needs 4; record a longer run"):
         order_map(TIME, ANGLE, 0.1 * ANGLE, 10.0)

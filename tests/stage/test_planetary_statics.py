@@ -293,4 +293,6 @@ def test_the_verb_writes_a_tidy_table(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_the_verb_refuses_held_bearings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["te", "planetary54", "--torque", "600 N*m", "--rigid-bearings", "--out", str(tmp_path / "te.csv")]
     assert cli.outcome(arguments) != 0
-    assert "shares its load by what its bearings yield" in " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert "load of a planetary set is shared by the compliance of its bearings" in " ".join(
+        capsys.readouterr().err.replace("│", " ").split()
+    )

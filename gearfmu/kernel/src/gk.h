@@ -32,7 +32,7 @@ typedef enum gk_outcome {
     GK_STEP_TOO_LARGE, /* h above the stability limit of this model at this level: see the message for h to use  */
     GK_NO_EQUILIBRIUM, /* the initial static equilibrium was not found                                           */
     GK_DIVERGED,       /* a state not finite or rk45 steps without end, even with the smallest step and em       */
-    GK_PENETRATION,    /* teeth overlap beyond what the model can mean                                           */
+    GK_PENETRATION,    /* tooth penetration exceeds the validity range of the contact model                      */
     GK_ENERGY,         /* the energy balance broke                                                               */
     GK_OUTCOMES
 } gk_outcome;

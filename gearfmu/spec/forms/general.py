@@ -144,11 +144,11 @@ class RotorSpec(Spec):
 
     axis: tuple[Axis, Axis] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
     offset: tuple[Place, Place] = Field(
-        default=(0.0, 0.0), description="deviation of the axis from that place: teeth stand as if there were none"
+        default=(0.0, 0.0), description="deviation of the axis from that place: teeth are placed as if there were none"
     )
     carried_by: Name | None = Field(
         default=None,
-        description="rotor in whose axes this one and its supports stand, a planet carrier's; the ground when absent",
+        description="rotor in whose axes this one and its supports are fixed (planet carrier); the ground when absent",
     )
     stands: bool = Field(default=False, description="it does not turn: supports with torsion hold it")
     bodies: Annotated[dict[Name, Place], Field(min_length=1)] = Field(

@@ -205,7 +205,7 @@ def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float
                 f"{millimetres(rounded_up(least, 3))}",
             )
         elif 2 * width > flank:
-            yield field, width, f"the strip is longer than the flank: {at_most(flank / 2)}"
+            yield field, width, f"the load patch is longer than the flank: {at_most(flank / 2)}"
 
 
 def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque: float) -> float:

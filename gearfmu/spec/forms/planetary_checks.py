@@ -181,7 +181,7 @@ def _ring_strips(spec: PlanetarySpec | RingPair, mesh: RingMesh, half_width: flo
             remedy = f"too narrow for the ring's contact at torque_max: at least {millimetres(rounded_up(least, 3))}"
             yield field, width, remedy
         elif gear is spec.ring and 2 * width > flank:
-            yield field, width, f"the strip is longer than the flank: {at_most(flank / 2)}"
+            yield field, width, f"the load patch is longer than the flank: {at_most(flank / 2)}"
 
 
 def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
@@ -253,7 +253,7 @@ def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
         yield "carrier.bore_diameter", carrier.bore_diameter, f"cuts into the bolts: less than {largest}"
     if g.r_o <= g.a + g.r_bolt:
         least = millimetres(2 * (g.a + g.r_bolt))
-        yield "carrier.outer_diameter", carrier.outer_diameter, f"the bolts stand over the edge: more than {least}"
+        yield "carrier.outer_diameter", carrier.outer_diameter, f"the bolts reach over the edge: more than {least}"
     if 0 < (half := g.a * math.sin(least_apart(g.angles) / 2)) <= g.r_bolt:
         largest = millimetres(2 * half)
         yield "carrier.bolt_diameter", carrier.bolt_diameter, f"neighbouring bolts touch: less than {largest}"

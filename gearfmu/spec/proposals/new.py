@@ -22,7 +22,7 @@ from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import StageSpec, load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
-_DESCRIPTION = "made like {like}; say here in one line what it is"
+_DESCRIPTION = "made like {like}; describe it here in one line"
 _HEAD = """# Gear stage "{name}", {origin}. Lengths, torques … are text with a unit.
 # A line such as "# slices = 5" shows a default.
 # Bodies (<gear>.h5) are made beside this file by `gearfmu reduce` and remade when anything that shapes them changes.

@@ -23,12 +23,10 @@ def _value(default: Any, meaning: str, source: str = ASSUMED) -> Any:
 
 
 class PassengerCar(Spec):
-    """Four-cylinder car with manual gearbox: engine – dual-mass flywheel – clutch – input shaft – gear pair – output
-    shaft – half shafts – wheels – vehicle.
+    """Four-cylinder car with manual gearbox.
 
-    The gear pair is the loaded pair of the engaged gear, pinion on the input shaft. Everything behind the output
-    shaft is lumped and referred to it by the rigid final drive ratio, and turns with the wheel gear. The gearbox's
-    other pairs and its synchronisers are not modelled.
+    The gear pair is that of the engaged gear, pinion on the input shaft. Everything behind the output shaft is referred
+    to it by the rigid final drive ratio, and turns with the wheel gear. Other pairs and synchronisers are not modelled.
     """
 
     chain_in_fmu: Annotated[
@@ -77,10 +75,9 @@ class PassengerCar(Spec):
 
 
 class TestRig(Spec):
-    """A rig: a drive with torque control on the pinion's shaft, a shaft of constant speed on the wheel.
+    """A drive with torque control on the pinion's shaft, a shaft of constant speed on the wheel.
 
-    The drive's controller adds `speed_droop` times the deviation from the nominal speed. It damps the drive against
-    the shafts, so that the mean torque is reached within the settling time.
+    The controller adds `speed_droop` times the deviation from the nominal speed, which damps the drive.
     """
 
     __test__ = False  # not a test class, whatever its name

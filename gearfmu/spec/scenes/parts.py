@@ -63,7 +63,7 @@ class ClutchPart(ClutchSpec):
 
 
 class TorquePart(ShaftLoad):
-    """A torque of the outside on one inertia: the sum of what is given, about +z."""
+    """A torque of the outside on one inertia: the sum of the given laws, about +z."""
 
     on: Name = Field(description="the inertia")
 

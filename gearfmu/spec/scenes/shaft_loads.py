@@ -45,7 +45,7 @@ class SpeedControl(Spec):
 
 
 class ShaftLoad(Spec):
-    """Torque of the outside on one shaft about +z: the sum of what is given."""
+    """Torque of the outside on one shaft about +z: the sum of the given laws."""
 
     constant: Torque | None = Field(default=None, description="the same at all times")
     over_time: Annotated[tuple[tuple[Time, Torque], ...], Field(min_length=1)] | None = Field(

@@ -76,7 +76,7 @@ class DeviationClass(Spec):
     )
     parts: tuple[Part, ...] = Field(
         default=("pitch", "profile", "helix"),
-        description="what is drawn: pitch deviations, profile slopes, helix slopes",
+        description="drawn deviations: pitch, profile slopes, helix slopes",
     )
     per_tooth: Switch = Field(default=True, description="slopes differ from tooth to tooth; false: one for each flank")
 

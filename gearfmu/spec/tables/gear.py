@@ -120,7 +120,7 @@ class BodySpec(Spec):
     """How the gear's body is meshed and reduced; with geometry and material it decides the reduced body."""
 
     strip_half_width: Annotated[float, Quantity("strip_half_width")] = Field(
-        description="half-width, in arc length, of the load strip on the flank; at least 1.5 Hertz half-widths"
+        description="half-width, in arc length, of the load patch on the flank; at least 1.5 Hertz half-widths"
     )
     modes: Annotated[Count, Whole("modes")] = Field(default=400, description="number of elastic modes stored")
     roll_points: Annotated[Count, Whole("roll_points")] = Field(

@@ -39,7 +39,7 @@ class FrictionSpec(Spec):
     """Friction of the flanks along the profile."""
 
     law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
-        default="constant", description="what the coefficient of friction follows"
+        default="constant", description="law of the coefficient of friction"
     )
     coefficient: Annotated[float, Quantity("friction_coefficient")] = Field(
         default=0.05, description="coefficient of friction of law constant"

@@ -53,8 +53,7 @@ NEGLECTED = (
     Neglected(
         "Euler acceleration",
         "Ω̇ ∫ρ φ·(e_z × X) = 0; on the places of carried bodies Ω̇ u/(ω² u) = Ω̇/ω²",
-        "exactly none in a body: its patterns are orthogonal to its rotation, whose inertia forces the inertia relief "
-        "of every static table holds",
+        "none in a body, whose patterns are orthogonal to its rotation",
     ),
 )
 

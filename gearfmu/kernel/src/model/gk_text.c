@@ -22,9 +22,9 @@ const char *gk_status_text(int bit)
         "limit of iterations reached",
         "gamma lowered: forces are damped more",
         "a loaded flank ended although effect.tip_contact is off",
-        "mesh force beyond torque_max, which the model is made for",
-        "speed beyond speed_max, which the model is made for",
-        "the gears started at rest and were torn along in the first step: set speeds before the initialisation ends",
+        "mesh force beyond torque_max, for which the model is made",
+        "speed beyond speed_max, for which the model is made",
+        "gears were accelerated abruptly in the first step: set speeds before the initialisation ends",
     };
     return bit >= 0 && bit < (int)(sizeof text / sizeof *text) ? text[bit] : NULL;
 }
@@ -40,8 +40,8 @@ const char *gk_outcome_text(gk_outcome outcome)
         "communication step refused: not positive, not finite or not at the current time",
         "internal step too large for this model",
         "no static equilibrium found for the start",
-        "diverged: state not finite or rk45 steps without end, even with the smallest step and the fallback scheme",
-        "teeth overlap beyond what the model can mean",
+        "diverged: the state is not finite, or rk45 needs endless steps, even with the fallback scheme",
+        "tooth penetration exceeds the validity range of the contact model",
         "energy balance broken"};
     return (int)outcome >= 0 && outcome < GK_OUTCOMES ? text[outcome] : "unknown outcome";
 }
