@@ -35,7 +35,7 @@ def reduced_carrier(spec: PlanetarySpec, input_hash: str, progress: Progress | N
     if spec.carrier.imported is None:
         need = carrier_need(spec)
         require_memory(need, lower_counts(spec.carrier.mesh, "carrier.mesh"))
-        _tell(progress, f"carrier: frequencies of a finer mesh, {need.text}", 0.0)
+        _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
         facts = _carrier_facts(spec)
         _tell(progress, "carrier: finite elements", 0.3)
         full = carrier_full_order(spec)
