@@ -34,7 +34,7 @@ def reduced_carrier(spec: Form, input_hash: str, progress: Progress | None = Non
     if part.imported is None:
         need = carrier_need(spec)
         require_memory(need, lower_counts(part.mesh, "carrier.mesh"))
-        _tell(progress, f"carrier: frequencies of a finer mesh, {need.text}", 0.0)
+        _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
         facts = _carrier_facts(spec)
         _tell(progress, "carrier: finite elements", 0.3)
         full = carrier_full_order(spec)

@@ -9,17 +9,18 @@ Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; Liu, SIAM Review 34 (
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.blas import dsyrk, dtrsm, strsm
 
 from gearfmu.fem.dissection import nested_dissection
 
 _COLUMNS = 128
+_TRSM = {np.dtype(np.float64): dtrsm, np.dtype(np.float32): strsm}
 _BLOCKED = 12  # mean length of a run from which on blocks are faster than columns
 
 
@@ -43,14 +44,19 @@ class CholeskyFront:
     def forward(self, work: np.ndarray) -> None:
         """L⁻¹ of the own rows of `work` (n, k) in place, and their part taken off the rows below."""
         own = work[self.start : self.stop]
-        own[:] = dtrsm(1.0, self.triangle, own.T, side=1, lower=1, trans_a=1).T
+        own[:] = _TRSM[own.dtype](1.0, self.triangle, own.T, side=1, lower=1, trans_a=1).T
         work[self.below] -= self.rest @ own
 
     def backward(self, work: np.ndarray) -> None:
         """L⁻ᵀ of the own rows, those below being solved for already."""
         own = work[self.start : self.stop]
         own -= self.rest.T @ work[self.below]
-        own[:] = dtrsm(1.0, self.triangle, own.T, side=1, lower=1).T
+        own[:] = _TRSM[own.dtype](1.0, self.triangle, own.T, side=1, lower=1).T
+
+    def kept_as(self, number: np.dtype) -> CholeskyFront:
+        """The same in numbers of another precision."""
+        triangle, rest = (part.astype(number, copy=False) for part in (self.triangle, self.rest))
+        return replace(self, triangle=triangle, rest=rest)
 
 
 class Factor:
@@ -83,14 +89,19 @@ class CondensedFactor:
     """The first n unknowns of a real symmetric matrix (n + b, n + b) factorised and condensed onto the others.
 
     cells, node_of_dof : as of `Factor`, of the first n unknowns. eliminate : how their fronts are eliminated; by
-    Cholesky their block must be positive definite. schur : (b, b) S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination
-    leaves. Raises FactorError.
+    Cholesky their block must be positive definite. number : precision in which the factor is kept and solves.
+    schur : (b, b) S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination leaves. Raises FactorError.
     """
 
     def __init__(
-        self, matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray, eliminate: Eliminate | None = None
+        self,
+        matrix: sp.csr_array,
+        cells: np.ndarray,
+        node_of_dof: np.ndarray,
+        eliminate: Eliminate | None = None,
+        number: type[np.floating] = np.float64,
     ):
-        self._eliminate = eliminate or _eliminate
+        self._eliminate, self._number = eliminate or _eliminate, np.dtype(number)
         self.inner, size = len(node_of_dof), matrix.shape[0]
         groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
@@ -98,7 +109,8 @@ class CondensedFactor:
 
     def _take(self, dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
         if start < self.inner:
-            return self._eliminate(dense, start, stop, below)
+            front, update = self._eliminate(dense, start, stop, below)
+            return front.kept_as(self._number), update
         return np.tril(dense) + np.tril(dense, -1).T, dense
 
     def forward(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -107,9 +119,9 @@ class CondensedFactor:
         if np.iscomplexobj(loads):
             parts = self.forward(np.ascontiguousarray(loads).view(float))
             return parts[0].view(complex), parts[1].view(complex)
-        inner, passed = np.empty(loads.shape), np.empty((len(self.schur), loads.shape[1]))
+        inner, passed = (np.empty((rows, loads.shape[1]), self._number) for rows in (self.inner, len(self.schur)))
         for columns in _blocks(loads.shape[1]):
-            work = np.concatenate([loads[self._order, columns], np.zeros_like(passed[:, columns])])
+            work = np.concatenate([loads[self._order, columns], np.zeros_like(passed[:, columns])], dtype=self._number)
             for front in self._fronts:
                 front.forward(work)
             inner[:, columns], passed[:, columns] = work[: self.inner], work[self.inner :]
@@ -122,7 +134,7 @@ class CondensedFactor:
             return self.backward(*both).view(complex)
         result = np.empty(inner.shape)
         for columns in _blocks(inner.shape[1]):
-            work = np.concatenate([inner[:, columns], border[:, columns]])
+            work = np.concatenate([inner[:, columns], border[:, columns]], dtype=self._number)
             for front in reversed(self._fronts):
                 front.backward(work)
             result[self._order, columns] = work[: self.inner]

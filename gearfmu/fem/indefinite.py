@@ -11,7 +11,7 @@ Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; refinement: Arioli, D
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,12 @@ class _PivotedFront:
         """The own rows, those below being solved for already."""
         own = work[self.start : self.stop]
         own[:] = sl.lu_solve(self.own, own, check_finite=False) - self.influence @ work[self.below]
+
+    def kept_as(self, number: np.dtype) -> _PivotedFront:
+        """The same in numbers of another precision."""
+        factors, pivots = self.own
+        own = factors.astype(number, copy=False), pivots
+        return replace(self, own=own, influence=self.influence.astype(number, copy=False))
 
 
 class SymmetricFactor:

@@ -4,8 +4,9 @@ The unknowns inside part j are those of part 0 turned by 2πj/N. Each part is co
 with others; the condensed matrix of part 0, turned, is that of every part. Borders are small (cuts of a carrier
 between its bolts, the master of its bore), so that their sum S is factorised dense:
     S = A_BB − Σ_j R_j A_BI A_II⁻¹ A_IB R_jᵀ.
-Real, exact for any shift, and the factor takes an N-th of the whole body's memory or less. Source: substructuring with
-repeated parts: Craig & Kurdila, Fundamentals of Structural Dynamics (2006), ch. 17.
+Real, exact for any shift, and the factor takes less than an N-th of the whole body's memory: it is formed in double
+precision and kept in single; solutions are refined with A in double (`refined`: two or three times). Source:
+substructuring with repeated parts: Craig & Kurdila, Fundamentals of Structural Dynamics (2006), ch. 17.
 """
 
 from __future__ import annotations
@@ -68,11 +69,9 @@ class RepeatedFactor:
         inner, border = parts.inner[0], parts.border[0]
         nodes = mesh[1][inner]
         inside = np.where(np.isin(mesh[0], nodes), mesh[0], -1)
-        own = block(np.concatenate([inner, border])).tocoo()
-        coupled = (own.row < len(inner)) | (own.col < len(inner))
-        entries = own.data[coupled], (own.row[coupled], own.col[coupled])
-        alone = sp.csr_array(sp.coo_array(entries, shape=own.shape))
-        self._factor = CondensedFactor(alone, inside[(inside >= 0).any(axis=1)], nodes, eliminate_symmetric)
+        alone = _without_border(block(np.concatenate([inner, border])), len(inner))
+        cells = inside[(inside >= 0).any(axis=1)]
+        self._factor = CondensedFactor(alone, cells, nodes, eliminate_symmetric, np.float32)
         self._shared = np.setdiff1d(np.unique(parts.border), self._held)
         self._place = [self._places(part) for part in range(parts.count)]
         self._small = lu(self._assembled(block(self._shared).toarray()))
@@ -125,3 +124,11 @@ class RepeatedFactor:
         result[self._shared] = shared[:-1]
         for part, inner in enumerate(parts.inner):
             result[inner] = parts.turned(inside[:, part * width : (part + 1) * width].copy(), part)
+
+
+def _without_border(matrix: sp.csr_array, inner: int) -> sp.csr_array:
+    """The matrix without its entries between unknowns from `inner` on."""
+    own = matrix.tocoo()
+    coupled = (own.row < inner) | (own.col < inner)
+    entries = own.data[coupled], (own.row[coupled], own.col[coupled])
+    return sp.csr_array(sp.coo_array(entries, shape=own.shape))

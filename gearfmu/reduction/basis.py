@@ -12,7 +12,7 @@ from gearfmu.reduction.elastic import Elastic
 
 BAND = (50.0, 10e3)
 DEPENDENT = 1e-10  # norm, relative to that before projection, at which a direction counts as known
-_ROOM = 4  # by how much room for vectors grows: what is not written yet takes no memory
+_FIRST, _ROOM = 640, 4  # room for vectors and by how much it grows: what is not written yet takes no memory
 
 
 @dataclass(frozen=True)
@@ -105,5 +105,5 @@ class Growing:
         if self.size <= self._v.shape[1]:
             return
         old = self._v
-        self._v = np.empty((self.space.size, max(self.size, _ROOM * old.shape[1])), order="F")
+        self._v = np.empty((self.space.size, max(self.size, _FIRST, _ROOM * old.shape[1])), order="F")
         self._v[:, : old.shape[1]] = old

@@ -17,6 +17,8 @@ from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_ne
 from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
+_COARSER = 0.75  # … of the mesh from which that one's frequencies are extrapolated where it is large
+_LARGE = 1e9  # bytes
 
 
 def carrier_full_order(spec: Form, scale: float = 1.0) -> FullOrder:
@@ -34,17 +36,34 @@ def carrier_full_order(spec: Form, scale: float = 1.0) -> FullOrder:
 
 
 def carrier_need(spec: Form) -> Need:
-    """Memory that the reduction of a carrier meshed here takes, from its counts: the whole body, or the sector of the
-    finer mesh (`FINER`) by which its error is measured."""
+    """Memory that the reduction of a carrier meshed here takes, from its counts, the mesh beside it by which its error
+    is known among it (`compared_scale`)."""
     carrier = carrier_of(spec)
-    sector = carrier_sector(carrier.geometry, carrier.part.mesh)
-    own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * carrier.part.modes
-    size, finer = own * sector.teeth, round(own * FINER**3)
-    if cyclic_carrier(carrier):
-        both = [parts_need(size, sector.teeth, vectors), modes_need(finer)]
-    else:
-        both = [whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (size, round(size * FINER**3))]
-    return Need(size, max(need.memory for need in both), True)
+    own, bolts = _sector_size(scaled_sector(carrier, 1.0))
+    size, vectors, cyclic = own * bolts, 3 * carrier.part.modes, cyclic_carrier(carrier)
+    need = parts_need(size, bolts, vectors) if cyclic else whole_need(size, vectors, CARRIER_FACTORS)
+    scale = max(1.0, compared_scale(carrier))
+    return Need(size, max(need.memory, _modes_memory(own * scale**3, 1 if cyclic else bolts)), True)
+
+
+def compared_scale(carrier: CarrierMember) -> float:
+    """Factor on all element counts of the mesh that the error of a carrier is known by: finer where that is no large
+    one, else coarser."""
+    own, bolts = _sector_size(scaled_sector(carrier, 1.0))
+    finer = _modes_memory(own * FINER**3, 1 if cyclic_carrier(carrier) else bolts)
+    return FINER if finer < _LARGE else _COARSER
+
+
+def _sector_size(sector: FeMesh) -> tuple[int, int]:
+    """Unknowns of a bolt's sector, and bolts."""
+    return 3 * (len(sector.nodes) - len(sector.cut_plus)), sector.teeth
+
+
+def _modes_memory(sector_size: float, together: int) -> float:
+    """Bytes that the lowest modes take, by one sector or by all that must be taken together."""
+    if together == 1:
+        return modes_need(round(sector_size)).memory
+    return whole_need(round(sector_size * together), 0, 1).memory
 
 
 def cyclic_carrier(carrier: CarrierMember) -> bool:

@@ -137,7 +137,7 @@ def _elimination(nodes: np.ndarray, rigid: Sequence[Coupling]) -> tuple[sp.csr_a
         columns.append(np.broadcast_to(master, fields.shape).ravel())
         values.append(fields.ravel())
     size = len(dofs) + 6 * len(rigid)
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    entries = (np.concatenate(values), tuple(np.concatenate(index).astype(np.int32) for index in (rows, columns)))
     transform = sp.coo_array(entries, shape=(3 * count, size)).tocsr()
     transform.eliminate_zeros()
     node_of_dof = np.concatenate([np.repeat(free, 3), np.repeat(count + np.arange(len(rigid)), 6)])

@@ -14,7 +14,7 @@ _SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector 
 _WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
 _SPACE = 36  # fields of the space of low modes per mode of a family
 CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
-_PART_FACTORS = 3  # of one of its equal parts: K and at the last two points
+_PART_FACTORS = 3  # of one of its equal parts, in single precision: K and at the last two points
 _PART_FACTOR = 48.0  # entries of a carrier's sector per unknown to the power 4/3, and fronts that wait
 MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
 _MEMORY_TABLE = Path("/proc/meminfo")
@@ -81,8 +81,8 @@ def whole_need(unknowns: int, vectors: int, factors: int) -> Need:
 
 def parts_need(unknowns: int, parts: int, vectors: int) -> Need:
     """Need of a body of equal parts (`fem.repeated`), of its `unknowns` in all, and full vectors beside the factors."""
-    numbers = _PART_FACTORS * _PART_FACTOR * (unknowns / parts) ** (4 / 3) + unknowns * vectors
-    return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
+    factors = 4 * _PART_FACTORS * _PART_FACTOR * (unknowns / parts) ** (4 / 3)
+    return Need(unknowns, _BASE + factors + 8 * unknowns * vectors + _SPARSE * unknowns, True)
 
 
 def modes_need(unknowns: int) -> Need:

@@ -122,22 +122,28 @@ class _Moments:
         self.body, self.basis = body, Growing(elastic(body))
         self.points = [Expansion(body, shift) for shift in shifts]
         self.stiffness = np.zeros((0, 0))
+        self.rows = np.zeros((body.rows().shape[0], 0))
 
     def grow(self) -> int:
         """One more power at every point; returns how many vectors came."""
         before = self.basis.size
         for point in self.points:
             point.advance(self.basis)
-        new = self.basis.vectors.T @ (self.body.stiffness @ self.basis.vectors[:, before:])
+            self._project()
+        return self.basis.size - before
+
+    def _project(self) -> None:
+        before = len(self.stiffness)
+        added = self.basis.vectors[:, before:]
+        new = self.basis.vectors.T @ (self.body.stiffness @ added)
         grown = np.empty((self.basis.size,) * 2)
         grown[:before, :before], grown[:, before:], grown[before:, :] = self.stiffness, new, new.T
         self.stiffness = grown
-        return self.basis.size - before
+        self.rows = np.hstack([self.rows, self.body.rows() @ added])
 
     def projection(self) -> Projection:
         """What is there so far, without static residual."""
-        rows = self.body.rows()
-        return Projection("moments", self.stiffness, rows @ self.basis.vectors, np.zeros((rows.shape[0],) * 2))
+        return Projection("moments", self.stiffness, self.rows, np.zeros((len(self.rows),) * 2))
 
 
 def direct(body: FullOrder, frequency: float, damping_ratio: float) -> np.ndarray:

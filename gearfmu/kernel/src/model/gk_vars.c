@@ -170,12 +170,13 @@ static void expand(char *out, size_t size, const gk_model *model, const gk_row *
 {
     if (row->scope == SCOPE_MODE) return name_mode(out, size, model, instance);
     const char *name = instance_name(model, row, instance);
+    const int several = model->engagements > 1;
     size_t n = 0;
     for (const char *c = row->name; *c && n < size; c++)
         n += (size_t)(*c == '%'   ? snprintf(out + n, size - n, "%s", name)
                       : *c == '&' ? snprintf(out + n, size - n, "%s", model->displacement_name[instance])
                       : *c != '@' ? snprintf(out + n, size - n, "%c", *c)
-                                  : snprintf(out + n, size - n, model->engagements > 1 ? "%s." : "", name));
+                                  : snprintf(out + n, size - n, "%s%s", several ? name : "", several ? "." : ""));
 }
 
 /* ---- interface --------------------------------------------------------------------------------------------------- */
