@@ -54,6 +54,18 @@ def simply_supported(shaft, load_at, bending):
     return total
 
 
+def test_sections_are_those_of_textbooks() -> None:
+    """Moments by integration; the shear factor of a full shaft and of a thin tube (Cowper, J. Appl. Mech. 33 (1966)
+    335)."""
+    tube, nu = Section(0.1, 50e-3, 30e-3), 0.3
+    r, dr = np.linspace(15e-3, 25e-3, 2001, retstep=True)
+    middle = 0.5 * (r[1:] + r[:-1])
+    assert tube.area == pytest.approx((2 * math.pi * middle * dr).sum())
+    assert tube.second_moment == pytest.approx((math.pi * middle**3 * dr).sum(), rel=1e-6)
+    assert Section(0.1, 50e-3).shear_factor(nu) == pytest.approx(6 * (1 + nu) / (7 + 6 * nu))
+    assert Section(0.1, 50e-3, 49.999e-3).shear_factor(nu) == pytest.approx(2 * (1 + nu) / (4 + 3 * nu), rel=1e-6)
+
+
 @pytest.mark.parametrize("cut", [5e3, 60e3, 1e9])
 @pytest.mark.parametrize("direction", [0, 1])
 def test_stepped_shaft_bends_as_beam_theory_says(cut, direction):
