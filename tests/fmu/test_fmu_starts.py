@@ -83,7 +83,7 @@ def test_windup_carries_the_torque_from_the_start(pinion: str, wheel: str) -> No
     for name, value in inputs.items():
         kernel.set(name, value)
     kernel.initialize(0.0)
-    force = 200.0 / PairGeometry.of(model.pair).gears[0].r_b
+    force = 200.0 / PairGeometry.of(model.spec).gears[0].r_b
     assert kernel.get("mesh.force") == pytest.approx(force, rel=0.05 if pinion == "spring" else 1e-3)
     assert set(inputs) <= {"pinion.phi", "pinion.w", "pinion.tau", "wheel.phi", "wheel.w", "wheel.tau"}
 

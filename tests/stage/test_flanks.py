@@ -171,7 +171,7 @@ def test_sidebands_of_mesh_orders_are_those_that_the_page_says(spec: StageSpec, 
     lines, nominal = (orders(revolution(model, 16, 32, 302.0)) for model in (eccentric, assemble(spec, bodies)))
     assert max(nominal[15], nominal[17]) < 1e-12 and lines[16] == pytest.approx(nominal[16], rel=0.01)
     page = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
-    said = re.search(r"is ([\d.]+), ([\d.]+) and ([\d.]+) times that product at mesh orders 1, 2 and 3", page)
+    said = re.search(r"are ([\d.]+), ([\d.]+) and ([\d.]+) times that product at mesh orders 1, 2 and 3", page)
     assert said is not None
     for k, number in enumerate(said.groups(), start=1):
         closed = nominal[16 * k] * j1(2 * math.pi * k * e / base_pitch)

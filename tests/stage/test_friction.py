@@ -362,14 +362,14 @@ def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
     def ratio(speed: float = 100.0, **settings: float) -> float:
         return float(simulate(helical, drives[speed], 4e-4, 1e-4, common | settings)["mesh.friction_ratio"][-1])
 
-    pair = PairGeometry.of(helical.pair)
+    pair = PairGeometry.of(helical.spec)
     a, b = pair.gears
     trace = simulate(helical, drives[100.0], 4e-4, 1e-4, {"level": 0.0, "slices": 1.0})
     cosine = math.cos(a.beta_b)
     pitch = [pair.length * gear.r_b / (a.r_b + b.r_b) for gear in (a, b)]
     rho = 1e3 * pitch[0] * pitch[1] / sum(pitch) / cosine
     v_sum = 100.0 * 2 * pitch[0]
-    width = 1e3 * min(gear.face_width for gear in helical.pair.gears)
+    width = 1e3 * min(gear.face_width for gear in helical.spec.gears)
     load = trace["mesh.force"][-1] / width
     expected = 0.048 * (load / (v_sum * rho)) ** 0.2 * 40.0**-0.05 * 0.5**0.25
     assert ratio(friction_law=2.0) == pytest.approx(expected, rel=0.01)
@@ -383,7 +383,7 @@ def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
 # ---- what a stage says -----------------------------------------------------------------------------------------------
 def test_a_stage_file_turns_friction_on(helical: StageModel) -> None:
     own = FrictionSpec(law="iso_tr_14179", viscosity=0.05, roughness=1e-6)
-    stage = helical.pair
+    stage = helical.spec
     stage = stage.model_copy(update={"contact": stage.contact.model_copy(update={"friction": own})})
     kernel = assemble(stage, load_bodies(stage)).kernel()
     names = ("effect.friction", "friction_law", "oil_viscosity", "flank_roughness")
