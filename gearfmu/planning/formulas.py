@@ -101,8 +101,8 @@ def _centrifugal(known: Conditions) -> float:
     stage = known.model.stage
     if not stage.carriers:
         return UNKNOWN
-    places = {gear: math.hypot(*stage.rotors[stage.rotor_of(gear.name)].axis) for gear in stage.gears}
-    planet, distance = max(places.items(), key=lambda item: item[1])
+    places = [(math.hypot(*stage.rotors[stage.rotor_of(gear.name)].axis), gear) for gear in stage.gears]
+    distance, planet = max(places, key=lambda place: place[0])
     radius = 0.25 * planet.teeth * planet.normal_module
     mass = 7800.0 * math.pi * radius**2 * planet.face_width  # of a disc of steel: an order of magnitude
     return mass * distance * known.speed**2 / max(abs(known.force), 1e-9)
