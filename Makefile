@@ -13,6 +13,7 @@ EVIDENCE = $(RUN) benchmarks/evidence.py
 export JOBS
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+unexport PYTHONDONTWRITEBYTECODE  # which makes every command compile all of Python's modules anew, 2 s each
 
 help:
 	@sed -n 's/^## //p' Makefile
