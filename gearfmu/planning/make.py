@@ -217,6 +217,8 @@ class _Made:
             return Line(knob.name, verdict, "policy", knob.kept, formula, alone, saved)
         if lower is None:
             reason = f"the set without it is {chosen.bound:.2g} budgets"
+        elif math.isinf(lower.bound):
+            reason = f"{_step_down(knob, lower.choice)} does not reach the end of the window"
         elif lower.bound > most:
             reason = f"{_step_down(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
         else:
