@@ -33,9 +33,7 @@ from gearfmu.stage.run.trace import write_columns  # noqa: E402
 
 STEP, SETTLE, LOAD, SPEED, FAST = 60e-6, 0.01, 302.0, 2000 * math.pi / 30, 1
 ROWS_STILL = {r"p->roll = corner_roll\(n, p\);": "p->roll = 0.5 * (n->gear->s_form + n->gear->s_tip);"}
-CURVATURE_STILL = {
-    r"gk_law_set\(model, setup, mesh, place->curvature": "gk_law_set(model, setup, mesh, 1.0 / 0.007 + 1.0 / 0.009"
-}
+CURVATURE_STILL = {r"s->curvature\[n\] = point->curvature;": "s->curvature[n] = 1.0 / 0.007 + 1.0 / 0.009;"}
 COLUMNS = (
     "stage",
     "piece",

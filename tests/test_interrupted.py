@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
 import subprocess
@@ -88,8 +89,9 @@ def test_a_full_disk_is_one_line_and_leaves_the_old_file(tmp_path: Path) -> None
     table = tmp_path / "te.csv"
     table.write_text("old\n", encoding="utf-8")
     words = ["te", "fzg_c", "--torque", "100 N*m", "--positions", "40", "--out", "te.csv"]
+    whole = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # a cut-off file of bytecode would stay and be read
     done = subprocess.run(
-        [*GEARFMU, *words], cwd=tmp_path, capture_output=True, text=True, check=False, preexec_fn=_no_room
+        [*GEARFMU, *words], cwd=tmp_path, env=whole, capture_output=True, text=True, check=False, preexec_fn=_no_room
     )
     (told,) = [line for line in done.stderr.splitlines() if line.startswith("gearfmu:")]
     assert done.returncode == 1 and "te.csv: cannot be written, File too large: make room" in told
