@@ -34,6 +34,8 @@ window.gearfmuStage = (stage, array, colour) => {
   gl.useProgram(program);
   const at = name => gl.getUniformLocation(program, name), BASE = gl.getAttribLocation(program, "base"), MOVED = gl.getAttribLocation(program, "moved");
 
+  const APART = 7; /* pixels between lines of the mesh below which they are left out */
+
   function bodyOf(own) {
     const size = own.size, teeth = own.teeth, count = size * teeth, sector = array(own.points), base = new Float32Array(3 * count);
     for (let j = 0; j < teeth; j++) {
@@ -48,11 +50,13 @@ window.gearfmuStage = (stage, array, colour) => {
       faces.push(p[0], p[1], p[2], p[0], p[2], p[3]);
       lines.push(p[0], p[1], p[1], p[2]);
     }
+    const point = p => base.subarray(3 * p, 3 * p + 3), edges = [];
+    for (let k = 0; k < quads.length; k += 2) { const [a, b] = [point(lines[k]), point(lines[k + 1])]; edges.push(Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2])); }
     const buffer = (kind, data, use) => { const b = gl.createBuffer(); gl.bindBuffer(kind, b); gl.bufferData(kind, data, use); return b; };
     gl.bindVertexArray(null);
     return { own, count, moved: new Float32Array(3 * count), bases: buffer(gl.ARRAY_BUFFER, base, gl.STATIC_DRAW), moves: buffer(gl.ARRAY_BUFFER, 12 * count, gl.DYNAMIC_DRAW),
       faces: buffer(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(faces), gl.STATIC_DRAW), lines: buffer(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lines), gl.STATIC_DRAW),
-      nFaces: faces.length, nLines: lines.length, reach: base.reduce((m, v, i) => i % 3 === 0 ? Math.max(m, Math.hypot(v, base[i + 1])) : m, 0) };
+      nFaces: faces.length, nLines: lines.length, edge: edges.sort((a, b) => a - b)[edges.length >> 1], reach: base.reduce((m, v, i) => i % 3 === 0 ? Math.max(m, Math.hypot(v, base[i + 1])) : m, 0) };
   }
   const bodies = stage.bodies.map(bodyOf);
   const xs = bodies.flatMap(b => [...array(b.own.x)].flatMap(x => [x - b.reach, x + b.reach])), ys = bodies.flatMap(b => [...array(b.own.y)].flatMap(y => [y - b.reach, y + b.reach]));
@@ -126,11 +130,11 @@ window.gearfmuStage = (stage, array, colour) => {
       gl.enableVertexAttribArray(MOVED);
       gl.vertexAttribPointer(MOVED, 3, gl.FLOAT, false, 0, 0);
       gl.enable(gl.POLYGON_OFFSET_FILL);
-      gl.polygonOffset(1, 1);
+      gl.polygonOffset(2, 8);
       gl.uniform1f(at("line"), 0);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.faces);
       gl.drawElements(gl.TRIANGLES, body.nFaces, gl.UNSIGNED_INT, 0);
-      if (!body.own.tone && (state.close || bodies.length < 3)) {
+      if (!body.own.tone && body.edge * fit / 2 > APART) {
         gl.uniform1f(at("line"), 1);
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.lines);
         gl.drawElements(gl.LINES, body.nLines, gl.UNSIGNED_INT, 0);
