@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "benchmarks" / "mutants.csv"
 LEAST = 0.95  # share that must be caught
 LONGEST = 900  # s for the tests of one defect
-LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "build", "out", "__pycache__", ".*_cache", ".hypothesis")
+LEFT_OUT = shutil.ignore_patterns("__pycache__", ".*_cache", ".hypothesis", ".git", ".venv")
 BUILD = """
 from gearfmu.kernel.build import HERE, PORTABLE, build_library, host_platform, STEM, SUFFIX
 name = host_platform()
@@ -181,6 +181,12 @@ MUTANTS: tuple[Mutant, ...] = (
 )
 
 
+def _left_out(folder: str, names: list[str]) -> set[str]:
+    """Caches, and of the checkout itself what builds and runs leave there."""
+    made = {"build", "out"} if Path(folder) == ROOT else set()
+    return LEFT_OUT(folder, names) | made & set(names)
+
+
 def place_of(root: Path, mutant: Mutant) -> tuple[Path, str]:
     """File and its text; SystemExit where `old` does not stand there once."""
     for path in sorted((root / "gearfmu").rglob(mutant.file)):
@@ -191,7 +197,7 @@ def place_of(root: Path, mutant: Mutant) -> tuple[Path, str]:
 
 
 def tried(root: Path, mutant: Mutant) -> tuple[str, str]:
-    """ "caught" with the test that failed, "missed", or "broken" where it does not compile."""
+    """ "caught" with the test that failed, "missed", or "broken" where it does not compile or no test runs."""
     path, text = place_of(root, mutant)
     setting = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
     path.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
@@ -212,7 +218,9 @@ def tried(root: Path, mutant: Mutant) -> tuple[str, str]:
         ]
         done = subprocess.run(line, cwd=root, env=setting, capture_output=True, text=True, timeout=LONGEST)
         failed = [text for text in done.stdout.splitlines() if text.startswith(("FAILED", "ERROR"))]
-        return ("caught", failed[0].split(" ")[1]) if done.returncode == 1 and failed else ("missed", "")
+        if done.returncode > 1:
+            return "broken", (done.stdout + done.stderr).strip().splitlines()[-1][:100]
+        return ("caught", failed[0].split(" ")[1]) if failed else ("missed", "")
     except subprocess.TimeoutExpired:
         return "caught", "it never ends"
     finally:
@@ -223,7 +231,7 @@ def worked(jobs: int, mutants: Sequence[Mutant]) -> list[tuple[Mutant, str, str]
     """All mutants, each worker in its own copy of the checkout."""
     folders = [Path(tempfile.mkdtemp(prefix="mutants-")) / "copy" for _ in range(jobs)]
     for folder in folders:
-        shutil.copytree(ROOT, folder, ignore=LEFT_OUT)
+        shutil.copytree(ROOT, folder, ignore=_left_out)
         subprocess.run(
             [sys.executable, "-c", BUILD], cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, check=True
         )
