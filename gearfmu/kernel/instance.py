@@ -38,11 +38,14 @@ class Variable:
 
 @dataclass(frozen=True)
 class TeState:
-    """Quasi-static transmission at one position: te (m) of an engagement; phi (rad): angle of the first port's bore;
-    forces (N) of the engagement's slices, keyed (flank 0 drive 1 coast, tooth number of gear A)."""
+    """Quasi-static transmission at one position: te (m) of an engagement by the bores of the ports; phi (rad): angle of
+    the first port's bore; output_te (m): as the output M.te in motion, by the carrier's own angle, so without the twist
+    between its bolts and its bore; forces (N) of the engagement's slices, keyed (flank 0 drive 1 coast, tooth
+    number of gear A)."""
 
     te: float
     phi: float
+    output_te: float
     forces: dict[tuple[int, int], tuple[float, ...]]
 
 
@@ -221,13 +224,13 @@ class Kernel:
     def transmission(self, phi_out: float, torque: float, mesh: int = 0, keep: bool = False) -> TeState:
         """Quasi-static equilibrium with the second port's bore held at phi_out (rad) and `torque` (N·m) on the first
         port's bore, seen at engagement number `mesh`; after `prepare`."""
-        out = (ctypes.c_double * (2 + PLACES * (2 + SLICES)))()
+        out = (ctypes.c_double * (3 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
         known = (self._model, self._setup, self._work, self._data, phi_out, torque, mesh)
         self._check(self._lib.gk_te(*known, int(keep), out, ctypes.byref(count)))
         width = 2 + int(self.get("slices"))
-        rows = [out[2 + i * width : 2 + (i + 1) * width] for i in range(count.value)]
-        return TeState(out[0], out[1], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
+        rows = [out[3 + i * width : 3 + (i + 1) * width] for i in range(count.value)]
+        return TeState(out[0], out[1], out[2], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
 
     @property
     def ports(self) -> list[str]:

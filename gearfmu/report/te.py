@@ -53,10 +53,12 @@ def write_set_plot(result: Any, path: Path) -> None:
         lower.legend(ncols=6, **LEGEND)
         lower.set_ylabel(f"force over mean, {result.torque[most]:.4g} N·m\nsun —  ring - -")
         lower.set(xlabel="position in mesh periods", xlim=upper.get_xlim())
+        _show_at_least(lower, 0.98, 1.02)
         order = np.argsort(result.torque)
         for gear, line, column in zip(("sun", "ring"), ("o-", "s--"), result.load_factor.T, strict=True):
             factors.plot(result.torque[order], column[order], line, color=MUTED, ms=4, label=gear)
-        factors.set(xlabel="torque in N·m", ylabel="mesh load factor K_γ", ylim=(0.98, None))
+        factors.set(xlabel="torque in N·m", ylabel="mesh load factor K_γ")
+        _show_at_least(factors, 0.98, 1.1)
         factors.legend(ncols=2, **LEGEND)
         _save(figure, path)
 
@@ -128,9 +130,14 @@ def _over_width(axis: Axes, result: Any) -> None:
     for colour, torque, row in _coloured(result, over_width):
         place = (np.arange(row.size) + 0.5) / row.size - 0.5
         axis.plot(place, row, color=colour, marker="o", ms=3, ls="-" if torque else ":")
-    low, high = axis.get_ylim()
     axis.set(xlabel="place over face width, −½ … ½", ylabel="load per width over its mean", xlim=(-0.5, 0.5))
-    axis.set_ylim(min(low, 0.9), max(high, 1.1))
+    _show_at_least(axis, 0.9, 1.1)
+
+
+def _show_at_least(axis: Axes, low: float, high: float) -> None:
+    """Widen the vertical axis, so that rounding noise does not fill it."""
+    lowest, highest = axis.get_ylim()
+    axis.set_ylim(min(low, lowest), max(high, highest))
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -95,8 +95,9 @@ GK_API double gk_time(const gk_data *data);
 
 /* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the
  * second held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues
- * from the last call. out[0] = te (m), out[1] = angle of the first port's bore (rad), then for each of *places tooth
- * pairs {flank 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 2 + 8·12 numbers. */
+ * from the last call. out[0] = te (m) by the bores of the ports, out[1] = angle of the first port's bore (rad),
+ * out[2] = te (m) as the output in motion, by the carrier's own angle; then for each of *places tooth pairs {flank
+ * 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 3 + 8·12 numbers. */
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                         double torque, int engagement, int keep, double *out, int *places);
 

@@ -21,7 +21,7 @@ SIDES = (1, -1)  # of the kernel's flanks 0 (drive) and 1 (coast)
 @dataclass(frozen=True)
 class FlankLoads:
     """position (P,) in pitches by which gear A would have turned on without load,
-    from the angle of gear B · te (P,) m · face_width (m), common · width (S,) m: middles of the
+    from the angle of gear B · te (P,) m, as the output M.te · face_width (m), common · width (S,) m: middles of the
     slices from mid-width · side: +1 drive flanks, −1 coast flanks · roll (K, S) m on gear A and force (K, S) N of every
     loaded tooth pair at every position, K in all · at (K,): number of its position."""
 
@@ -63,7 +63,7 @@ def flank_loads(
     for i, part in enumerate(np.arange(positions) / positions):
         with limit_named(model, torque):
             state = kernel.transmission(-part * place.pitch, torque, place.number, keep=i > 0)
-        te[i] = state.te
+        te[i] = state.output_te
         if stage.rotor_of(engagement.gears[0]) == stage.rotor_of(stage.ports[model.shafts.input].body):
             behind[i] = (state.phi - state.te / gear.r_b) * gear.z / (2 * math.pi) - part
         for (flank, tooth), force in state.forces.items():

@@ -32,10 +32,20 @@ static gk_boundary further(const gk_model *model, int p)
     return held ? (gk_boundary){PORT_SPRING, 0.0, 0.0, model->port[p].k} : (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
 }
 
+/* transmission error of an engagement by the angles of its gears and of the rotor that carries it, m */
+static double te_of(const gk_model *model, const gk_setup *setup, int e, const double *angle, const double *carried)
+{
+    const gk_engagement *mesh = &model->engagement[e];
+    const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];
+    const int f = setup->mesh[e].frame;
+    const double frame = f < 0 ? 0.0 : carried[f];
+    return A->r_b * (angle[A->rotor] - frame) + mesh->kind * B->r_b * (angle[B->rotor] - frame);
+}
+
 /* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
- * other ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first
- * port's bore, then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 +
- * MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
+ * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of
+ * the ports, angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for
+ * every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                  double torque, int e, int keep, double *out, int *places)
 {
@@ -50,13 +60,11 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     angle[model->port[0].rotor] = driven_angle(model, work, 0);
     angle[model->port[1].rotor] = phi_out;
     const gk_engagement *mesh = &model->engagement[e];
-    const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    const int f = setup->mesh[e].frame;
-    const double frame = f < 0 ? 0.0 : angle[f];
-    *out++ = A->r_b * (angle[A->rotor] - frame) + mesh->kind * B->r_b * (angle[B->rotor] - frame);
+    *out++ = te_of(model, setup, e, angle, angle);
     *out++ = angle[model->port[0].rotor];
+    *out++ = te_of(model, setup, e, angle, GK_OF(data, x));
     *places = engaged->places;
     for (int p = 0; p < *places; p++, out += 2 + setup->slices) {
         out[0] = engaged->place[p].key.flank;
