@@ -3,7 +3,8 @@
  * dashpots let move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2
  * have no κ, so μ′ goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and
  * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused.
- * Friction c λ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide. */
+ * Friction c λ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide. Contacts
+ * that stick follow the gaps: C less C_nt C_tt⁻¹ C_tn, and C − K likewise. */
 #include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_tables.h"
@@ -156,6 +157,37 @@ static void add_symmetric(const gk_system *s, const double *Y, const double *sha
         }
 }
 
+/* M (n, n) += sign Yᵀ T⁻¹ Y, Y (contacts, stride): what contacts that stick take from the gaps; L: factor of T, what
+ * they yield along the profile */
+static void add_stuck(const gk_system *s, const double *Y, const double *L, double sign, double *M)
+{
+    double y[MAX_CONTACTS];
+    for (int k = 0; k < s->n; k++) {
+        for (int j = 0; j < s->contacts; j++) y[j] = counts(s, k) ? Y[j * s->stride + k] : 0.0;
+        gk_cholesky_solve(L, y, s->contacts);
+        for (int i = 0; i < s->n; i++)
+            for (int j = 0; j < s->contacts && counts(s, i); j++) M[i * s->n + k] += sign * Y[j * s->stride + i] * y[j];
+    }
+}
+
+/* μ′ where all contacts stick: friction follows the gaps */
+static double mu_stuck(const gk_model *model, gk_work *work, const double *Q, int e)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const gk_system *s = &work->engaged[e].system;
+    gk_glide *glide = work->engaged[e].glide;
+    double *const C = work->engaged[e].system.J, *const K = work->engaged[e].system.L, *T = glide->moves;
+    for (int i = 0; i < s->contacts; i++)
+        for (int j = 0; j < s->contacts; j++)
+            T[i * s->contacts + j] = glide->yields[i * s->stride + j] + (i == j) * gk_friction_local_yield(s, i);
+    if (!gk_cholesky(T, s->contacts)) return INFINITY;
+    gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
+    kappa_part(s, Q, K);
+    add_stuck(s, glide->D, T, -1.0, C);
+    add_stuck(s, glide->D, T, -1.0, K), add_stuck(s, glide->gap_yields, T, 1.0, K);
+    return gk_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+}
+
 /* μ′ of the problem that is formed, Q without the κ part; `sign` of the direction in which gear A turns, 0: no friction
  */
 static double mu_of(const gk_model *model, const gk_setup *setup, gk_work *work, const double *Q, int e, double sign)
@@ -188,7 +220,8 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work,
     gk_glide_rows(setup, work, e);
     memcpy(glide->D, glide->gap_yields, (size_t)(s->contacts * s->stride) * sizeof *glide->D); /* C_nt */
     gk_glide_moves(setup, k, work, e);                                                         /* C_nt − K_nt */
-    return gk_max(mu_of(model, setup, work, Q, e, 1.0), mu_of(model, setup, work, Q, e, -1.0));
+    const double slides = gk_max(mu_of(model, setup, work, Q, e, 1.0), mu_of(model, setup, work, Q, e, -1.0));
+    return gk_max(slides, mu_stuck(model, work, Q, e));
 }
 
 static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,

@@ -70,7 +70,11 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
 }
 
 /* What a contact yields along the profile by itself: as much as its local law does above its upper bound */
-static double local_yield(const gk_system *s, int i) { return s->law[i / 4].slope_high[i % 4] * s->per_width[i]; }
+double gk_friction_local_yield(const gk_system *s, int i)
+{
+    GK_ASSERT(i >= 0 && i < s->contacts);
+    return s->law[i / 4].slope_high[i % 4] * s->per_width[i];
+}
 
 /* energy that friction holds in what is quasi-static, with normal forces `force` + `more` */
 static double held(const gk_glide *glide, const gk_system *s, const double *force, const double *more,
@@ -102,7 +106,7 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     find_coefficients(model, setup, data, k->h, e, engaged);
     gk_glide_moves(setup, k, work, e);
     for (int i = 0; i < s->contacts; i++) {
-        const double yields = local_yield(s, i);
+        const double yields = gk_friction_local_yield(s, i);
         glide->yields[i * s->stride + i] += yields;
         glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
     }

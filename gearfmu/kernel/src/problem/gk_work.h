@@ -254,6 +254,7 @@ GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const
                              const gk_coefficients *k, gk_work *work, int e);
 GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
 GK_HOT double gk_friction_held(const gk_glide *glide, const gk_system *s);
+GK_HOT double gk_friction_local_yield(const gk_system *s, int i);
 GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
 GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);
 /* gk_couple.c */
