@@ -2,35 +2,14 @@
 #ifndef GK_WORK_H
 #define GK_WORK_H
 #include "base/gk_check.h"
+#include "force/gk_flank.h"
+#include "force/gk_place.h"
 #include "problem/gk_system.h"
 #include "setup/gk_spread.h"
 
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
 /* phases of a step, for the profile */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
-typedef struct gk_point { /* of a strip */
-    double gap, gradient[POSE];
-    double slide[POSE];        /* with friction: what gear A slides past B along the profile of A */
-    double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
-    double share;              /* of the strip's length that lies on both flanks */
-} gk_point;
-
-typedef struct gk_place { /* a tooth pair on one flank that may touch, at the predicted poses */
-    gk_key key;
-    double gap;                     /* the smallest of its points' */
-    gk_point point[MAX_SLICES];     /* of every strip; one for all where the model is planar */
-    int tooth[2], number[2], flank; /* tooth of each gear: wrapped to 0 … z−1, and as counted */
-    int candidate[2];               /* its place in the tables of both sides */
-    double action;                  /* angle t of the line of action */
-    int memory;                     /* its entry in the memory of the engagement, −1 if new */
-} gk_place;
-
-static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place *place, int strip)
-{
-    GK_ASSERT(strip >= 0 && strip < setup->strips);
-    return &place->point[setup->spatial ? strip : 0];
-}
-
 /* Displacement of the flank of one tooth along its outward normal, at its points and by width function, and the forces
  * that press on it (gk_nodal.c); what no node has asked for is not known */
 typedef struct gk_field {
@@ -38,13 +17,6 @@ typedef struct gk_field {
     unsigned char known[POINTS];
     gk_real *q, *v, *f; /* lanes: gear group in the frame of the tooth; force on it */
 } gk_field;
-
-/* where a side stands in its table */
-typedef struct gk_position {
-    int node, tooth;   /* node below; reference tooth, wrapped */
-    int64_t reference; /* as counted */
-    double part;       /* 0 … 1 of the way to the next node */
-} gk_position;
 
 typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
@@ -173,11 +145,6 @@ struct gk_work {
     uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
 };
 
-/* gk_flank.c */
-GK_HOT void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
-GK_HOT void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
-GK_HOT int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
-                         double search_distance, gk_position position[2], gk_place *place);
 /* gk_nodal.c */
 GK_HOT void gk_nodal_leave(gk_system *s);
 GK_HOT void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,

@@ -24,6 +24,7 @@
 #define GK_WIDE
 #include "force/gk_law.c"
 #include "setup/gk_flow.c"
+#include "force/gk_section.c"
 #include "force/gk_flank.c"
 #include "force/gk_rows.c"
 #include "setup/gk_block.c"
