@@ -106,7 +106,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="where body resonances lie in the band, or mesh harmonics reach the tooth modes (40–60 kHz on fzg_c)",
         off="level `rigid`: bodies follow their loads statically",
         code=(
-            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
+            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_advance.c (predict_gear, "
             "correct_damped)"
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
@@ -204,7 +204,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="3.9",
         matters="bearing forces and the mesh mode: more than half of the static compliance of fzg_c",
         off="bores held on their axes; bearing forces are reactions",
-        code="gk_setup.c (fill_base), gk_step.c (damp_supports)",
+        code="gk_setup.c (fill_base), gk_advance.c (damp_supports)",
         kept="without it bearing forces are reactions, another output",
     ),
     _switched(

@@ -9,6 +9,7 @@
  * 2nd order while contacts keep their status; stable while ¼h²ω² + hχ < 1 with all contacts closed (eq. 16a): ω² of the
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
 #include "base/gk_dense.h"
+#include "integrate/gk_energy.h"
 #include "integrate/gk_integrate.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
@@ -127,7 +128,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
         const gk_real *a = gk_modal_seen(setup, data, g) + 2 * n;
         for (int i = 0; i < n; i++) sum += (double)a[i] * a[i];
     }
-    return gk_step_energy(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
+    return gk_energy_invariant(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
 }
 
 /* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the

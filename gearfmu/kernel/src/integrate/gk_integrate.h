@@ -7,8 +7,6 @@
 
 /* gk_step.c */
 GK_HOT gk_step_function gk_step_once;
-GK_HOT double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
-                             const gk_coefficients *k);
 /* gk_frame.c */
 GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
 GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);

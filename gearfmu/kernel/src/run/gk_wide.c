@@ -48,6 +48,8 @@
 #include "force/gk_nodal.c"
 #include "problem/gk_engage.c"
 #include "integrate/gk_frame.c"
+#include "integrate/gk_advance.c"
+#include "integrate/gk_energy.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
