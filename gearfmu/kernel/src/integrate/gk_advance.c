@@ -3,6 +3,7 @@
  * both, half a step each, what turns speeds or damps supports (Strang). */
 #include "integrate/gk_advance.h"
 #include "integrate/gk_integrate.h"
+#include "problem/gk_exchange.h"
 
 /* where arrays are whole halves (gk_real) or quads (double): the compiler need not prove that they do not overlap */
 #define HALVES(array) ((gk_half *)(array))
@@ -230,7 +231,7 @@ void gk_advance_correct(const gk_model *model, const gk_setup *setup, gk_work *w
         for (int i = 0; linear && i < s->stride; i++) s->last[i] += s->end[i];
         if (GK_ON(setup, friction)) work->engaged[e].glide->taken = gk_friction_settle(work->engaged[e].glide, s);
     }
-    gk_rows_scatter(model, setup, work, gk_step_z, force_with_dampers);
+    gk_exchange_scatter(model, setup, work, gk_step_z, force_with_dampers);
     for (int g = 0; g < model->gears; g++) {
         const int n = GK_LANES(setup, g), e = engagement_of(model, g);
         gk_real *q = gk_modal_of(setup, data, g);

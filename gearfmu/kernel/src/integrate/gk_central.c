@@ -11,6 +11,7 @@
 #include "base/gk_dense.h"
 #include "integrate/gk_energy.h"
 #include "integrate/gk_integrate.h"
+#include "problem/gk_exchange.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
 static const double FIRST = 1e-6; /* s: where the search for the limit begins */
@@ -237,7 +238,7 @@ static quotient round_of_power(const gk_model *model, const gk_setup *setup, gk_
     memset(work->outer_speed, 0, sizeof work->outer_speed);
     for (int e = 0; e < model->engagements; e++) press(model, setup, work, e, h, &of);
     for (int e = 0; e < model->engagements; e++) spin_round(setup, work, e, &of);
-    gk_rows_scatter(model, setup, work, gk_step_force, gk_step_z);
+    gk_exchange_scatter(model, setup, work, gk_step_force, gk_step_z);
     ground_round(model, setup, work, h, &of);
     for (int g = 0; g < model->gears; g++) gear_round(setup, work, g, h, &of);
     const double scale = of.size > 0.0 ? 1.0 / sqrt(of.size) : 0.0;

@@ -3,6 +3,7 @@
  * engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W. */
 #include "integrate/gk_equilibrium.h"
 #include "integrate/gk_motions.h"
+#include "problem/gk_exchange.h"
 
 /* Lists the unknowns. Soft modes are those of a gear with several engagements through which these feel each other:
  * softer, with the gear's own mass, than a few per cent of a contact. */
@@ -49,7 +50,7 @@ void gk_equilibrium_forces(gk_equilibrium *r)
     }
     for (int d = 0; d < spins; d++)
         if (!gk_equilibrium_moves(r, d)) r->force[d] = 0.0;
-    gk_rows_scatter(r->model, &r->setup, r->work, gk_step_force, gk_step_force);
+    gk_exchange_scatter(r->model, &r->setup, r->work, gk_step_force, gk_step_force);
     gk_frame_load(r->model, &r->setup, r->data, r->work->ground_force);
     for (int i = 0; i < base->n; i++)
         r->force[spins + i] = r->work->ground_force[i] - base->omega2[i] * r->work->rest_ground[i];
@@ -72,6 +73,7 @@ static double *soft_row(const gk_equilibrium *r, int w, int row)
 static void find_soft_rows(gk_equilibrium *r, int e)
 {
     const gk_system *s = &r->work->engaged[e].system;
+    const gk_rows rows = gk_rows_of_gaps(&r->setup, r->work, e);
     for (int w = 0; w < 2; w++) {
         const int g = r->setup.mesh[e].side[w].gear, n = r->setup.modal[g].n;
         for (int row = 0; row < s->contacts && r->soft[g]; row++) {
@@ -79,7 +81,7 @@ static void find_soft_rows(gk_equilibrium *r, int e)
             gk_real *out = r->work->trial[g];
             memset(out, 0, 2 * (size_t)n * sizeof *out);
             unit[row] = 1.0;
-            gk_rows_push_modes(&r->setup, r->work, e, w, unit, unit, out, out + n);
+            gk_exchange_push_modes(&rows, w, unit, unit, out, out + n);
             for (int i = 0; i < r->soft[g]; i++) soft_row(r, w, row)[i] = (double)out[r->lane[g][i]];
         }
     }

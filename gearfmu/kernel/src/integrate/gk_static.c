@@ -7,6 +7,8 @@
 #include "integrate/gk_integrate.h"
 #include "integrate/gk_equilibrium.h"
 #include "integrate/gk_motions.h"
+#include "problem/gk_exchange.h"
+#include "problem/gk_rows.h"
 
 static const double MOBILITY = 1e-11; /* s²: divided by the inertia of a spin, rad/(N m): what a spin yields within an
                                          engagement's problem, so that no row of it is without compliance */
@@ -216,7 +218,7 @@ static void spread(gk_equilibrium *r)
     const int n = setup->base.n;
     double *x = gk_ground_of(data);
     data->state_h = data->state_gamma = 0.0;
-    gk_rows_scatter(r->model, setup, work, gk_step_force, gk_step_force);
+    gk_exchange_scatter(r->model, setup, work, gk_step_force, gk_step_force);
     memcpy(x + 2 * n, work->ground_force, (size_t)n * sizeof *x);
     gk_frame_load(r->model, setup, data, work->ground_force);
     for (int i = 0; i < n; i++) {
