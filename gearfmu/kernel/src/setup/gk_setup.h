@@ -9,8 +9,6 @@
 #include "setup/gk_grid.h"
 #include "setup/gk_spread.h"
 
-#define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
-
 enum {
     NODES = 88,          /* of a side's table in one pitch */
     CACHE = 4,           /* coefficient sets kept */
