@@ -1,6 +1,6 @@
-/* Displacement of the flank of one tooth for nodal contact: read at a few points along the flank, by width function, where
- * a node first asks for it; places between are interpolated. Loads are gathered at the same points and press on the
- * oscillators once a tooth, however many nodes it has. */
+/* Displacement of the flank of one tooth for nodal contact: read at a few points along the flank, by width function,
+ * where a node first asks for it; places between are interpolated. Loads are gathered at the same points and press on
+ * the oscillators once a tooth, however many nodes it has. */
 #include "force/gk_field.h"
 #include "force/gk_turn.h"
 

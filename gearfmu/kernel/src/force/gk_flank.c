@@ -1,6 +1,6 @@
-/* Which teeth may touch: pairs whose gap (gk_section.c) is below a search distance, on the drive and the coast flank, and
- * their entries in the tables of both sides. In space every strip has its own section. A tooth with an index deviation ε
- * is the same tooth at β + ε (docs/theory.md, eq. 4a). */
+/* Which teeth may touch: pairs whose gap (gk_section.c) is below a search distance, on the drive and the coast flank,
+ * and their entries in the tables of both sides. In space every strip has its own section. A tooth with an index
+ * deviation ε is the same tooth at β + ε (docs/theory.md, eq. 4a). */
 #include "force/gk_flank.h"
 #include "force/gk_section.h"
 

@@ -1,5 +1,5 @@
-/* A gear group in the frame of a tooth (docs/theory.md, eq. 3): rows are those of the reference tooth 0, so that the state
- * is turned to a tooth before it is read, and forces are turned back. */
+/* A gear group in the frame of a tooth (docs/theory.md, eq. 3): rows are those of the reference tooth 0, so that the
+ * state is turned to a tooth before it is read, and forces are turned back. */
 #include "force/gk_turn.h"
 
 /* a gear group's state in the frame of a tooth: what tooth 0 of a state turned back would have */

@@ -1,6 +1,6 @@
-/* Motion in a step (docs/theory.md, 3.1): every oscillator of the gear groups and of the ground group and every spin, as
- * if alone and in closed form. Predicted with the forces of the last step, corrected with those that were found. Around
- * both, half a step each, what turns speeds or damps supports (Strang). */
+/* Motion in a step (docs/theory.md, 3.1): every oscillator of the gear groups and of the ground group and every spin,
+ * as if alone and in closed form. Predicted with the forces of the last step, corrected with those that were found.
+ * Around both, half a step each, what turns speeds or damps supports (Strang). */
 #include "integrate/gk_advance.h"
 #include "integrate/gk_integrate.h"
 #include "problem/gk_exchange.h"

@@ -1,6 +1,6 @@
-/* Energy of a stage (docs/theory.md, eq. 11), and the accounts of a step: what ports brought in, what dampers, clutches,
- * friction and films took. Another h, γ or setup has another energy for the same motion: the baseline takes the
- * difference, which is no error of the step. */
+/* Energy of a stage (docs/theory.md, eq. 11), and the accounts of a step: what ports brought in, what dampers,
+ * clutches, friction and films took. Another h, γ or setup has another energy for the same motion: the baseline takes
+ * the difference, which is no error of the step. */
 #include "integrate/gk_energy.h"
 
 static const double ENERGY_SMALL = 1e-300;

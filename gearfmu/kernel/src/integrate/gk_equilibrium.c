@@ -1,6 +1,6 @@
 /* What statics solve for (docs/theory.md, 4): spins, dynamic oscillators of the ground group, soft modes of gears with
- * several engagements. The forces that are left on them, and the tangent of these over the active rows W of the island's
- * engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W. */
+ * several engagements. The forces that are left on them, and the tangent of these over the active rows W of the
+ * island's engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W. */
 #include "integrate/gk_equilibrium.h"
 #include "integrate/gk_motions.h"
 #include "problem/gk_exchange.h"

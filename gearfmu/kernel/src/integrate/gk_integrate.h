@@ -39,8 +39,8 @@ double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data 
 void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE]);
-/* gk_static.c. BARE: the boundary acts on the bores, without the ports' chains. KEEP: the search starts from the present
- * angles instead of from the unloaded mesh. */
+/* gk_static.c. BARE: the boundary acts on the bores, without the ports' chains. KEEP: the search starts from the
+ * present angles instead of from the unloaded mesh. */
 enum { STATIC_BARE = 1, STATIC_KEEP = 2 };
 typedef struct gk_boundary {
     gk_port_kind kind;

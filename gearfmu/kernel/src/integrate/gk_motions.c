@@ -1,6 +1,6 @@
-/* Motions of a stage at rest: how its spins turn together without deformation (gk_kinematics.c). Ports decide where some
- * of them begin; others nothing holds: their net torque is taken as that of a uniform acceleration, and they stay where
- * they are. */
+/* Motions of a stage at rest: how its spins turn together without deformation (gk_kinematics.c). Ports decide where
+ * some of them begin; others nothing holds: their net torque is taken as that of a uniform acceleration, and they stay
+ * where they are. */
 #include "integrate/gk_motions.h"
 
 static const double FLOATS = 1e-11; /* s²: what a motion that must not be moved yields in the tangent */

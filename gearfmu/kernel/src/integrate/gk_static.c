@@ -1,7 +1,7 @@
 /* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): the potential energy of a stage at
- * rest is least. At given outer unknowns (gk_equilibrium.c) each engagement has its contact problem, everything else being
- * compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces that are left, with the tangents of the
- * engagements. Motions that nothing holds stay where they are (gk_motions.c). Islands come to rest one after the
+ * rest is least. At given outer unknowns (gk_equilibrium.c) each engagement has its contact problem, everything else
+ * being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces that are left, with the tangents of
+ * the engagements. Motions that nothing holds stay where they are (gk_motions.c). Islands come to rest one after the
  * other: they know nothing of each other. */
 #include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"

@@ -1,5 +1,5 @@
-/* What the rows of an engagement read of the oscillators, and what their forces do to them: modes of the gear groups, the
- * ground group, bores. Rows of the gaps and rows of the sliding of contacts go the same way (gk_rows). Whatever is
+/* What the rows of an engagement read of the oscillators, and what their forces do to them: modes of the gear groups,
+ * the ground group, bores. Rows of the gaps and rows of the sliding of contacts go the same way (gk_rows). Whatever is
  * pushed is read by the same numbers, else energy leaks. Forces come in pairs x, y: two sums in one pass. */
 #include "problem/gk_exchange.h"
 #include "force/gk_turn.h"

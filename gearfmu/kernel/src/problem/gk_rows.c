@@ -1,7 +1,7 @@
 /* Rows of an engagement on the oscillators, from the tables of both sides. A contact's row on a gear group is the
- * interpolated row of its candidate, for the reference tooth 0 (gk_turn.c). On the ground group a row is minus the outward
- * displacement of both gears plus the gap's gradient times their rigid motion; it is kept over the oscillators that the
- * two gears read, those of gear A first. Rows of the sliding, with friction, are made likewise. */
+ * interpolated row of its candidate, for the reference tooth 0 (gk_turn.c). On the ground group a row is minus the
+ * outward displacement of both gears plus the gap's gradient times their rigid motion; it is kept over the oscillators
+ * that the two gears read, those of gear A first. Rows of the sliding, with friction, are made likewise. */
 #include "problem/gk_rows.h"
 
 /* rigid motion of both gears of an engagement by displacements (or speeds) of the ground group */

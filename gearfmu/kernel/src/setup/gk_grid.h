@@ -1,4 +1,5 @@
-/* Places on even grids along the flanks of a gear (gk_grid.c), and what nodal contact needs there (docs/theory.md, 2.7). */
+/* Places on even grids along the flanks of a gear (gk_grid.c), and what nodal contact needs there (docs/theory.md,
+ * 2.7). */
 #ifndef GK_GRID_H
 #define GK_GRID_H
 #include "base/gk_lanes.h"
