@@ -22,7 +22,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.tables import ROLLS, blend, resampling
 
-POINTS = 20  # of a flank in the kernel (gk_nodal.h)
+POINTS = 20  # of a flank in the kernel (gk_grid.h)
 BANDS = (0, 20e3, 60e3, 120e3, 180e3, 300e3)  # Hz
 
 

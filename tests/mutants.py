@@ -58,7 +58,7 @@ MUTANTS: tuple[Mutant, ...] = (
         ("(0.5 * secant - 0.125 * law->a) + law->phi_log", "(0.5 * secant - 0.125 * law->a)"),
     ),
     *of(
-        "gk_flank.c",
+        "gk_section.c",
         "kernel/test_contact.py stage/test_internal_pair.py stage/test_physics.py",
         ("l.cosine = (dx * R + sg * dy * l.L) / a2;", "l.cosine = (dx * R - sg * dy * l.L) / a2;"),
         ("const double radial = -sg * R / (a2 * l.L);", "const double radial = sg * R / (a2 * l.L);"),

@@ -106,7 +106,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="where body resonances lie in the band, or mesh harmonics reach the tooth modes (40–60 kHz on fzg_c)",
         off="level `rigid`: bodies follow their loads statically",
         code=(
-            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
+            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_advance.c (predict_gear, "
             "correct_damped)"
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
@@ -182,7 +182,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="2.2 (eq. 5)",
         matters="wherever the stage has it: it is as large as the transmission error",
         off="unmodified involutes",
-        code="gk_flank.c (relief)",
+        code="gk_section.c (relief)",
         kept="it is the shape of the teeth",
     ),
     _switched(
@@ -195,7 +195,7 @@ EFFECTS: tuple[Effect, ...] = (
             "flanks end at their tip roll. Exact while no loaded pair gets there (fzg_c_relief: up to about 100 N·m); "
             "else energy is lost and status bit 16 is set"
         ),
-        code="gk_flank.c (corner_contact)",
+        code="gk_section.c (corner_contact)",
     ),
     _switched(
         "bearings",
@@ -204,7 +204,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="3.9",
         matters="bearing forces and the mesh mode: more than half of the static compliance of fzg_c",
         off="bores held on their axes; bearing forces are reactions",
-        code="gk_setup.c (fill_base), gk_step.c (damp_supports)",
+        code="gk_setup.c (fill_base), gk_advance.c (damp_supports)",
         kept="without it bearing forces are reactions, another output",
     ),
     _switched(
@@ -248,7 +248,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="2.2 (eqs. 5a to 5f)",
         matters="corrected or measured flanks: micrometres are as large as the transmission error",
         off="involutes with parabolic tip relief; leads too are left out",
-        code="gk_deviation.c (gk_deviation_at), gk_flank.c (depth_of), gk_strips.c (fill_deviations)",
+        code="gk_deviation.c (gk_deviation_at), gk_section.c (depth_of), gk_strips.c (fill_deviations)",
         test="tests/stage/test_flanks.py::test_unloaded_te_is_the_gap_of_the_modified_profile",
         of_data=True,
     ),

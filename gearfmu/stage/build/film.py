@@ -6,10 +6,11 @@ from __future__ import annotations
 import math
 
 from gearfmu.errors import ModelError
+from gearfmu.ranges import kernel_number
 from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.spec.forms.shapes import face_width, mesh_shape
 
-REACH = 100e-6  # m: of the kernel, GK_FILM_REACH
+REACH = kernel_number("FILM_REACH")  # m: flanks further apart know no film
 NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
 
 

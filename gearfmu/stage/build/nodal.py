@@ -9,12 +9,13 @@ import numpy as np
 
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
+from gearfmu.ranges import kernel_limits
 from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.spec.forms.shapes import face_width, mesh_shape, toothed
 
 SHARE_OF_A = {"both": 0.5, "a": 1.0, "b": 0.0}
-MOST = 513  # nodes that the kernel takes along or across
-STIFFEST = 1e22  # N/m³ that it takes
+MOST = int(kernel_limits()["NODES"][1])  # nodes that the kernel takes along or across
+STIFFEST = kernel_limits()["PENALTY"][1]  # N/m³ that it takes
 
 
 def nodal_sections(stage: Stage) -> dict[str, Any]:

@@ -9,7 +9,9 @@
  * 2nd order while contacts keep their status; stable while ¼h²ω² + hχ < 1 with all contacts closed (eq. 16a): ω² of the
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
 #include "base/gk_dense.h"
+#include "integrate/gk_energy.h"
 #include "integrate/gk_integrate.h"
+#include "problem/gk_exchange.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
 static const double FIRST = 1e-6; /* s: where the search for the limit begins */
@@ -127,7 +129,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
         const gk_real *a = gk_modal_seen(setup, data, g) + 2 * n;
         for (int i = 0; i < n; i++) sum += (double)a[i] * a[i];
     }
-    return gk_step_energy(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
+    return gk_energy_invariant(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
 }
 
 /* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the
@@ -236,7 +238,7 @@ static quotient round_of_power(const gk_model *model, const gk_setup *setup, gk_
     memset(work->outer_speed, 0, sizeof work->outer_speed);
     for (int e = 0; e < model->engagements; e++) press(model, setup, work, e, h, &of);
     for (int e = 0; e < model->engagements; e++) spin_round(setup, work, e, &of);
-    gk_rows_scatter(model, setup, work, gk_step_force, gk_step_z);
+    gk_exchange_scatter(model, setup, work, gk_step_force, gk_step_z);
     ground_round(model, setup, work, h, &of);
     for (int g = 0; g < model->gears; g++) gear_round(setup, work, g, h, &of);
     const double scale = of.size > 0.0 ? 1.0 / sqrt(of.size) : 0.0;

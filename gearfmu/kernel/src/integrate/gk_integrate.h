@@ -7,8 +7,6 @@
 
 /* gk_step.c */
 GK_HOT gk_step_function gk_step_once;
-GK_HOT double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
-                             const gk_coefficients *k);
 /* gk_frame.c */
 GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
 GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
@@ -41,11 +39,13 @@ double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data 
 void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE]);
-/* gk_static.c */
+/* gk_static.c. BARE: the boundary acts on the bores, without the ports' chains. KEEP: the search starts from the
+ * present angles instead of from the unloaded mesh. */
+enum { STATIC_BARE = 1, STATIC_KEEP = 2 };
 typedef struct gk_boundary {
     gk_port_kind kind;
     double torque, phi, k;
 } gk_boundary;
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
-                           const gk_boundary *b, int bare, int keep);
+                           const gk_boundary *boundary, int how);
 #endif

@@ -3,6 +3,8 @@
  * solved in every evaluation: g + C λ + δ(λ) = 0. Local error per step ~h⁵; step limited by stability at the highest
  * mode. */
 #include "integrate/gk_integrate.h"
+#include "problem/gk_nodal.h"
+#include "problem/gk_exchange.h"
 
 static const double RELATIVE = 1e-6, SMALLEST = 1e-12, POSITION = 1e-10, SPEED = 1e-6;
 enum { STAGES = 7, TRIALS = 20000 };
@@ -137,7 +139,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work
         if (!engage(model, setup, work, data, e)) return 0;
     solve_contacts(model, setup, work, speed);
     spin_rates(model, setup, work, i);
-    gk_rows_scatter(model, setup, work, gk_step_z, gk_step_z);
+    gk_exchange_scatter(model, setup, work, gk_step_z, gk_step_z);
     if (setup->nodal) gk_nodal_press(model, setup, work, data, speed, work->stage_spin[i] + MAX_SPINS);
     ground_rates(model, setup, work, i);
     for (int g = 0; g < model->gears; g++) {

@@ -20,7 +20,7 @@ gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, 
     GK_ASSERT(torque && phi);
     gk_boundary b[MAX_PORTS];
     for (int p = 0; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, torque[p], 0.0, 0.0};
-    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, 0);
+    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, STATIC_BARE);
     for (int p = 0; p < model->ports && outcome == GK_OK; p++) phi[p] = driven_angle(model, work, p);
     return outcome;
 }
@@ -54,7 +54,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     double angle[MAX_ROTORS];
     if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
     for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
-    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
+    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, keep ? STATIC_BARE | STATIC_KEEP : STATIC_BARE);
     if (outcome) return outcome;
     for (int r = 0; r < model->rotors; r++) angle[r] = GK_OF(data, x)[r];
     angle[model->port[0].rotor] = driven_angle(model, work, 0);

@@ -61,6 +61,7 @@
 #define GK_HIGH_ROUGHNESS 1e-5
 #define GK_LOW_FILM_ROUGHNESS 1e-8 /* m */
 #define GK_HIGH_FILM_ROUGHNESS 1e-5
+#define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
 
 /* ports and what happens to them */
 #define GK_LOW_PORT_STIFFNESS 1e-6 /* N·m/rad */

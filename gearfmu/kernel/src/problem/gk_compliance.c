@@ -3,6 +3,7 @@
  * are symmetric and filled by block rows of quads: row i of a contact has columns up to the end of its block, that
  * of a joint up to itself; at the end the rest is mirrored. */
 #include "problem/gk_work.h"
+#include "problem/gk_rows.h"
 
 static const double SHARE = 0.95, SHARE_OF_BOTH_FLANKS = 0.75;
 

@@ -3,6 +3,7 @@
  * through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that
  * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_shared.h"
+#include "problem/gk_exchange.h"
 
 enum { SWEEPS = 40, SETTLED = 20 }; /* from then on dashpots stand: they may go on limiting each other in turns */
 #ifdef GK_DOUBLE_MODES
@@ -71,9 +72,12 @@ static void give_ground(const gk_setup *setup, gk_work *work, const gk_coefficie
     gk_engaged *engaged = &work->engaged[e];
     gk_quad moved[(MAX_GROUND + 4 * MAX_ROTORS) / 4], yielded[(MAX_GROUND + 4 * MAX_ROTORS) / 4];
     gk_clear((double *)moved, mesh->local / 4), gk_clear((double *)yielded, mesh->local / 4);
-    gk_rows_push_local(mesh, engaged, f->step, f->once, (double *)moved, (double *)yielded);
-    if (GK_ON(setup, friction))
-        gk_rows_push_local_along(mesh, engaged, f->step_along, f->once_along, (double *)moved, (double *)yielded);
+    const gk_rows gaps = gk_rows_of_gaps(setup, work, e);
+    gk_exchange_push_local(&gaps, f->step, f->once, (double *)moved, (double *)yielded);
+    if (GK_ON(setup, friction)) {
+        const gk_rows sliding = gk_rows_of_sliding(setup, work, e);
+        gk_exchange_push_local(&sliding, f->step_along, f->once_along, (double *)moved, (double *)yielded);
+    }
     for (int w = 0, at = 0; w < 2; w++) {
         const gk_span part = mesh->part[w];
         const gk_quad *mobility = (const gk_quad *)(k->ground.mobility + part.from);
@@ -94,15 +98,16 @@ static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficien
     gk_real *given = work->engaged[e].given_modes[w], *yielded = work->scaled;
     memset(given, 0, (size_t)n * sizeof *given);
     memset(yielded, 0, (size_t)n * sizeof *yielded);
-    gk_rows_push_modes(setup, work, e, w, f->step, f->once, given, yielded);
-    gk_rows_push_modes_along(setup, work, e, w, f->step_along, f->once_along, given, yielded);
+    const gk_rows gaps = gk_rows_of_gaps(setup, work, e), sliding = gk_rows_of_sliding(setup, work, e);
+    gk_exchange_push_modes(&gaps, w, f->step, f->once, given, yielded);
+    gk_exchange_push_modes(&sliding, w, f->step_along, f->once_along, given, yielded);
     for (int i = 0; i < n; i++) given[i] = k->flow[g].mobility[i] * given[i] - k->flow[g].kappa[i] * yielded[i];
 }
 
 static void give_bores(const gk_setup *setup, gk_work *work, int e, const double *once)
 {
     gk_bores bores = {{0}, {0}}, *given = &work->engaged[e].given_bores;
-    gk_rows_push_bores(setup, &work->engaged[e], e, once, &bores);
+    gk_exchange_push_bores(setup, &work->engaged[e], once, &bores);
     exchange(work->sum_bores.moment, given->moment, bores.moment, MAX_PORTS);
     exchange(work->sum_bores.turned, given->turned, bores.turned, MAX_PORTS);
 }
@@ -162,11 +167,11 @@ static void others_ground(const gk_coupled *c, int e, double *others)
     }
 }
 
-static void take_ground(const gk_coupled *c, int e, double *read)
+static void take_ground(const gk_coupled *c, const gk_rows *rows, double *read)
 {
     double others[MAX_GROUND + 4 * MAX_ROTORS];
-    others_ground(c, e, others);
-    gk_rows_read_local(&c->setup->mesh[e], &c->work->engaged[e], others, read);
+    others_ground(c, rows->engaged->index, others);
+    gk_exchange_read_local(rows, others, read);
 }
 
 static void take_bores(const gk_coupled *c, int e, double *read)
@@ -177,13 +182,14 @@ static void take_bores(const gk_coupled *c, int e, double *read)
         others.moment[p] = sum->moment[p] - own->moment[p];
         others.turned[p] = sum->turned[p] - own->turned[p];
     }
-    gk_rows_read_bores(c->setup, &c->work->engaged[e], e, &others, read);
+    gk_exchange_read_bores(c->setup, &c->work->engaged[e], &others, read);
 }
 
-/* by the modes of a gear that other engagements read too: gaps, or sliding */
-static void take_modes(const gk_coupled *c, int e, int which, int along, double *read)
+/* by the modes of a gear that other engagements read too */
+static void take_modes(const gk_coupled *c, const gk_rows *rows, int which, double *read)
 {
     gk_work *work = c->work;
+    const int e = rows->engaged->index;
     const int g = c->setup->mesh[e].side[which].gear, n = c->setup->modal[g].n;
     gk_real *sum = work->scaled;
     memset(sum, 0, (size_t)n * sizeof *sum);
@@ -192,21 +198,19 @@ static void take_modes(const gk_coupled *c, int e, int which, int along, double 
             const gk_real *given = work->engaged[other].given_modes[w];
             for (int i = 0; i < n && c->setup->mesh[other].side[w].gear == g; i++) sum[i] += given[i];
         }
-    if (along)
-        gk_rows_read_modes_along(c->setup, work, e, which, sum, read);
-    else
-        gk_rows_read_modes(c->setup, work, e, which, sum, read);
+    gk_exchange_read_modes(rows, which, sum, read);
 }
 
 /* what the others do to the rows of an engagement; at_once: their forces in the step are 0 */
 static void take(const gk_coupled *c, int e, int at_once, double *read)
 {
-    take_ground(c, e, read);
+    const gk_rows gaps = gk_rows_of_gaps(c->setup, c->work, e);
+    take_ground(c, &gaps, read);
     take_spins(c, e, read);
     take_bores(c, e, read);
     gk_shared_read(c->work, e, at_once, read);
     for (int w = 0; w < 2 && GK_ON(c->setup, friction); w++)
-        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, 0, read);
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, &gaps, w, read);
 }
 
 /* what the others do to the sliding of its contacts */
@@ -215,16 +219,15 @@ static void take_along(const gk_coupled *c, int e, double *read)
     gk_work *work = c->work;
     const gk_mesh *mesh = &c->setup->mesh[e];
     const gk_engaged *engaged = &work->engaged[e];
-    double others[MAX_GROUND + 4 * MAX_ROTORS];
-    others_ground(c, e, others);
-    gk_rows_read_local_along(mesh, engaged, others, read);
+    const gk_rows sliding = gk_rows_of_sliding(c->setup, work, e);
+    take_ground(c, &sliding, read);
     for (int l = 0; l < mesh->spins; l++) {
         const double moved = work->sum_spin[0][mesh->spin[l]] - engaged->given_spin[0][l];
         const double yielded = work->sum_spin[1][mesh->spin[l]] - engaged->given_spin[1][l];
         gk_axpy(moved - yielded, engaged->glide->rigid[l], read, 0, engaged->system.stride / 4);
     }
     for (int w = 0; w < 2; w++)
-        if (c->setup->engagements_of[mesh->side[w].gear] > 1) take_modes(c, e, w, 1, read);
+        if (c->setup->engagements_of[mesh->side[w].gear] > 1) take_modes(c, &sliding, w, read);
 }
 
 /* takes all that the others do; returns how much that has changed, against the largest gap and deflection */

@@ -5,6 +5,7 @@
  * the start, gaps are linear in the coordinates. Then rows and C′ are constant, the mesh does no work of its own, and
  * the scheme's invariant (docs/theory.md, eq. 11) must hold exactly. */
 #include "problem/gk_engage.h"
+#include "problem/gk_rows.h"
 
 static const double PAYABLE = 1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot
                                        repay waits */

@@ -3,6 +3,8 @@
  * all tooth pairs, then the live joints of its ports (springs, shafts, clutches). Contact forces press inward, rows
  * measure outward: a contact row is −(flank row). */
 #include "problem/gk_work.h"
+#include "problem/gk_exchange.h"
+#include "problem/gk_rows.h"
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work,
@@ -99,7 +101,8 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     for (int d = 0; d < mesh->spins; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
-    gk_rows_read(setup, work, e, work->y, work->ground_y, s->g);
+    const gk_rows rows = gk_rows_of_gaps(setup, work, e);
+    gk_exchange_read(&rows, work->y, work->ground_y, s->g);
     gk_rows_without_rigid(model, setup, engaged, e, work->ground_y, s->g);
     for (int p = 0, i = 0; p < engaged->places; p++)
         for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
@@ -124,7 +127,8 @@ void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *c
     GK_ASSERT(modal_speed && speed && rate);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &work->engaged[e].system;
-    gk_rows_read(setup, work, e, modal_speed, ground_speed, rate);
+    const gk_rows rows = gk_rows_of_gaps(setup, work, e);
+    gk_exchange_read(&rows, modal_speed, ground_speed, rate);
     for (int i = 0; i < s->n; i++) {
         for (int d = 0; d < mesh->spins; d++) rate[i] += s->rigid[d][i] * speed[mesh->spin[d]];
         if (s->kind[i] == ROW_SPRING && s->joint_of[i] == JOINT_PORT) rate[i] -= work->outer_speed[s->port_of[i]];

@@ -1,6 +1,8 @@
 /* What friction does: friction of every contact to all gaps and to the sliding of all contacts, in the step (D of the
  * rows along the profile) and at once (C − K), from tables, modes, ground group and spins (docs/theory.md, 3.12). */
 #include "problem/gk_work.h"
+#include "problem/gk_exchange.h"
+#include "problem/gk_rows.h"
 
 /* adds what is not dynamic, from the tables of a side, linear between nodes */
 static void slide_residual(const gk_engaged *engaged, const gk_side *side, gk_glide *glide)
@@ -123,14 +125,15 @@ void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, 
     const double *x = gk_ground_seen(data);
     const int contacts = work->engaged[e].system.contacts;
     for (int i = 0; i < setup->base.n; i++) work->ground_reading[i] = work->ground_q[i] - x[i];
-    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_reading, glide->free);
-    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_start, glide->begin);
+    const gk_rows rows = gk_rows_of_sliding(setup, work, e);
+    gk_exchange_read_ground(&rows, work->ground_reading, glide->free);
+    gk_exchange_read_ground(&rows, work->ground_start, glide->begin);
     for (int w = 0; w < 2; w++) {
         const int g = mesh->side[w].gear, n = GK_LANES(setup, g);
         const gk_real *q = gk_modal_seen(setup, data, g);
         for (int k = 0; k < n; k++) work->reading[g][k] = work->qp[g][k] - q[k];
-        gk_rows_read_modes_along(setup, work, e, w, work->reading[g], glide->free);
-        gk_rows_read_modes_along(setup, work, e, w, q + n, glide->begin);
+        gk_exchange_read_modes(&rows, w, work->reading[g], glide->free);
+        gk_exchange_read_modes(&rows, w, q + n, glide->begin);
     }
     for (int l = 0; l < mesh->spins; l++) {
         const double turned = work->spin[mesh->spin[l]] - GK_OF(data, x)[mesh->spin[l]];

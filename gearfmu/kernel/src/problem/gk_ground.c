@@ -1,6 +1,7 @@
 /* What the ground group and the spins do to the rows of an engagement within the step: D and −K, from the rows, or
  * motion by motion of both gears from the tables of the step. */
 #include "problem/gk_work.h"
+#include "problem/gk_rows.h"
 
 /* D += W mobility Wᵀ, A −= W κ Wᵀ over the dynamic ground oscillators, from the rows: for a step that has no table */
 static void add_ground(const gk_setup *setup, gk_work *work, int e, const gk_coefficients *k)

@@ -4,6 +4,8 @@
 #include "problem/gk_linearise.h"
 #include "problem/gk_engage.h"
 #include "problem/gk_shared.h"
+#include "problem/gk_exchange.h"
+#include "problem/gk_rows.h"
 
 static const double DAMPER_AT_UNIT_STEP = 0.5; /* c over 2c/h, h = 1 */
 
@@ -131,7 +133,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
     int of = -1;
     unit[rows[r].row] = 1.0;
     gk_bores bores = {{0}, {0}};
-    gk_rows_push_bores(setup, &work->engaged[rows[r].engagement], rows[r].engagement, unit, &bores);
+    gk_exchange_push_bores(setup, &work->engaged[rows[r].engagement], unit, &bores);
     push_far(model, work, rows[r].engagement, unit);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
@@ -139,7 +141,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
         if (!same && e != of) {
             memset(read, 0, sizeof read);
             of = e;
-            gk_rows_read_bores(setup, &work->engaged[e], e, &bores, read);
+            gk_exchange_read_bores(setup, &work->engaged[e], &bores, read);
             gk_shared_read(work, e, 1, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
@@ -156,7 +158,7 @@ static void fill_row(const gk_model *model, const gk_setup *setup, gk_work *work
     gk_system *s = &work->engaged[row.engagement].system;
     int at[MAX_SPINS], n = number_spins(model, setup, at);
     s->force[row.row] = 1.0;
-    gk_rows_scatter(model, setup, work, gk_step_force, gk_step_force);
+    gk_exchange_scatter(model, setup, work, gk_step_force, gk_step_force);
     s->force[row.row] = 0.0;
     place_ground(setup, work->ground_force, n, n + oscillators(model, setup), W);
     for (int l = 0; l < mesh->spins; l++) W[at[mesh->spin[l]]] += s->rigid[l][row.row];

@@ -2,6 +2,7 @@
  * through far teeth, as blocks of contacts × contacts that are formed once a step. Engagements then exchange some
  * hundred products a round instead of gathering and scattering over oscillators. */
 #include "problem/gk_shared.h"
+#include "force/gk_turn.h"
 
 /* Rows of the contacts on the modes of a gear in axes of the gear, so that rows of several engagements meet */
 static void turn_rows(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which)
@@ -10,7 +11,7 @@ static void turn_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
     const int g = setup->mesh[e].side[which].gear, z = model->gear[g].z, n = setup->modal[g].n;
     const int back = (z - engaged->position[which].tooth) % z;
     for (int i = 0; i < engaged->system.contacts * n; i += n)
-        gk_rows_turn_back(&setup->modal[g], back, engaged->basis[which] + i, engaged->turned[which] + i);
+        gk_turn_back(&setup->modal[g], back, engaged->basis[which] + i, engaged->turned[which] + i);
 }
 
 /* R mobility Rᵀ and −R κ Rᵀ over the modes of the gear */

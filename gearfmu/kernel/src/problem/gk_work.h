@@ -2,50 +2,15 @@
 #ifndef GK_WORK_H
 #define GK_WORK_H
 #include "base/gk_check.h"
+#include "force/gk_field.h"
+#include "force/gk_flank.h"
+#include "force/gk_place.h"
 #include "problem/gk_system.h"
 #include "setup/gk_spread.h"
 
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
 /* phases of a step, for the profile */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
-typedef struct gk_point { /* of a strip */
-    double gap, gradient[POSE];
-    double slide[POSE];        /* with friction: what gear A slides past B along the profile of A */
-    double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
-    double share;              /* of the strip's length that lies on both flanks */
-} gk_point;
-
-typedef struct gk_place { /* a tooth pair on one flank that may touch, at the predicted poses */
-    gk_key key;
-    double gap;                     /* the smallest of its points' */
-    gk_point point[MAX_SLICES];     /* of every strip; one for all where the model is planar */
-    int tooth[2], number[2], flank; /* tooth of each gear: wrapped to 0 … z−1, and as counted */
-    int candidate[2];               /* its place in the tables of both sides */
-    double action;                  /* angle t of the line of action */
-    int memory;                     /* its entry in the memory of the engagement, −1 if new */
-} gk_place;
-
-static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place *place, int strip)
-{
-    GK_ASSERT(strip >= 0 && strip < setup->strips);
-    return &place->point[setup->spatial ? strip : 0];
-}
-
-/* Displacement of the flank of one tooth along its outward normal, at its points and by width function, and the forces
- * that press on it (gk_nodal.c); what no node has asked for is not known */
-typedef struct gk_field {
-    double at[POINTS * MAX_FUNCTIONS], rate[POINTS * MAX_FUNCTIONS], load[POINTS * MAX_FUNCTIONS];
-    unsigned char known[POINTS];
-    gk_real *q, *v, *f; /* lanes: gear group in the frame of the tooth; force on it */
-} gk_field;
-
-/* where a side stands in its table */
-typedef struct gk_position {
-    int node, tooth;   /* node below; reference tooth, wrapped */
-    int64_t reference; /* as counted */
-    double part;       /* 0 … 1 of the way to the next node */
-} gk_position;
-
 typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
     double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
@@ -173,15 +138,6 @@ struct gk_work {
     uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
 };
 
-/* gk_flank.c */
-GK_HOT void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
-GK_HOT void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
-GK_HOT int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
-                         double search_distance, gk_position position[2], gk_place *place);
-/* gk_nodal.c */
-GK_HOT void gk_nodal_leave(gk_system *s);
-GK_HOT void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                           const gk_real *const speed[], double spin_rate[]);
 /* gk_layout.c */
 void gk_layout_plan(const gk_model *model, gk_setup *setup);
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
@@ -198,47 +154,6 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
                          double *sum);
 /* gk_moves.c */
 GK_HOT gk_moves_function gk_side_step;
-/* gk_rows.c */
-GK_HOT void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
-GK_HOT void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
-GK_HOT void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
-                         double *pose);
-GK_HOT void gk_rows_form(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
-                         double *read);
-GK_HOT void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                                  const double *ground, double *read);
-GK_HOT void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
-                               gk_real *out_x, gk_real *out_y);
-GK_HOT void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
-GK_HOT void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work,
-                            const double *(*x)(const gk_system *), const double *(*y)(const gk_system *));
-/* does a joint pull at the bore of its port's rotor? */
-static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int i)
-{
-    GK_ASSERT(i >= s->contacts && i < s->n);
-    GK_ASSERT(s->port_of[i] >= 0 && s->port_of[i] < MAX_PORTS);
-    return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
-}
-GK_HOT void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
-GK_HOT void gk_rows_push_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
-                               double *out_x, double *out_y);
-GK_HOT void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
-GK_HOT void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores,
-                               double *read);
-/* the same of the sliding of the contacts and of forces along the profile */
-GK_HOT void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
-                                      double *read);
-GK_HOT void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
-GK_HOT void gk_rows_push_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
-                                     double *out_x, double *out_y);
-GK_HOT void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x,
-                                     const double *y, gk_real *out_x, gk_real *out_y);
-GK_HOT void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y,
-                                     double *read);
 /* gk_far.c */
 GK_HOT void gk_far_form(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);

@@ -3,6 +3,7 @@
  * diameter 0 and 1 are those of the ground oscillators, turned into the gear's axes; modes of the gear group are its
  * own. What is not dynamic follows the forces at once, −N λ/ω². Left out: the residual beyond all stored modes. */
 #include "run/gk_run.h"
+#include "problem/gk_rows.h"
 
 /* forces on the strips of a tooth of one gear of an engagement: contacts press, so outward they pull */
 static double strip_load(const gk_setup *setup, const gk_engaged *engaged, int p, int which, gk_strip_load *load)

@@ -81,7 +81,7 @@ static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *w
         b[p].phi = port->kind == PORT_SPRING ? GK_OF(data, input)[p].phi : 0.0;
         b[p].k = port->k;
     }
-    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 0, 0);
+    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 0);
     if (outcome == GK_OK) gk_rk45_angles(model, work, data);
     return outcome;
 }

@@ -1,4 +1,5 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
+#include "integrate/gk_energy.h"
 #include "run/gk_run.h"
 
 static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
@@ -173,11 +174,11 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
     if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
         data->energy.quasi_static = stored(model, work);
         v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
-                                                   : gk_step_energy(model, setup, data, &work->explicit_rows);
+                                                   : gk_energy_invariant(model, setup, data, &work->explicit_rows);
         return gk_finite(v[V_ENERGY]);
     }
-    const double energy = gk_step_energy(model, setup, data,
-                                         gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
+    const double energy = gk_energy_invariant(model, setup, data,
+                                              gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
     if (first) data->energy.baseline = energy - data->energy.work + data->energy.dissipated;
     v[V_ENERGY] = energy;
     v[V_RESIDUAL] = energy - data->energy.baseline - data->energy.work + data->energy.dissipated;

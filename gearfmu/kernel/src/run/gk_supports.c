@@ -1,6 +1,7 @@
 /* Forces on the supports: by what the ground oscillators move them, and what contacts, joints and turning axes put on
  * them directly. */
 #include "run/gk_run.h"
+#include "problem/gk_rows.h"
 
 /* what moves the springs of the supports, and what their dashpots see, of the dynamic oscillators */
 void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed)

@@ -4,6 +4,7 @@
 #include "base/gk_check.h"
 #include "base/gk_lanes.h"
 #include "problem/gk_work.h"
+#include "setup/gk_grid.h"
 #include "setup/gk_spread.h"
 
 typedef struct gk_spot { /* a candidate's strip at a node */

@@ -6,10 +6,8 @@
 #include "base/gk_math.h"
 #include "model/gk_data.h"
 #include "model/gk_effects.h"
-#include "setup/gk_nodal.h"
+#include "setup/gk_grid.h"
 #include "setup/gk_spread.h"
-
-#define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
 
 enum {
     NODES = 88,          /* of a side's table in one pitch */

@@ -1,4 +1,5 @@
-/* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/compact.py).
+/* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/build/
+ * compact.py).
  * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large.
  * Rows are kept in the setup, compliances only while the sides of their gear are filled. */
 #include "setup/gk_grounded.h"

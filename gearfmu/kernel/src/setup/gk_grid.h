@@ -1,6 +1,7 @@
-/* What nodal contact needs of the flanks (docs/theory.md, 2.7), and places on even grids along them. */
-#ifndef GK_NODAL_H
-#define GK_NODAL_H
+/* Places on even grids along the flanks of a gear (gk_grid.c), and what nodal contact needs there (docs/theory.md,
+ * 2.7). */
+#ifndef GK_GRID_H
+#define GK_GRID_H
 #include "base/gk_lanes.h"
 #include "model/gk_model.h"
 

@@ -5,22 +5,21 @@
  *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8h)
  * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
  *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8i)
- * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a
- * few points along its flank, by width function. Interpolation gives those of all its nodes from there, and forces are
- * gathered there before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are
- * looked for from the line of contact outwards until they are open. */
-#include "problem/gk_work.h"
+ * gradients being exact, slopes of relief and of e_o along the flank included. Elastic displacements are read, and
+ * forces gathered, at a few points of a tooth's flank (gk_field.c). Nodes are looked for from the line of contact
+ * outwards until they are open. */
+#include "problem/gk_nodal.h"
+#include "problem/gk_rows.h"
 
 static const double NODE_NEAR = 5e-6; /* m: gap up to which the next node outwards is looked at too */
 
 typedef struct tooth_in_hand { /* one tooth of a place */
     const gk_gear *gear;
     gk_field *field;
-    int g, which, index;      /* index: wrapped number of the tooth */
+    int index;                /* wrapped number of the tooth */
     double hollow, tan_helix; /* hollow: −1 for a ring */
     double base, toward;      /* base angle at mid-width; direction t of the line of action seen from its axis */
     double along[2];          /* cos and sin of that direction */
-    double cosine, sine;      /* of the angle of the tooth */
 } tooth_in_hand;
 
 typedef struct nodal_pair { /* a place in hand */
@@ -29,7 +28,6 @@ typedef struct nodal_pair { /* a place in hand */
     const gk_engagement *e;
     const gk_mesh *mesh;
     const gk_place *place;
-    const double *ground;           /* displacements of the ground group, then speeds */
     const double *pose;             /* where it is taken */
     double stand[POSE], turn[POSE]; /* where toothings stand that do not run true (gk_deviation.c) */
     double moved[POSE];             /* from there on, gaps are linear: roll_motion off */
@@ -51,109 +49,6 @@ typedef struct nodal_layer { /* nodes of tooth `own` across the width that share
 typedef struct node_foot { /* of a node on the other flank, without elastic displacement */
     double gap, gradient[POSE], roll, roll_gradient[POSE];
 } node_foot;
-
-/* ---- displacement of a tooth ------------------------------------------------------------------------------------- */
-static void begin_tooth(const nodal_pair *p, const gk_work *work, const gk_real *const speed[], tooth_in_hand *t)
-{
-    const gk_modal *m = &p->setup->modal[t->g];
-    memset(t->field->known, 0, sizeof t->field->known);
-    if (!GK_LANES(p->setup, t->g)) return;
-    gk_rows_turn_back(m, t->index, work->y[t->g], t->field->q);
-    gk_rows_turn_back(m, t->index, speed[t->g], t->field->v);
-}
-
-static size_t cell_of(const nodal_pair *p, int part, int cell)
-{
-    return (size_t)((2 * part + p->flank) * POINTS * p->model->functions + cell);
-}
-
-static const gk_real *modal_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
-{
-    return p->setup->point_rows[t->g].modes + cell_of(p, 0, cell) * (size_t)p->setup->modal[t->g].n;
-}
-
-typedef struct ground_parts { /* rows c0, c_c, c_s of a cell and their factors at the angle of the tooth (eq. 2c) */
-    const gk_four *c0, *cc, *cs;
-    double cosine, sine;
-} ground_parts;
-
-static ground_parts ground_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
-{
-    const gk_real *rows = p->setup->point_rows[t->g].ground;
-    const size_t width = (size_t)p->setup->base.width[t->g];
-    return (ground_parts){(const gk_four *)(rows + cell_of(p, 0, cell) * width),
-                          (const gk_four *)(rows + cell_of(p, 1, cell) * width),
-                          (const gk_four *)(rows + cell_of(p, 2, cell) * width), t->cosine, t->sine};
-}
-
-#define GROUND_QUAD(row, q)                                                                                            \
-    (GK_WIDENED((row)->c0[q]) + (row)->cosine * GK_WIDENED((row)->cc[q]) + (row)->sine * GK_WIDENED((row)->cs[q]))
-
-/* adds the sums of a row with two vectors */
-static void read_ground_row(const ground_parts *row, const double *x, const double *y, int quads, double sum[2])
-{
-    gk_quad a = {0}, b = {0};
-    for (int q = 0; q < quads; q++) {
-        const gk_quad r = GROUND_QUAD(row, q);
-        a += r * ((const gk_quad *)x)[q], b += r * ((const gk_quad *)y)[q];
-    }
-    sum[0] += (a[0] + a[2]) + (a[1] + a[3]), sum[1] += (b[0] + b[2]) + (b[1] + b[3]);
-}
-
-/* displacement and its rate at a point, by width function */
-static void read_point(const nodal_pair *p, const tooth_in_hand *t, int point)
-{
-    gk_field *f = t->field;
-    const gk_base *base = &p->setup->base;
-    const int A = p->model->functions, n = GK_LANES(p->setup, t->g), quads = base->width[t->g] / 4;
-    const double *x = p->ground + base->from[t->g], *v = x + base->n;
-    for (int cell = point * A; cell < (point + 1) * A; cell++) {
-        double sum[2] = {0.0, 0.0};
-        if (n) sum[0] = gk_dot(modal_row(p, t, cell), f->q, n), sum[1] = gk_dot(modal_row(p, t, cell), f->v, n);
-        const ground_parts ground = ground_row(p, t, cell);
-        read_ground_row(&ground, x, v, quads, sum);
-        f->at[cell] = sum[0], f->rate[cell] = sum[1], f->load[cell] = 0.0;
-    }
-    f->known[point] = 1;
-}
-
-static void know(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *at)
-{
-    for (int i = 0; i < 4; i++)
-        if (!t->field->known[at->index + i]) read_point(p, t, at->index + i);
-}
-
-static void press_modes(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
-{
-    const int n = GK_LANES(p->setup, t->g), A = p->model->functions;
-    const gk_field *field = t->field;
-    gk_half *f = (gk_half *)field->f;
-    memset(field->f, 0, (size_t)n * sizeof *field->f);
-    for (int cell = 0; cell < POINTS * A && n; cell++) {
-        if (!field->known[cell / A] || field->load[cell] == 0.0) continue;
-        const gk_half *row = (const gk_half *)modal_row(p, t, cell);
-        const gk_real load = (gk_real)field->load[cell];
-        for (int k = 0; k < 2 * n / LANES; k++) f[k] -= load * row[k];
-    }
-    const gk_real *turned[2] = {field->f, work->zero};
-    gk_real *sum[2] = {work->force[t->g], work->next[t->g]};
-    if (n) gk_rows_turn_forth(&p->setup->modal[t->g], t->index, turned, sum);
-}
-
-/* what presses on a tooth presses on the oscillators: inward, against the rows */
-static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
-{
-    const int A = p->model->functions, quads = p->setup->base.width[t->g] / 4;
-    const gk_field *f = t->field;
-    gk_quad *force = (gk_quad *)(work->ground_force + p->setup->base.from[t->g]);
-    press_modes(p, work, t);
-    for (int cell = 0; cell < POINTS * A; cell++) {
-        if (!f->known[cell / A] || f->load[cell] == 0.0) continue;
-        const ground_parts row = ground_row(p, t, cell);
-        const double load = f->load[cell];
-        for (int q = 0; q < quads; q++) force[q] -= load * GROUND_QUAD(&row, q);
-    }
-}
 
 /* ---- gap of a node ----------------------------------------------------------------------------------------------- */
 /* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as
@@ -248,25 +143,6 @@ static int foot_at(const nodal_pair *p, const nodal_layer *layer, int along, nod
 }
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
-typedef struct flank_reading { /* of a tooth at one length of roll, by width function */
-    double at[MAX_FUNCTIONS], slope[MAX_FUNCTIONS], rate[MAX_FUNCTIONS];
-} flank_reading;
-
-static flank_reading reading_at(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *grid)
-{
-    const int A = p->model->functions;
-    flank_reading r = {{0}, {0}, {0}};
-    know(p, t, grid);
-    for (int i = 0; i < 4; i++)
-        for (int a = 0; a < A; a++) {
-            const int cell = (grid->index + i) * A + a;
-            r.at[a] += grid->weight[i] * t->field->at[cell];
-            r.slope[a] += grid->slope[i] * t->field->at[cell];
-            r.rate[a] += grid->weight[i] * t->field->rate[cell];
-        }
-    return r;
-}
-
 static double by_functions(const double *functions, const double *values, int n)
 {
     double sum = 0.0;
@@ -279,13 +155,6 @@ static double by_pose(const double gradient[POSE], const double moved[POSE])
     double sum = 0.0;
     for (int d = 0; d < POSE; d++) sum += gradient[d] * moved[d];
     return sum;
-}
-
-static void gather_load(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *grid, const double *load)
-{
-    const int A = p->model->functions;
-    for (int i = 0; i < 4; i++)
-        for (int a = 0; a < A; a++) t->field->load[(grid->index + i) * A + a] += grid->weight[i] * load[a];
 }
 
 /* (8i) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles
@@ -309,7 +178,7 @@ static double press_row(nodal_pair *p, const nodal_layer *layer, int along)
     if (!foot_at(p, layer, along, &foot)) return INFINITY;
     foot.gap += by_pose(foot.gradient, p->moved);
     const gk_grid at = gk_grid_points(o->gear, foot.roll);
-    const flank_reading here = reading_at(p, c, &nodes->grid[along]), there = reading_at(p, o, &at);
+    const gk_reading here = gk_field_read(c->field, &nodes->grid[along]), there = gk_field_read(o->field, &at);
     const double stiffness = p->mesh->penalty[own] * nodes->length[along] / p->mesh->cosine;
     for (int j = layer->first; j < layer->last; j++) {
         const double *of_own = nodes->functions[own] + j * A, *of_other = nodes->functions[other] + j * A;
@@ -326,8 +195,8 @@ static double press_row(nodal_pair *p, const nodal_layer *layer, int along)
     }
     if (sum == 0.0) return smallest;
     for (int d = 0; d < POSE; d++) p->push[d] += sum * foot.gradient[d] - slide * foot.roll_gradient[d];
-    gather_load(p, c, &nodes->grid[along], own_load);
-    gather_load(p, o, &at, other_load);
+    gk_field_load(c->field, &nodes->grid[along], own_load);
+    gk_field_load(o->field, &at, other_load);
     return smallest;
 }
 
@@ -374,7 +243,8 @@ static void take_tooth(nodal_pair *p, gk_work *work, int which)
     tooth_in_hand *t = &p->tooth[which];
     const gk_place *place = p->place;
     const int internal = p->e->kind == MESH_INTERNAL;
-    t->g = p->e->gear[which], t->which = which, t->gear = &p->model->gear[t->g], t->field = &work->field[which];
+    const int g = p->e->gear[which];
+    t->gear = &p->model->gear[g], t->field = &work->field[which];
     t->index = place->tooth[which];
     t->hollow = internal && which ? -1.0 : 1.0;
     t->tan_helix = p->mesh->helix[which];
@@ -384,7 +254,10 @@ static void take_tooth(nodal_pair *p, gk_work *work, int which)
     gk_sincos(t->toward, &t->along[1], &t->along[0]);
     t->base = angle + p->sg * t->gear->psi_b;
     if (t->gear->index) t->base += t->gear->index[p->flank * t->gear->z + t->index];
-    gk_sincos(angle, &t->sine, &t->cosine);
+    gk_field *f = t->field;
+    f->setup = p->setup, f->functions = p->model->functions, f->ground = work->ground_trial;
+    f->gear = g, f->flank = p->flank, f->tooth = t->index;
+    gk_sincos(angle, &f->sine, &f->cosine);
 }
 
 /* forces on the poses of an engagement to spins and ground oscillators */
@@ -426,30 +299,38 @@ static void take_runout(nodal_pair *p)
     p->pose = p->stand;
 }
 
-static void press_engagement(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e,
-                             const gk_real *const speed[], double *spin_rate)
+static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, const gk_real *const speed[],
+                             double *spin_rate)
 {
+    const gk_model *model = p->model;
+    const gk_setup *setup = p->setup;
+    const int e = p->mesh->index;
     gk_engaged *engaged = &work->engaged[e];
     const int frozen = !GK_ON(setup, roll_motion);
-    nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
-    p.ground = work->ground_trial;
-    p.pose = frozen ? GK_OF(data, meshing)[e].frozen : engaged->pose;
-    for (int d = 0; d < POSE && frozen; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
-    gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);
-    take_runout(&p);
+    p->pose = frozen ? GK_OF(data, meshing)[e].frozen : engaged->pose;
+    for (int d = 0; d < POSE && frozen; d++)
+        p->moved[d] = p->e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p->pose[d];
+    gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p->rate);
+    take_runout(p);
     for (int c = 0; c < 2; c++)
-        p.apart[c] = p.e->position[1][c] + p.pose[XB + c] - (p.e->position[0][c] + p.pose[XA + c]);
+        p->apart[c] = p->e->position[1][c] + p->pose[XB + c] - (p->e->position[0][c] + p->pose[XA + c]);
     for (int i = 0; i < engaged->places; i++) {
-        p.place = &engaged->place[i];
-        p.flank = p.place->flank, p.sg = p.flank ? -1.0 : 1.0, p.energy = 0.0;
-        memset(p.strip, 0, sizeof p.strip);
-        memset(p.push, 0, sizeof p.push);
-        for (int w = 0; w < 2; w++) take_tooth(&p, work, w), begin_tooth(&p, work, speed, &p.tooth[w]);
-        for (int w = 0; w < 2; w++) press_nodes(&p, w);
-        for (int w = 0; w < 2; w++) end_tooth(&p, work, &p.tooth[w]);
-        if (p.mesh->runs_out) gk_runout_turn(p.turn, p.push);
-        press_pose(setup, work, p.mesh, p.push, spin_rate);
-        report(setup, &p, i, &engaged->system);
+        p->place = &engaged->place[i];
+        p->flank = p->place->flank, p->sg = p->flank ? -1.0 : 1.0, p->energy = 0.0;
+        memset(p->strip, 0, sizeof p->strip);
+        memset(p->push, 0, sizeof p->push);
+        for (int w = 0; w < 2; w++) {
+            take_tooth(p, work, w);
+            gk_field_begin(p->tooth[w].field, work->y[p->e->gear[w]], speed[p->e->gear[w]]);
+        }
+        for (int w = 0; w < 2; w++) press_nodes(p, w);
+        for (int w = 0; w < 2; w++) {
+            gk_real *sum[2] = {work->force[p->e->gear[w]], work->next[p->e->gear[w]]};
+            gk_field_end(p->tooth[w].field, work->zero, sum, work->ground_force);
+        }
+        if (p->mesh->runs_out) gk_runout_turn(p->turn, p->push);
+        press_pose(setup, work, p->mesh, p->push, spin_rate);
+        report(setup, p, i, &engaged->system);
     }
 }
 
@@ -465,5 +346,8 @@ void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work,
                     const gk_real *const speed[], double spin_rate[])
 {
     GK_ASSERT(setup->nodal && speed && spin_rate);
-    for (int e = 0; e < model->engagements; e++) press_engagement(model, setup, work, data, e, speed, spin_rate);
+    for (int e = 0; e < model->engagements; e++) {
+        nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
+        press_engagement(work, data, &p, speed, spin_rate);
+    }
 }
