@@ -141,7 +141,7 @@ class Ledger:
         entry, started = self.read()[name], time.monotonic()
         needs = {need: self.digest(need) for need in entry["needs"]}
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        fixed = {"PATH": path, BEHAVIOUR: "".join(map(self.digest, KERNEL))}
+        fixed = {"PATH": path, BEHAVIOUR: "+".join(map(self.digest, KERNEL))}
         code, last = run(entry["command"], self.root, ONE_THREAD | os.environ | fixed)
         ended = f"exit {code}: {last}" if code else last
         minutes = round((time.monotonic() - started) / 60, 1)

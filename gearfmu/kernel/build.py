@@ -95,7 +95,8 @@ def source_hash(files: Sequence[Path]) -> str:
 
 def fingerprint() -> str:
     """The kernel's part of the key of stored results, hex: the variable GEARFMU_BEHAVIOUR (`make evidence` sets it to
-    the hash of the golden runs, after it has checked them), else the SHA-256 of the host's library."""
+    the hashes of the golden runs without and with friction, "+" between them, after it has checked them), else the
+    SHA-256 of the host's library."""
     return os.environ.get(BEHAVIOUR) or hashlib.sha256(library_path().read_bytes()).hexdigest()
 
 

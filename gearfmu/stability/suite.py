@@ -30,6 +30,7 @@ from gearfmu.stability.trains import CLOSING, train
 from gearfmu.stage.build.blob import rounded_hash
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
+RUBBING = {"rubbing", "set_rubbing"}  # files of the scenes with friction
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -121,16 +122,18 @@ def _nothing(outcome: str, case: Case, message: str) -> Finding:
 
 
 def key_of(scene: str) -> str:
-    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`) and what the scene is made from: the file of
-    the scene and those of this package that it imports, the assembled stages (bodies, damping, cuts), files of scenes.
+    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`; its part behind "+" only where the scene has
+    friction) and what the scene is made from: the file of the scene and those of this package that it imports, the
+    assembled stages (bodies, damping, cuts), files of scenes.
     """
     used, left = set[str](), [SCENES[scene].__module__.rpartition(".")[2]]
-    digest = hashlib.sha256(fingerprint().encode())
+    kernel, _, friction = fingerprint().partition("+")
     while left:
         name = left.pop()
         if name not in used:
             used.add(name)
             left += re.findall(r"^from gearfmu\.stability\.(\w+) import", _source(name), flags=re.MULTILINE)
+    digest = hashlib.sha256((kernel + friction if used & RUBBING else kernel).encode())
     for name in sorted(used):
         digest.update(_source(name).encode())
         digest.update(_made_from(name, (PLAIN, RELIEVED)).encode())

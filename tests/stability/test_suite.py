@@ -81,8 +81,11 @@ def test_a_row_is_of_its_kernel_its_stage_and_its_own_files(tmp_path: Path, monk
         with monkeypatch.context() as changed:
             changed.setattr(suite, "_source", lambda name, file=file: sources(name) + "#" * (name == file))
             assert moved(before) == touched
-    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "other golden runs")
+    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "golden runs+those with friction")
     assert moved(before) == list(scenes)
+    before, rubbing = [suite.key_of(scene) for scene in scenes], suite.key_of("set_rubbing_reversal")
+    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "golden runs+others with friction")
+    assert not moved(before) and suite.key_of("set_rubbing_reversal") != rubbing
 
 
 def test_failures_are_counted_and_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,9 +43,10 @@ static double te_of(const gk_model *model, const gk_setup *setup, int e, const d
 }
 
 /* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
- * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of
- * the ports, angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for
- * every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
+ * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of the ports,
+ * angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for every
+ * tooth pair of e {flank, tooth of gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers.
+ * `keep` continues from the last call. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                  double torque, int e, int keep, double *out, int *places)
 {
