@@ -86,7 +86,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "stage/test_film.py",
         ("return 13.328648814475098 *", "return 12.9 *"),
         ("return film->closes[i] * (sunk + late / mean);", "return 0.0;"),
-        ("film->yields[i] = 2.0 / 3.0 * fifth / pushed;", "film->yields[i] = fifth / pushed;"),
+        ("film->factor[i] * (u * u * u - far * far * far);", "film->factor[i] * (u * u * u + far * far * far);"),
     ),
     *of(
         "gk_friction.c",
@@ -157,7 +157,7 @@ MUTANTS: tuple[Mutant, ...] = (
     *of(
         "frf.py",
         "test_frf.py reduction",
-        ("s = squared / (1 + 2j * case.damping_ratio)", "s = squared / (1 - 2j * case.damping_ratio)"),
+        ("_bore_held(exact - rigid / squared)", "_bore_held(exact + rigid / squared)"),
     ),
     # ---- running a stage, coupling, report ----
     *of(

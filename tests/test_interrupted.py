@@ -32,8 +32,15 @@ def tiny(folder: Path) -> Path:
     return path
 
 
+def _heeds_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # which a test run in the background of a shell ignores
+
+
 def started(words: list[str], folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen([*GEARFMU, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        [*GEARFMU, *words], cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=_heeds_interrupts
+    )
 
 
 def left_over(folder: Path) -> list[str]:

@@ -47,7 +47,7 @@ def test_impacts_and_open_time_are_those_of_the_steps(relieved: StageModel) -> N
     time, impacts, drive_force, coast_force = np.array(rows).T
     opened = np.diff(time) > 0
     assert 0.1 < opened.mean() < 0.9
-    assert np.allclose(np.diff(time)[opened], STEP, rtol=1e-6)
+    assert np.allclose(np.diff(time)[opened], STEP, rtol=1e-6, atol=0)
     assert not np.any((drive_force + coast_force)[1:][opened])
     struck = opened[:-1] & ~opened[1:]
     assert np.array_equal(np.diff(impacts)[1:], struck.astype(float)) and struck.sum() > 10
