@@ -30,6 +30,7 @@ KNOWN = {
     ("set_rubbing_reversal", "fast", "quarter"),
     ("set_rubbing_reversal", "standard", "default"),
     ("set_rubbing_reversal", "standard", "half"),
+    ("set_rubbing_reversal", "standard", "quarter"),
     ("set_clutch_dump", "full", "default"),
     ("planetary_backfire", "fast", "quarter"),
 }
