@@ -93,7 +93,9 @@ def test_discarded_step_tells_how_far_it_came_and_can_be_taken_back(unpacked_oth
     steps = 0
     while subject.status("doStep", steps * 1e-4, 1e-4) == OK:
         steps += 1
-    reached = ctypes.c_double()
+    reached, discarded = ctypes.c_double(), ctypes.c_int()
+    assert subject.status("fmi2GetStatus", subject.fmu.component, 0, ctypes.byref(discarded)) == OK
+    assert discarded.value == 2
     assert subject.status("fmi2GetRealStatus", subject.fmu.component, 2, ctypes.byref(reached)) == OK
     assert steps * 1e-4 - 1e-12 <= reached.value < (steps + 1) * 1e-4
     outputs = subject.fmu.getReal(subject.references("output", "Real"))
