@@ -27,7 +27,7 @@ runs. It runs each at levels `fast`, `standard` and `full`, with the kernel's de
 gearfmu stability --list                                     # every scene: event and checks
 gearfmu stability --level fast --h default                   # what continuous integration runs
 gearfmu stability --scene rollbacks --h "5 us" --out my.csv  # one scene, another step; a later call continues my.csv
-make stability                                               # everything: table and this page, about four hours of one core
+make stability                                               # everything: table and this page, four hours of one core
 ```
 
 The exit code is the number of failures.
@@ -61,8 +61,8 @@ read.
 |---|---|---|---|---|---|---|
 """
 TAIL = """
-All rows are of the present kernel. A step whose energy balance has no root is solved without it and counts as unsolved \
-([theory](theory.md)); the rest shows in the energy residual.
+All rows are of the present kernel. A step whose energy balance has no root is solved without it and counts as \
+unsolved ([theory](theory.md)); the rest shows in the energy residual.
 
 ## The table
 
