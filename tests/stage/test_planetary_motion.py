@@ -120,3 +120,14 @@ def test_two_integrators_see_the_same_set(model: StageModel) -> None:
     swing = methods["dg4"].std(axis=0)
     apart = {name: np.sqrt(((method - methods["dg4"]) ** 2).mean(axis=0)) / swing for name, method in methods.items()}
     assert np.all(apart["central"] < 3e-3) and np.all(apart["without"] > 5e-3)
+
+
+def test_the_load_of_an_uneven_set_turns_with_the_carrier() -> None:
+    """One pin out of its place: what the sun's bearing carries keeps its size and turns by the carrier's angle."""
+    spec = load_stage("planetary54/stage_pin_error")
+    kernel = started(assemble(spec, load_bodies(spec)), 600.0, 85.0, 340.0)
+    found = stepped(kernel, 800, "bearing.sun.fx", "bearing.sun.fy", "carrier.gear.phi")
+    own = (found[:, 0] + 1j * found[:, 1]) * np.exp(-1j * found[:, 2])
+    early, late = own[100:300].mean(), own[600:].mean()
+    assert found[-1, 2] > 1.2 and abs(early) > 20.0
+    assert abs(late - early) < 0.05 * abs(early)
