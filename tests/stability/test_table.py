@@ -32,6 +32,7 @@ KNOWN = {
     ("set_rubbing_reversal", "standard", "half"),
     ("set_rubbing_reversal", "standard", "quarter"),
     ("set_clutch_dump", "full", "default"),
+    ("set_clutch_dump", "full", "half"),
     ("planetary_backfire", "fast", "quarter"),
 }
 
