@@ -38,7 +38,7 @@ def _segment_text(segment: Segment) -> Iterator[str]:
 
 def cells(line: Line) -> tuple[str, ...]:
     """The cells of one effect."""
-    share = "" if math.isnan(line.share) else f"{100 * max(line.share, 0.0):.0f} %"  # below 0: timing noise
+    share = "" if math.isnan(line.share) else f"{100 * max(line.share, 0.0):.0f} %"  # below 0: noise or harder steps
     return line.effect, number(line.error), number(line.formula), share, line.verdict, f"{line.by}: {line.reason}"
 
 
