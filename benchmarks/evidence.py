@@ -7,10 +7,10 @@
 
 evidence.json has one entry a target: `command`; `needs`, input → hash when the target was made, "" where unknown;
 `makes`, file → hash; `made` (date), `minutes`, `ended` (last line that the command printed). Inputs: `kernel` (the
-golden digests: a rewrite that leaves all bits ages nothing), `stage NAME` (the assembled model, so stage file, bodies
-and assembly), `reduction` (the version of bodies), and files, by patterns. Comments and docstrings of Python files do
-not count. `kernel friction` is the golden runs with friction, which `kernel` leaves out. A command that fails leaves
-its target stale.
+golden digests of the shipped build: a rewrite that leaves all bits ages nothing), `stage NAME` (the assembled model,
+so stage file, bodies and assembly), `reduction` (the version of bodies), and files, by patterns. Comments and
+docstrings of Python files do not count. `kernel friction` is the golden runs with friction, which `kernel` leaves out.
+A command that fails leaves its target stale.
 """
 
 from __future__ import annotations
@@ -69,12 +69,9 @@ def content(path: Path) -> bytes:
 
 
 def golden_runs(path: Path, friction: bool) -> bytes:
-    """The golden digests of the runs with friction, or of all others."""
-    builds = json.loads(path.read_bytes())
-    chosen = {
-        build: {name: bits for name, bits in runs.items() if ("friction" in name) == friction}
-        for build, runs in builds.items()
-    }
+    """The golden digests of the shipped kernel's runs with friction, or of all others."""
+    runs = json.loads(path.read_bytes())["float"]
+    chosen = {name: bits for name, bits in runs.items() if ("friction" in name) == friction}
     return json.dumps(chosen, sort_keys=True).encode()
 
 

@@ -170,7 +170,7 @@ def solved(chosen: Any, gears: list[ReducedBody], torque: float, position: int) 
         "case": "tilted" if tilted else "parallel",
         "torque_Nm": f"{torque:g}",
         "position": f"{position / POSITIONS:.6f}",
-        "te_um": f"{1e6 * (te + (torque - moment) / r_b / mine.mesh_stiffness):.4f}",
+        "te_um": f"{1e6 * (te + (torque - moment) / r_b / mine.stiffness):.4f}",
         "solved_te_um": f"{1e6 * te:.4f}",
         "solved_torque_Nm": f"{moment:.3f}",
         "gearfmu_te_um": f"{1e6 * mine.te:.4f}",

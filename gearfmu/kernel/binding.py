@@ -12,7 +12,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 4
+ABI = 5
 MESSAGE = 512
 OUTCOMES = (
     "ok",

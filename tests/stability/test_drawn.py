@@ -203,8 +203,10 @@ def unsolved(made: Record) -> list[str]:
 FOUND = {  # by the first 200 draws, not cured yet
     **dict.fromkeys((49, 56, 74, 75, 95, 131), "energy balance leaves 1e-4 to 4e-4"),
     102: "energy balance leaves 3e-3: friction, pairs that end under load",
-    **dict.fromkeys((92, 127), "one step in thousands unsolved under friction"),
 }
+
+
+CYCLED = 92  # a contact stuck, parted, slid and stuck again without end, until what would hold it showed the side
 
 
 def later(seed: int) -> object:
@@ -213,7 +215,7 @@ def later(seed: int) -> object:
     return pytest.param(seed, marks=[pytest.mark.full, *known])
 
 
-@pytest.mark.parametrize("seed", [*range(10), *map(later, range(10, 200))])
+@pytest.mark.parametrize("seed", [*range(10), CYCLED, *(later(seed) for seed in range(10, 200) if seed != CYCLED)])
 def test_what_is_drawn_runs_or_is_refused(seed: int) -> None:
     drawn = draw(seed)
     print(drawn)

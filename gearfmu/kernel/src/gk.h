@@ -19,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 4
+#define GK_ABI 5
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {

@@ -101,6 +101,7 @@ void gk_energy_settle(const gk_model *model, const gk_setup *setup, const gk_wor
 {
     GK_ASSERT(data->magic == GK_DATA_MAGIC);
     const double before = data->energy.quasi_static;
+    int unsolved = 0;
     data->energy.quasi_static = 0.0;
     if (work->another) data->energy.baseline -= before;
     for (int e = 0; e < model->engagements; e++) {
@@ -109,6 +110,7 @@ void gk_energy_settle(const gk_model *model, const gk_setup *setup, const gk_wor
         if (GK_ON(setup, friction)) data->energy.quasi_static += account_friction(work, data, e);
         if (GK_ON(setup, film)) account_film(work, data, e);
         data->iterations += s->iterations;
-        if (s->limit_reached) data->retried++, data->status |= STATUS_LIMIT;
+        unsolved |= s->limit_reached;
     }
+    if (unsolved) data->retried++, data->status |= STATUS_LIMIT;
 }

@@ -205,7 +205,7 @@ static double secant(double alpha, double defect, double last, double last_defec
 }
 
 /* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
-static int find_alpha(const gk_island *island, balance b)
+static int find_alpha(const gk_island *island, balance b, double tolerance)
 {
     double p[MAX_STRIDE], damper[MAX_STRIDE], last = 0.0, last_defect = 0.0;
     bracket ends = {0};
@@ -233,7 +233,7 @@ static int find_alpha(const gk_island *island, balance b)
         }
         solve_members(island);
         b = defect_of_all(island);
-        if (!open_balance(&b, BALANCE)) return leave(island, &b);
+        if (!open_balance(&b, tolerance)) return leave(island, &b);
     }
     return 0;
 }
@@ -280,8 +280,9 @@ static int dry(const gk_island *island)
 }
 
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
- * quasi-static part's energy change equal its work. Contacts that hardly move cannot repay what the steps before left:
- * then the defect waits, as it does in a step without change of status. */
+ * quasi-static part's energy change equal its work: on contacts; then on bearings too; then on contacts to the tolerance
+ * of a step without change, because contacts that change with α let the defect jump across zero. Contacts that hardly
+ * move cannot repay what the steps before left: then the defect waits, as it does in a step without change of status. */
 void gk_balance_solve(const gk_island *island)
 {
     GK_ASSERT(island->count >= 0 && island->count <= MAX_ENGAGEMENTS);
@@ -293,7 +294,7 @@ void gk_balance_solve(const gk_island *island)
         rubs |= GK_HAS(friction) && island->member[m]->rubs;
     }
     curved |= rubs;
-    for (int all_rows = 0; all_rows < 2; all_rows++) {
+    for (int attempt = 0; attempt < 3; attempt++) {
         gk_balance_plain(island);
         const int changed = any_changed(island);
         if (!changed && !curved) return;
@@ -302,8 +303,8 @@ void gk_balance_solve(const gk_island *island)
             leave(island, &b);
             return;
         }
-        for (int m = 0; m < island->count; m++) choose_direction(island->member[m], all_rows);
-        if (find_alpha(island, b)) return;
+        for (int m = 0; m < island->count; m++) choose_direction(island->member[m], attempt == 1);
+        if (find_alpha(island, b, attempt < 2 ? BALANCE : steady)) return;
         if (rubs && !changed) break; /* contacts that stick hardly move */
     }
     gk_balance_plain(island);

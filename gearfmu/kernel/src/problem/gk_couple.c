@@ -284,29 +284,44 @@ static void rub(const gk_island *island)
     if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
 }
 
+/* Is what friction still changes by nothing beside the largest normal force of the island? In a mesh that is only grazed
+ * it may go on changing sides. */
+static int hardly_rubs(const gk_coupled *c)
+{
+    double moved = 0.0, largest = 0.0;
+    for (int e = 0; e < c->model->engagements; e++) {
+        const gk_system *s = &c->work->engaged[e].system;
+        if (!within(c, e)) continue;
+        if (GK_ON(c->setup, friction)) moved = gk_max(moved, c->work->engaged[e].glide->moved);
+        for (int i = 0; i < s->contacts; i++) largest = gk_max(largest, fabs(s->force[i]));
+    }
+    return moved < TOLERANCE * largest;
+}
+
 /* sweeps until what engagements do to each other no longer changes */
 static void sweep(const gk_island *island)
 {
     gk_coupled *c = island->context;
-    double change = INFINITY, next = INFINITY;
+    double change = INFINITY, next = INFINITY, gaps = INFINITY;
     give_all(c, WHOLE);
     const int most = c->sweeps ? c->sweeps : SWEEPS;
     for (int round = 0; round < most && !(next < TOLERANCE); round++) {
         const double last = change;
-        change = 0.0;
+        change = gaps = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
             if (!within(c, e)) continue;
-            change = gk_max(change, take_whole(c, e));
+            gaps = gk_max(gaps, take_whole(c, e));
             if (GK_ON(c->setup, friction)) take_along(c, e, c->work->engaged[e].glide->others);
             change = gk_max(change, solve_own(c, e, round));
             give(c, e, WHOLE);
         }
+        change = gk_max(change, gaps);
         if (round) c->rate = gk_min(1.0, change / last);
         next = change * c->rate; /* what another sweep would find */
     }
     for (int m = 0; m < island->count; m++) island->member[m]->dashpots_stand = 0;
     part_at_once(c, AT_ONCE);
-    if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;
+    if (!(next < TOLERANCE) && !(gaps < TOLERANCE && hardly_rubs(c))) island->member[0]->limit_reached = 1;
 }
 
 gk_island gk_couple_island(gk_coupled *c)

@@ -273,7 +273,10 @@ static int change_status(gk_glide *glide, const gk_system *s, int patient)
         if (!(most > 0.0)) { /* apart at the end: what there was may not push along the sliding */
             const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * glide->slid[j] > 0.0;
             if (pushes) glide->limit[j] = glide->start_end[j] > 0.0 ? -1 : 1, count++;
-            if (!(glide->most_force[j] > 0.0)) glide->limit[j] = against(glide->slid[j], glide->creep[j]);
+            if (glide->held[j] && fabs(glide->mean[j]) > glide->most_force[j]) /* what would hold it shows the side */
+                glide->limit[j] = glide->mean[j] > 0.0 ? 1 : -1;
+            else if (!(glide->most_force[j] > 0.0))
+                glide->limit[j] = against(glide->slid[j], glide->creep[j]);
             continue;
         }
         if (glide->limit[j] ? glide->limit[j] * glide->slid[j] > -glide->creep[j] * (1.0 - ALMOST)
@@ -356,11 +359,11 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     apply(glide, s);
     gk_solve_settle(s);
     gk_solve_contacts(s);
-    const double moved = follow(glide, s);
+    glide->moved = follow(glide, s);
     s->rubbing = friction_defect(glide, s);
     s->rubbed = friction_taken(glide, s);
     if (changed || (!stands && !round)) return 1.0;
-    return moved / find_limits(glide, s);
+    return glide->moved / find_limits(glide, s);
 }
 
 /* the speed of gear A as a mean over the last millisecond */

@@ -42,6 +42,7 @@ typedef struct gk_glide {
     double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
     signed char limit[MAX_STRIDE], held[MAX_STRIDE];    /* ±1: at that limit; 1: below it */
     int rolls;                                          /* the gears do: friction fades, it does not stick */
+    double moved;                                       /* by the last round, N */
     double fixed[MAX_STRIDE], *by_z;                    /* mean friction as a function of z, (contacts, stride) */
     double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE], /* friction at the end as a function of z and its mean */
         end_by_mean[MAX_STRIDE];
