@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -24,13 +23,11 @@ def finding(
     complaints: Iterable[str] = (),
     facts: Mapping[str, float] | None = None,
     energy: float = ENERGY,
-    unsolved: float = 0.0,
 ) -> Finding:
-    """The finding of a recorded run of a pair; complaints: the scene's own. energy: limit of the energy residual;
-    unsolved: of the share of steps that the kernel did not solve."""
+    """The finding of a recorded run of a pair; complaints: the scene's own. energy: limit of the energy residual."""
     depth = overlap(record, pair)
     said = deep(record, depth, record["mesh.force_max"] / SOFTEST + CLEARANCE)
-    return judged(record, float(depth.max()), [*said, *complaints], facts or {}, energy, unsolved)
+    return judged(record, float(depth.max()), [*said, *complaints], facts or {}, energy)
 
 
 def judged(
@@ -39,14 +36,12 @@ def judged(
     complaints: Iterable[str],
     facts: Mapping[str, float],
     energy: float = ENERGY,
-    unsolved: float = 0.0,
 ) -> Finding:
-    """The finding of a recorded run of any stage: finite everywhere, energy balance closed, no more than the share
-    `unsolved` of the steps unsolved, and the scene's own complaints. penetration: m."""
+    """The finding of a recorded run of any stage: finite everywhere, energy balance closed, no step unsolved, and
+    the scene's own complaints. penetration: m."""
     found = lost(record)
     found |= {"retried_steps": float(record["solver.retried_steps"][-1]), "status": float(record["solver.status"][-1])}
-    most = math.floor(unsolved * float(record["solver.steps"][-1]))
-    said = [*common(record, energy), *at_most("number of steps left unsolved", found["retried_steps"], most)]
+    said = [*common(record, energy), *at_most("number of steps left unsolved", found["retried_steps"], 0.0)]
     said += complaints
     outcome = record.outcome
     if outcome != COMPLETED:

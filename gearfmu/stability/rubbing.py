@@ -15,7 +15,6 @@ from gearfmu.stability.record import run
 
 MU = 0.1
 FRICTION = {"effect.friction": 1.0, "friction_coefficient": MU}
-UNSOLVED = 1e-4  # of all steps: which of them have no root of the step's energy depends on the last bits of the stage
 FILM = {"effect.film": 1.0, "oil_viscosity": 0.01}
 
 
@@ -27,20 +26,20 @@ def rubbing_reversal(case: Case) -> Finding:
 
 def rubbing_standstill(case: Case) -> Finding:
     """Friction and 302 N·m at rest for 10 s: once the start has died away, after 1 s, force and transmission error may
-    not creep by more than 1e-3: load patches at the limit of friction give way to rounding, by 4e-4."""
+    not creep by more than 2e-4: load patches at the limit of friction give way to rounding, by 1.2e-4."""
     pair = geometry(RELIEVED)
     made = run(kernel(model(RELIEVED), case, FRICTION), loaded(RELIEVED, Constant(0.0), NOMINAL), 10.0, 1e-3)
     late, said, facts = made.after(1.0), [], {}
     for name in ("mesh.force_mean", "mesh.te"):
         facts[f"creep_of_{name}"] = float(np.ptp(late[name]) / abs(late[name][0]))
-        said += at_most(f"change of {name}", facts[f"creep_of_{name}"], 1e-3)
+        said += at_most(f"change of {name}", facts[f"creep_of_{name}"], 2e-4)
     return finding(made, pair, said, facts)
 
 
 def rubbing_light_load(case: Case) -> Finding:
     """Friction in idle rattle: the driver swings at 53 Hz, a drag of 4.4 N·m on a loose wheel. The impulse of the mesh
-    is that of the drag to 2 %, and some contact is lost. One step in ten thousand may stay unsolved."""
-    return light_load(case, FRICTION, UNSOLVED)
+    is that of the drag to 2 %, and some contact is lost."""
+    return light_load(case, FRICTION)
 
 
 def rubbing_turns_for_long(case: Case) -> Finding:
@@ -80,8 +79,8 @@ def reversal(case: Case, effects: Mapping[str, float]) -> Finding:
     return finding(made, pair, said, {"coast_torque_Nm": coast, "drive_torque_Nm": drive})
 
 
-def light_load(case: Case, effects: Mapping[str, float], unsolved: float = 0.0) -> Finding:
-    """A driver that swings, a drag on a loose wheel. unsolved: share of steps that may be."""
+def light_load(case: Case, effects: Mapping[str, float]) -> Finding:
+    """A driver that swings, a drag on a loose wheel."""
     variant, frequency, periods = Variant(ports=(DRIVEN, LOOSE)), 53.0, 20
     pair = geometry(variant)
     inputs, start = swinging(1500 * RPM, frequency, SWING, DRAG)
@@ -92,4 +91,4 @@ def light_load(case: Case, effects: Mapping[str, float], unsolved: float = 0.0) 
     torque = mean_torque(steady, pair) * pair.gears[1].r_b / pair.gears[0].r_b
     said = near("mean torque of the mesh on the wheel, its impulse,", torque, DRAG, 0.02)
     said += at_least("share without contact", float(np.mean(steady["mesh.contact"] == 0)), 0.1)
-    return finding(made, pair, said, {"drag_Nm": torque}, unsolved=unsolved)
+    return finding(made, pair, said, {"drag_Nm": torque})

@@ -273,17 +273,6 @@ static double solve_own(const gk_coupled *c, int e, int round)
     return 0.0;
 }
 
-/* an engagement that is alone: normal forces and friction in turns */
-static void rub(const gk_island *island)
-{
-    gk_coupled *c = island->context;
-    const int e = (int)c->alone;
-    double change = INFINITY;
-    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) change = solve_own(c, e, round);
-    island->member[0]->dashpots_stand = 0;
-    if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
-}
-
 /* Is what friction still changes by nothing beside the largest normal force of the island? In a mesh that is only grazed
  * it may go on changing sides. */
 static int hardly_rubs(const gk_coupled *c)
@@ -296,6 +285,17 @@ static int hardly_rubs(const gk_coupled *c)
         for (int i = 0; i < s->contacts; i++) largest = gk_max(largest, fabs(s->force[i]));
     }
     return moved < TOLERANCE * largest;
+}
+
+/* an engagement that is alone: normal forces and friction in turns */
+static void rub(const gk_island *island)
+{
+    gk_coupled *c = island->context;
+    const int e = (int)c->alone;
+    double change = INFINITY;
+    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) change = solve_own(c, e, round);
+    island->member[0]->dashpots_stand = 0;
+    if (!(change < TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
 }
 
 /* sweeps until what engagements do to each other no longer changes */
