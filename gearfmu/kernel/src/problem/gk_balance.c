@@ -13,7 +13,6 @@ static const double STEADY_BALANCE = 1e-9, COUPLED_BALANCE = 1e-9;
 static const double STEADY_BALANCE = 1e-7;  /* rows in float are good to 1e-7 */
 static const double COUPLED_BALANCE = 1e-6; /* engagements know each other's gaps to 1e-7; what is left waits */
 #endif
-static const double RUBBED_BALANCE = 1e-4; /* what teeth that stick cannot give back in a step, the next one can */
 
 typedef struct balance {
     double defect, c1, c2, scale, rounding;
@@ -321,6 +320,6 @@ void gk_balance_solve(const gk_island *island)
         own.defect = 0.0;
     }
     leave(island, &b);
-    if (open_balance(&own, rubs ? RUBBED_BALANCE : steady))
+    if (open_balance(&own, steady))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }
