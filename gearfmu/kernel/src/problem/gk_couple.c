@@ -273,8 +273,8 @@ static double solve_own(const gk_coupled *c, int e, int round)
     return 0.0;
 }
 
-/* Is what friction still changes by nothing beside the largest normal force of the island? In a mesh that is only grazed
- * it may go on changing sides. */
+/* Is what friction still changes by nothing beside the largest normal force of the island? In a mesh that is only
+ * grazed it may go on changing sides. */
 static int hardly_rubs(const gk_coupled *c)
 {
     double moved = 0.0, largest = 0.0;
