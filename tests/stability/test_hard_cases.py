@@ -36,6 +36,12 @@ def test_every_scene_runs_through_at_level_fast(scene: str) -> None:
     assert not row.failed, row.finding
 
 
+def test_a_grazed_mesh_leaves_no_step_unsolved() -> None:
+    """Its friction changes by rounding for ever: with that as the measure four steps of this run found no end."""
+    row = found("rubbing_light_load", "fast", "half")
+    assert not row.failed, row.finding
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("scene", list(SCENES))
 @pytest.mark.parametrize("level, step", SLOW)

@@ -150,6 +150,7 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
         found = energies(kernel, 1e-5, 0.03)
         print(viscosity, f"drift {found.drift:.1e}, growth {found.growth:.1e}, retried_steps {found.retried_steps}")
         assert found.drift < 5e-6 and found.growth < 2e-6  # single: 5e-7 without a film, 1.4e-6 with one
+        assert found.retried_steps == 0  # though contacts that change with α let the defect of energy jump across zero
         assert np.diff(found.dissipated).min() > -1e-7 * found.kinetic
         assert 0 < kernel.get("mesh.film_loss") <= 1.001 * found.dissipated[-1]
 
