@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.cosim.friction import sticking_torques
@@ -98,15 +98,17 @@ def test_a_jump_of_capacity_between_steps_is_exact():
     capacities=st.lists(st.floats(0.0, 40.0), min_size=3, max_size=3),
     stiffness=st.floats(10.0, 1e4),
 )
+@example(speeds=[3.25, 0.0, -0.875, 23.0], capacities=[40.0, 30.0, 0.0], stiffness=9366.0)
 def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
-    """Four inertias, three clutches and a spring around them, no torque from outside."""
+    """Four inertias, three clutches and a spring around them, no torque from outside. Micro-steps of a twentieth: in the
+    example a slip comes back after a third of a step, which a unit without them does not see (4e-8 of the energy)."""
     names = ("a", "b", "c", "d")
     network = Network(
         tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
         springs=(Spring("spring", {"a": 1.0, "d": -1.0}, stiffness),),
         clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], Constant(c)) for k, c in enumerate(capacities)),
     )
-    unit = PyUnit(network)
+    unit = PyUnit(network, micro_step=5e-5)
     unit.initialize(0.0)
     handle = unit.resolve(["energy.stored", *(f"{name}.w" for name in names), *(f"clutch{k}.tau" for k in range(3))])
     inertias = np.array([node.inertia for node in network.nodes])
