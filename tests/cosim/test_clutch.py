@@ -100,8 +100,9 @@ def test_a_jump_of_capacity_between_steps_is_exact():
 )
 @example(speeds=[3.25, 0.0, -0.875, 23.0], capacities=[40.0, 30.0, 0.0], stiffness=9366.0)
 def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
-    """Four inertias, three clutches and a spring around them, no torque from outside. Micro-steps of a twentieth: in the
-    example a slip comes back after a third of a step, which a unit without them does not see (4e-8 of the energy)."""
+    """Four inertias, three clutches and a spring around them, no torque from outside. Micro-steps of a twentieth: in
+    the example a slip comes back after a third of a step, which a unit without them does not see (4e-8 of the energy).
+    """
     names = ("a", "b", "c", "d")
     network = Network(
         tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
