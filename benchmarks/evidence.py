@@ -97,6 +97,10 @@ class Ledger:
         paths = sorted(self.root.glob(need))
         return short(b"\0".join(content(path) for path in paths)) if paths else "missing"
 
+    def inputs(self, name: str) -> str:
+        """Hash of all present inputs of a target: what its command need not make again has the same one."""
+        return short(" ".join(map(self.digest, self.read()[name]["needs"])).encode())
+
     def stale(self) -> dict[str, list[str]]:
         """Stale targets → what is wrong with each. What is made from a stale file is stale."""
         found: dict[str, list[str]] = {}

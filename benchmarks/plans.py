@@ -7,7 +7,8 @@ window behind that of the plan, three times as long where the scene is steady. T
 (`pair_loaded`, `clutch_closure`, `clutch_dump`, `planetary_paper`, `planetary_backfire`) with another torque, speed or
 stage, and shipped stages under alternating torques. kept: the error there is at most the budget (and the noise of the
 full model where contact is lost). A part with no room behind its window is not judged: true is nan. None of the scenes
-set a constant of gearfmu/planning. Rows are added as they come; a row that is there is not made again.
+set a constant of gearfmu/planning. Rows are added as they come; one that was made from the same inputs (`made_from`:
+those of the target `plans` in evidence.json) is not made again.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from evidence import Ledger
 
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import stage_model
@@ -34,6 +37,7 @@ from gearfmu.sweeps.runners import in_this_process
 
 LONGER, LONGEST = 3, 0.3  # windows; s
 BUDGETS = ("1 dB", "0.2 dB", "5 %")
+SETS = ("te", "pin.planet1.fx")
 BAND = ("500 Hz", "5 kHz")
 DEAR = ("train", "planetary")  # minutes each: planned for levels alone
 
@@ -61,7 +65,8 @@ proportional = {{ torque = "{brake} N*m", speed = "{wheel} rad/s" }}
 class Row:
     """One part of a plan. error: predicted, bound, and true on the window behind, budgets; price: of the full model and
     of the scene's own level over that of the plan; default_error: of the scene's own level, budgets; cost: of planning,
-    in runs of the full model's window. outcome: planned, full (nothing cheaper keeps it), or why there is no plan."""
+    in runs of the full model's window. outcome: planned, full (nothing cheaper keeps it), or why there is no plan.
+    made_from: hash of all inputs."""
 
     kind: str
     scene: str
@@ -78,6 +83,7 @@ class Row:
     times_default: float
     default_error: float
     cost: float
+    made_from: str
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ def cases() -> Iterator[Case]:
         yield Case("loaded", _rig(f"loaded_{torque}_{rpm}", torque, rpm))
     for torque, rpm in ((200, 3878), (100, 3241), (250, 4862)):
         yield Case("resonance", _rig(f"resonance_{torque}_{rpm}", torque, rpm))
-    for torque, rpm in ((100, 1500), (200, 2500), (60, 4000)):
+    for torque, rpm in ((100, 1500), (200, 2500), (60, 4000), (150, 900), (120, 3200)):
         yield Case("helical", _rig(f"helical_{torque}_{rpm}", torque, rpm, "helical_demo"))
     for mean, swing, hertz in ((8, 12, 83.7), (5, 9, 127.3), (12, 20, 61.1), (6, 8, 211.9)):
         yield Case("rattle", _loads(f"rattle_{mean}_{swing}", mean, swing, hertz, 190.0))
@@ -104,10 +110,12 @@ def cases() -> Iterator[Case]:
     for name, slip in (("clutch_closure", "40 rad/s"), ("clutch_dump", "45 rad/s")):
         changes = {"start.slip": slip, "coupling.step": "50 us", "duration": "0.2 s"}
         yield Case("clutch", load_scene(name, changes))
-    yield Case("train", _rig("train_100_1500", 100, 1500, "two_stage"), ("te", "seat.pinion1.fx"))
-    sets = ("te", "pin.planet1.fx")
-    yield Case("planetary", _short("planetary_paper"), sets)
-    yield Case("planetary", load_scene("planetary_backfire", {"shaft_loads.carrier.constant": "130 N*m"}), sets)
+    for torque, rpm in ((100, 1500), (60, 2500), (160, 800)):
+        yield Case("train", _rig(f"train_{torque}_{rpm}", torque, rpm, "two_stage"), ("te", "seat.pinion1.fx"))
+    for stage in (("planetary54", 4, 450, 85), ("planetary54", 4, 200, 60), ("helical_set", 90 / 26, 400, 85)):
+        yield Case("planetary", _set(*stage), SETS)
+    yield Case("planetary", load_scene("planetary_backfire", {"shaft_loads.carrier.constant": "130 N*m"}), SETS)
+    yield Case("planetary", load_scene("planetary_closure", {"start.slip": "45 rad/s", "duration": "0.2 s"}), SETS)
 
 
 def _rig(name: str, torque: float, rpm: float, stage: str = "fzg_c/stage_relief") -> SceneSpec:
@@ -124,11 +132,20 @@ def _loads(name: str, mean: float, swing: float, hertz: float, speed: float) -> 
         return load_scene(path)
 
 
-def _short(name: str) -> SceneSpec:
-    return load_scene(name, {"deformation": None, "shaft_loads.carrier.constant": "450 N*m"})
+def _set(stage: str, ratio: float, torque: float, speed: float) -> SceneSpec:
+    """`planetary_paper` with another stage, torque on the carrier (N·m) and speed of it (rad/s). ratio: of the set."""
+    brake = {"torque": f"{-torque / ratio} N*m", "speed": f"{ratio * speed} rad/s"}
+    changes = {
+        "deformation": None,
+        "name": f"{stage}_{torque}_{speed}",
+        "stage.name": stage,
+        "start.input_speed": f"{speed} rad/s",
+    }
+    loads = {"shaft_loads.carrier.constant": f"{torque} N*m", "shaft_loads.sun.proportional": brake}
+    return load_scene("planetary_paper", changes | loads)
 
 
-def rows_of(case: Case, budget: str) -> Iterator[Row]:
+def rows_of(case: Case, budget: str, made_from: str) -> Iterator[Row]:
     """A row for every part of the scene."""
     scene, model = case.scene, stage_model(case.scene)
     level, waveform = (None, budget) if budget.endswith("%") else (budget, None)
@@ -137,14 +154,14 @@ def rows_of(case: Case, budget: str) -> Iterator[Row]:
         plan = make(Job(scene, model, asked, in_this_process), scene.name)
     except PlanError as refusal:
         nothing = [float("nan")] * 4
-        yield Row(case.kind, scene.name, "", budget, f"refused: {refusal}", "", *nothing, True, *nothing)
+        yield Row(case.kind, scene.name, "", budget, f"refused: {refusal}", "", *nothing, True, *nothing, made_from)
         return
     for part in plan.segments:
         true = _true(scene, asked, part)
         prices = part.price_full / part.price, part.price_default / part.price
         head = (case.kind, scene.name, part.name, budget, "planned" if part.kept else "full", part.choice.words)
         errors = (part.error, part.bound, true, part.noise)
-        yield Row(*head, *errors, not true > 1.0 + part.noise, *prices, part.error_default, plan.cost)
+        yield Row(*head, *errors, not true > 1.0 + part.noise, *prices, part.error_default, plan.cost, made_from)
 
 
 def _true(scene: SceneSpec, asked: Request, part: Segment) -> float:
@@ -167,14 +184,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     given = parser.parse_args()
     rows = read_rows(given.out, Row)
+    made_from = Ledger().inputs("plans")
     for budget in given.budget or BUDGETS:
         for case in cases():
-            done = any((row.scene, row.budget) == (case.scene.name, budget) for row in rows)
+            known = [row for row in rows if (row.scene, row.budget) == (case.scene.name, budget)]
+            done = any(row.made_from == made_from for row in known)
             dear = case.kind in DEAR and budget == BUDGETS[2]
             if done or dear or given.only not in f"{case.kind} {case.scene.name}":
                 continue
             started = time.time()
-            rows += rows_of(case, budget)
+            rows = [row for row in rows if row not in known] + list(rows_of(case, budget, made_from))
             write_rows(given.out, Row, rows)
             print(f"{case.scene.name}, {budget}: {time.time() - started:.0f} s", flush=True)
     print(tidy(rows, ["kind", "scene", "budget", "choice", "bound", "true", "kept", "times_full", "times_default"]))

@@ -3,7 +3,8 @@ any change of a number moves, are not among them: the physics must see it.
 
     python tests/mutants.py [--only WORD] [--jobs 2]
 
-works on copies of the checkout and writes benchmarks/mutants.csv; exit code 1 where fewer than 95 % are caught."""
+works on copies of the checkout and writes benchmarks/mutants.csv; exit code 1 where fewer than 95 % are caught. The
+test that caught a defect last time runs first, the others where it passes."""
 
 from __future__ import annotations
 
@@ -196,8 +197,9 @@ def place_of(root: Path, mutant: Mutant) -> tuple[Path, str]:
     raise SystemExit(f"{mutant.file}: {mutant.old!r} does not stand there once: adapt tests/mutants.py")
 
 
-def tried(root: Path, mutant: Mutant) -> tuple[str, str]:
-    """ "caught" with the test that failed, "missed", or "broken" where it does not compile or no test runs."""
+def tried(root: Path, mutant: Mutant, first: str) -> tuple[str, str]:
+    """ "caught" with the test that failed, "missed", or "broken" where it does not compile or no test runs. first: the
+    test that is run before the others, or ""."""
     path, text = place_of(root, mutant)
     setting = {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
     path.write_text(text.replace(mutant.old, mutant.new), encoding="utf-8")
@@ -206,25 +208,32 @@ def tried(root: Path, mutant: Mutant) -> tuple[str, str]:
             built = subprocess.run([sys.executable, "-c", BUILD], cwd=root, env=setting, capture_output=True, text=True)
             if built.returncode:
                 return "broken", built.stderr.strip().splitlines()[-1][:100]
-        line = [
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "-x",
-            "-p",
-            "no:cacheprovider",
-            *(f"tests/{t}" for t in mutant.tests),
-        ]
-        done = subprocess.run(line, cwd=root, env=setting, capture_output=True, text=True, timeout=LONGEST)
-        failed = [text for text in done.stdout.splitlines() if text.startswith(("FAILED", "ERROR"))]
-        if done.returncode > 1:
-            return "broken", (done.stdout + done.stderr).strip().splitlines()[-1][:100]
-        return ("caught", failed[0].split(" ")[1]) if failed else ("missed", "")
-    except subprocess.TimeoutExpired:
-        return "caught", "it never ends"
+        outcome, by = _tested(root, [first], setting) if first else ("", "")
+        return (outcome, by) if outcome == "caught" else _tested(root, [f"tests/{t}" for t in mutant.tests], setting)
     finally:
         path.write_text(text, encoding="utf-8")
+
+
+def _tested(root: Path, tests: list[str], setting: dict[str, str]) -> tuple[str, str]:
+    """Outcome of `tried` under the named tests."""
+    line = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+    try:
+        done = subprocess.run(line, cwd=root, env=setting, capture_output=True, text=True, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return "caught", "it never ends"
+    failed = [text for text in done.stdout.splitlines() if text.startswith(("FAILED", "ERROR"))]
+    if done.returncode > 1:
+        return "broken", (done.stdout + done.stderr).strip().splitlines()[-1][:100]
+    return ("caught", failed[0].split(" ")[1]) if failed else ("missed", "")
+
+
+def known() -> dict[tuple[str, str, str], str]:
+    """The test that caught a defect (file, line, what it becomes) last time."""
+    if not TABLE.exists():
+        return {}
+    with open(TABLE, encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["by"].startswith("tests/")]
+    return {(row["file"], row["line"], row["becomes"]): row["by"] for row in rows}
 
 
 def worked(jobs: int, mutants: Sequence[Mutant]) -> list[tuple[Mutant, str, str]]:
@@ -235,11 +244,11 @@ def worked(jobs: int, mutants: Sequence[Mutant]) -> list[tuple[Mutant, str, str]
         subprocess.run(
             [sys.executable, "-c", BUILD], cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, check=True
         )
-    free = list(folders)
+    free, first = list(folders), known()
 
     def one(mutant: Mutant) -> tuple[Mutant, str, str]:
         folder, started = free.pop(), time.monotonic()
-        outcome, by = tried(folder, mutant)
+        outcome, by = tried(folder, mutant, first.get((mutant.file, mutant.old.strip(), mutant.new.strip()), ""))
         free.append(folder)
         print(
             f"{outcome:6} {time.monotonic() - started:4.0f} s  {mutant.file}: {mutant.new.strip()!r}  {by}", flush=True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -135,15 +136,27 @@ def bored(gear: GearGeometry, radius: float | None) -> GearGeometry:
     return gear if radius is None else replace(gear, r_bore=radius)
 
 
+def prepared(
+    case: Case, pair: PairGeometry, face_width: float, load: Load, folder: Path, number: int = 0
+) -> tuple[Path, Problem]:
+    """The deck of a load, written into the folder, and its problem."""
+    folder.mkdir(parents=True, exist_ok=True)
+    problem, deck = problem_of(case, pair, face_width, load), folder / f"load_{number}.inp"
+    write_deck(problem, deck)
+    return deck, problem
+
+
+def digest(deck: Path) -> str:
+    """First half of the deck's SHA-256: what was solved with the same deck need not be solved again."""
+    return hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
+
+
 def solve(case: Case, pair: PairGeometry, face_width: float, loads: Sequence[Load], folder: Path) -> Solution:
     """Write a deck a load, run ccx, read the bores' torques. RuntimeError when ccx gives up."""
-    folder.mkdir(parents=True, exist_ok=True)
     base, half = np.array([gear.r_b for gear in pair.gears]), case.levels(face_width)[-1]
     line_load, seconds = [], 0.0
     for number, load in enumerate(loads):
-        deck = folder / f"load_{number}.inp"
-        problem = problem_of(case, pair, face_width, load)
-        write_deck(problem, deck)
+        deck, problem = prepared(case, pair, face_width, load, folder, number)
         seconds += run_deck(deck)
         line_load.append(torques(problem, deck.with_suffix(".dat")) / base / half)
     return Solution(

@@ -2,22 +2,21 @@
 
     python benchmarks/calculix/pitch_point.py [CASE …] [--work DIR] [--out pitch_point.csv]
 
-One row a case: secant and tangent at 300 N/mm from two turns of the pinion (te 3 % apart), bores rigid. Without names
-all cases are run (an hour on one core); rows of other cases in the table stay. Needs CalculiX's ccx (Debian:
-calculix-ccx).
+One row a case: secant and tangent at 300 N/mm from two turns of the pinion (te 3 % apart), bores rigid. A case whose
+deck is that of the table is not run again unless it is named; all of them take an hour on one core. Needs CalculiX's
+ccx (Debian: calculix-ccx).
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import hashlib
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from case import Case, Load, Solution, pitch_point_turn, solve
+from case import Case, Load, Solution, digest, pitch_point_turn, prepared, solve
 from ccx import require_ccx
 from section import Fineness
 
@@ -53,21 +52,19 @@ GUESS = {"plane_stress": 12.5, "plane_strain": 13.5, "half_width": 13.0}  # N/(m
 SHAFT, AVERAGED = 0.34, 0.965  # … and by how much other bores change it
 
 
-def row(case: Case, spec: StageSpec, work: Path) -> dict[str, Any]:
-    """The table's row of a case, made by running it."""
+def row(case: Case, spec: StageSpec, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+    """The table's row of a case, made by running it unless `known` comes from the same deck."""
     pair = PairGeometry.of(spec)
     guess = 1e9 * GUESS[case.condition]
     guess *= SHAFT if case.bore_radius else AVERAGED if case.bores == "averaged" else 1.0
     te = LINE_LOAD / guess
     loads = [Load(pitch_point_turn(pair), part * te) for part in (0.985, 1.015)]
-    folder = work / case.name
-    solution = solve(case, pair, spec.gears[0].face_width, loads, folder)
-    return entry(case, solution) | {"deck_sha256": digest(folder / "load_0.inp")}
-
-
-def digest(deck: Path) -> str:
-    """First half of the deck's SHA-256."""
-    return hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
+    width, folder = spec.gears[0].face_width, work / case.name
+    deck, _ = prepared(case, pair, width, loads[0], folder)
+    name = digest(deck)
+    if known and known["deck_sha256"] == name:
+        return known
+    return entry(case, solve(case, pair, width, loads, folder)) | {"deck_sha256": name}
 
 
 def entry(case: Case, solution: Solution) -> dict[str, Any]:
@@ -91,14 +88,12 @@ def entry(case: Case, solution: Solution) -> dict[str, Any]:
     }
 
 
-def merged(path: Path, fresh: dict[str, Any]) -> list[dict[str, Any]]:
-    """The rows of the table at `path`, one of them replaced or added, in the order of CASES."""
-    rows = {}
-    if path.exists():
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = {line["case"]: line for line in csv.DictReader(file)}
-    rows[fresh["case"]] = fresh
-    return [rows[name] for name in CASES if name in rows]
+def read(path: Path) -> dict[str, dict[str, Any]]:
+    """Case → row of the table at `path`, nothing where there is none."""
+    if not path.exists():
+        return {}
+    with open(path, newline="", encoding="utf-8") as file:
+        return {line["case"]: line for line in csv.DictReader(file)}
 
 
 def main() -> None:
@@ -113,13 +108,16 @@ def main() -> None:
     require_ccx()
     spec = load_stage(chosen.stage)
     for name in chosen.cases or CASES:
-        fresh = row(CASES[name], spec, chosen.work)
-        print(f"{name}: {fresh['secant_N_per_mm_um']} N/(mm µm), {fresh['seconds']} s", file=sys.stderr, flush=True)
-        table = merged(chosen.out, fresh)
+        table = read(chosen.out)
+        known = None if chosen.cases else table.get(name)
+        fresh = row(CASES[name], spec, chosen.work, known)
+        kept = "of the same deck" if fresh is known else f"{fresh['seconds']} s"
+        print(f"{name}: {fresh['secant_N_per_mm_um']} N/(mm µm), {kept}", file=sys.stderr, flush=True)
+        table[name] = fresh
         with written_whole(chosen.out) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(fresh), lineterminator="\n")
             writer.writeheader()
-            writer.writerows(table)
+            writer.writerows(table[name] for name in CASES if name in table)
 
 
 if __name__ == "__main__":

@@ -7,8 +7,8 @@ Bores averaged: their mean displacement and rotation are prescribed (as `gearfmu
 positions.csv. Clamped: all nodes of a bore move as one rigid body, in both codes (`rigid_bores.py`: minutes before the
 first run), into positions_clamped.csv. The pinion is turned to where gearfmu expects the torque; from the torque that
 comes out (within a few per cent) te is moved to the one asked by gearfmu's tangent stiffness. Where ccx ends with teeth
-that stick, or goes round in circles, te is moved by up to 2 % and solved again. What the table has is not run again
-unless its position is named.
+that stick, or goes round in circles, te is moved by up to 2 % and solved again. A position whose deck is that of the
+table is not run again unless it is named; its te is moved by the tangent stiffness of today.
 `--compare` runs nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute
 to some minutes a run.
 """
@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from case import Case, Load, Solution, solve
+from case import Case, Load, Solution, digest, prepared, solve
 from ccx import first_solved, require_ccx
 from rigid_bores import rigid_bore_bodies
 from section import Fineness
@@ -75,30 +75,42 @@ def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> C
     return Case("positions", bores=bores, fine=fine, penalty=PENALTY)
 
 
-def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path) -> dict[str, Any]:
-    """The table's row of one torque and position."""
+def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+    """The table's row of one torque and position, made by running it unless `known` comes from the same deck."""
     torque, position = place.torque, place.position
     pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
-    turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
     folder = work / f"position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
     case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)
 
-    def attempt(nudge: float) -> tuple[Load, Solution]:
-        load = Load(turn, nudge * ours.te[row, position], MARGIN)
-        return load, solve(case, pair, width, [load], folder)
+    def load_of(te_um: float) -> Load:
+        return Load(2 * math.pi / pair.gears[0].z * position / POSITIONS, 1e-6 * te_um, MARGIN)
 
-    load, solution = first_solved(NUDGES, attempt)
-    force, wheel = solution.line_load[0] * width
-    te = load.te + (torque / pair.gears[0].r_b - force) / ours.mesh_stiffness[row, position]
-    return {
-        "torque_Nm": f"{torque:g}",
-        "position": f"{position / POSITIONS:.6f}",
-        "te_um": f"{1e6 * te:.4f}",
-        "solved_te_um": f"{1e6 * load.te:.4f}",
-        "solved_torque_Nm": f"{force * pair.gears[0].r_b:.3f}",
-        "wheel_torque_over_ratio_Nm": f"{wheel * pair.gears[0].r_b:.3f}",
-        "seconds": f"{solution.seconds:.0f}",
-    }
+    def attempt(nudge: float) -> tuple[float, Solution]:
+        te_um = round(1e6 * nudge * ours.te[row, position], 4)
+        return te_um, solve(case, pair, width, [load_of(te_um)], folder)
+
+    def of_same_deck(row: dict[str, Any]) -> bool:
+        deck, _ = prepared(case, pair, width, load_of(float(row["solved_te_um"])), folder)
+        return digest(deck) == row["deck_sha256"]
+
+    if known and of_same_deck(known):
+        found = known
+    else:
+        te_um, solution = first_solved(NUDGES, attempt)
+        force, wheel = solution.line_load[0] * width
+        found = {
+            "torque_Nm": f"{torque:g}",
+            "position": f"{position / POSITIONS:.6f}",
+            "te_um": "",
+            "solved_te_um": f"{te_um:.4f}",
+            "solved_torque_Nm": f"{force * pair.gears[0].r_b:.3f}",
+            "wheel_torque_over_ratio_Nm": f"{wheel * pair.gears[0].r_b:.3f}",
+            "seconds": f"{solution.seconds:.0f}",
+            "deck_sha256": digest(folder / "load_0.inp"),
+        }
+    missing = (torque - float(found["solved_torque_Nm"])) / pair.gears[0].r_b
+    te = float(found["solved_te_um"]) + 1e6 * missing / ours.mesh_stiffness[row, position]
+    return {**found, "te_um": f"{te:.4f}"}
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -152,15 +164,17 @@ def main() -> None:
     if chosen.compare:
         return compare(1e6 * ours.te, rows)
     require_ccx()
-    done, failed = {_place(row) for row in rows}, []
+    failed = []
     for torque in chosen.torque or TORQUES:
-        for position in chosen.positions or [k for k in range(POSITIONS) if (torque, k) not in done]:
+        for position in chosen.positions or range(POSITIONS):
+            place = Place(torque, position, chosen.bores, chosen.increments)
+            known = next((row for row in rows if _place(row) == (torque, position)), None)
             try:
-                fresh = solved(spec, ours, Place(torque, position, chosen.bores, chosen.increments), chosen.work)
+                fresh = solved(spec, ours, place, chosen.work, None if chosen.positions else known)
             except RuntimeError as failure:
                 failed.append(f"{torque:g} N·m, position {position}: {failure}")
                 continue
-            rows = [row for row in rows if _place(row) != (torque, position)] + [fresh]
+            rows = [row for row in rows if row is not known] + [fresh]
             write(out, rows)
             print(f"{torque:g} N·m, position {position}: {fresh['te_um']} µm", file=sys.stderr, flush=True)
     if failed:
