@@ -29,7 +29,9 @@ enum {
     NAME_LENGTH = 32,
     MAX_NODES = GK_HIGH_NODES, /* of a flank along or across */
     MAX_FLANK_ROLLS = 1025,
-    MAX_FLANK_PLACES = 129
+    MAX_FLANK_PLACES = 129,
+    SMEARED_ROLLS = 9, /* places of gk_gear.smeared */
+    SMEARED_DISTANCES = 17
 };
 
 /* what the outputs tell of a gear's own motion; name NULL: nothing */
@@ -57,6 +59,7 @@ typedef struct gk_gear {
     double z_mid, helix;                      /* axial place of mid-width; base helix angle, right-hand positive */
     int rotor, z, modes;
     int points, low, mirrored; /* where rows are stored; modes of nodal diameter 0 and 1; flank 1 is the image of 0 */
+    const double *smeared;     /* (rolls, distances, functions, functions) 1/m (gk_slices.c); NULL: not known */
     int nodes[2];              /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta;
     const double *resample;              /* (rolls, points) weights of the points on the even grid of rolls */

@@ -215,6 +215,7 @@ void gk_model_gear(gk_reader *r, gk_model *m, int i)
     if (!r->outcome) check_modes(r, g);
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
+    if (!r->outcome) g->smeared = gk_read_bounded(r, F_GEAR_smeared, 1e9);
     if (!r->outcome) read_lead(r, g);
     if (!r->outcome) read_flanks(r, g);
     if (!r->outcome) read_observed(r, m, g);

@@ -31,6 +31,7 @@
 #include "setup/gk_block.c"
 #include "setup/gk_node.c"
 #include "setup/gk_grounded.c"
+#include "setup/gk_slices.c"
 #include "setup/gk_residual.c"
 #include "setup/gk_tables.c"
 #include "setup/gk_moves.c"

@@ -237,6 +237,7 @@ static double corner_roll(const gk_node *n, const gk_spot *p)
 static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int strip)
 {
     p->z = mesh->strip_middle[strip];
+    p->length = n->e->width / n->setup->slices;
     memcpy(p->width, n->weight[strip], sizeof p->width);
     if (n->e->kind == MESH_FLAT || n->gear->helix == 0.0) return;
     const int own = n->side->which, internal = n->e->kind == MESH_INTERNAL;
@@ -249,6 +250,7 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
     const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;
     const double middle = gk_clamp(part.middle, low, high);
     p->z = part.middle;
+    p->length = 2.0 * half;
     gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
 }
 

@@ -11,7 +11,7 @@ typedef struct gk_spot { /* a candidate's strip at a node */
     int flank, offset;
     gk_grid grid;                   /* of where contact is */
     double middle, nominal, roll;   /* length of roll on the line of action at mid-width, here; where contact is */
-    double z, width[MAX_FUNCTIONS]; /* middle of the part that carries; its weights on the width functions */
+    double z, length, width[MAX_FUNCTIONS]; /* part that carries: middle, length, weights on the width functions */
 } gk_spot;
 
 typedef struct gk_node { /* what a node's tables are made from */

@@ -1,6 +1,7 @@
 /* Compliance of what is not dynamic between the points of a node: of the gear group by the tables of its body less what
  * its dynamic modes carry, then what ground oscillators and supports yield. */
 #include "setup/gk_residual.h"
+#include "setup/gk_slices.h"
 
 static size_t most_lanes(const gk_gear *gear) { return 2 * ((size_t)gear->modes + LANES); }
 
@@ -96,10 +97,11 @@ static void gather_block(const gk_residual *r, const gk_node *n, int at, int hal
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
     double cell[MAX_BLOCK];
-    const int near = tabulated(n, p, q, cell);
+    const int near = tabulated(n, p, q, cell), own = p == q && n->gear->smeared;
     for (int c = 0; c < square; c++) {
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = (size_t)i * (size_t)n->points + (size_t)j;
+        if (own) cell[c] += gk_slices_local(n, &n->at[i], &n->at[j]);
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
         if (p == q && !halfway) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
         if (p == q && j > i) continue; /* it is symmetric */
