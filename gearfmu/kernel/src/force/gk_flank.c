@@ -70,8 +70,25 @@ static void take_deviations(const gk_posed *q, const gk_place *p, int strip, gk_
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
-/* Every strip by itself, in the middle of its part that carries; 0 when none comes within `search_distance`. Strips of
- * spur teeth with the same deviations have one section. */
+/* The section of a part that carries: that of the flank, and what the gap grows past the tip edges in its ends, in the
+ * mean */
+static void section_of(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], const gk_part *part,
+                       gk_point *p, gk_touch *t)
+{
+    gk_section_at(q, f, roll, part->flank, p, t);
+    for (int i = 0; i < 2; i++) {
+        if (part->past[i] == 0.0) continue;
+        gk_point end;
+        gk_touch there;
+        const double gap = p->gap;
+        gk_section_at(q, f, roll, part->end[i], &end, &there);
+        p->gap += part->past[i] * (end.gap - gap);
+        for (int d = 0; d < POSE; d++) p->gradient[d] += part->past[i] * (end.gradient[d] - p->gradient[d]);
+    }
+}
+
+/* Every strip by itself, by its part that carries; 0 when none comes within `search_distance`. Strips of spur teeth
+ * with the same deviations have one section. */
 static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance,
                      gk_place *place)
 {
@@ -86,7 +103,7 @@ static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2]
         const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
         take_deviations(q, place, i, f);
         if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
-            gk_section_at(q, f, roll, part.middle, &plane, &t);
+            section_of(q, f, roll, &part, &plane, &t);
         *p = plane, depth[0] = f->depth[0], depth[1] = f->depth[1];
         lean(q, s->sg, &t, part.middle, p);
         if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, part.middle, p);

@@ -61,6 +61,15 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
         row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
 }
 
+/* Past a tip edge the gap grows as the square of the distance u from it: its mean over u from … to, as a share of what
+ * it is at `to`, times the part of `length` that lies there. */
+static double mean_past(double from, double to, double length)
+{
+    if (!(to > 0.0)) return 0.0;
+    from = gk_max(from, 0.0);
+    return (to - from > 0.0 ? (to - from) / length : 1.0) * (from * from + from * to + to * to) / (3.0 * to * to);
+}
+
 /* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks
  * and past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s +
  * sg z tan β_b, β_b of its own gear. */
@@ -72,20 +81,26 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
     static const double LEAST_SHARE = 0.02; /* of a strip that has left its flanks */
     const gk_engagement *e = &model->engagement[mesh->index];
     const double half = 0.5 * e->width / setup->slices, middle = mesh->strip_middle[strip];
-    double from = middle - half, to = middle + half;
+    double from = middle - half, to = middle + half, low = -INFINITY, high = INFINITY; /* low, high: tip edges */
     for (int w = 0; w < 2; w++) {
-        const double slope = sg * mesh->helix[w], last = model->gear[e->gear[w]].s_tip + mesh->past[w];
+        const double slope = sg * mesh->helix[w], edge = model->gear[e->gear[w]].s_tip - roll[w];
         if (slope == 0.0) continue;
-        const double end = (last - roll[w]) / slope;
+        const double end = (edge + mesh->past[w]) / slope;
         if ((slope > 0.0) == (w == 0 || e->kind != MESH_INTERNAL))
-            to = gk_min(to, end);
+            to = gk_min(to, end), high = gk_min(high, edge / slope);
         else
-            from = gk_max(from, end);
+            from = gk_max(from, end), low = gk_max(low, edge / slope);
     }
-    return (gk_part){
-        .middle = gk_clamp(0.5 * (from + to), middle - half, middle + half),
-        .share = gk_max((to - from) / (2.0 * half), LEAST_SHARE),
-    };
+    gk_part part = {.middle = gk_clamp(0.5 * (from + to), middle - half, middle + half),
+                    .share = gk_max((to - from) / (2.0 * half), LEAST_SHARE)};
+    const double length = 2.0 * half * part.share;
+    part.end[0] = part.middle - 0.5 * length, part.end[1] = part.middle + 0.5 * length;
+    part.flank = part.middle;
+    if (!(low < high)) return part; /* nothing of it is on both flanks anywhere */
+    part.flank = gk_clamp(part.middle, low, high);
+    part.past[0] = mean_past(low - part.end[1], low - part.end[0], length);
+    part.past[1] = mean_past(part.end[0] - high, part.end[1] - high, length);
+    return part;
 }
 
 /* The tip edge carries a line of contact on past the end of its flank: by the half-width of the load strip, over
