@@ -94,13 +94,13 @@ static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2]
 {
     const gk_flank_side *s = f->side;
     const int spur = q->mesh->helix[0] == 0.0 && q->mesh->helix[1] == 0.0;
-    const double *depth[2] = {NULL, NULL};
+    const double *depth[2] = {NULL, NULL}, overlap = f->closer - s->gap;
     gk_point plane;
     gk_touch t;
     place->gap = GK_OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
-        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
+        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, overlap, i);
         take_deviations(q, place, i, f);
         if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
             section_of(q, f, roll, &part, &plane, &t);
