@@ -202,7 +202,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "modes": ("", 1, 2000, "shipped stages store 400"),
     "carrier_modes": ("", 24, 2000, "shipped stages store 120"),
     "roll_points": ("", 4, 200, "shipped stages have 28"),
-    "width_functions": ("", 1, 20, "shipped stages have 5"),
+    "width_functions": ("", 1, 12, "shipped stages have 5"),
     "stored_to": ("Hz", 1, 1e9, "150 kHz suit shafts of 100 mm"),
     "length_unit": ("m", 1e-9, 1e3, '"1 mm" for a mesh in millimetres'),
     "force_unit": ("N", 1e-12, 1e12, '"1 N" for matrices in newtons'),

@@ -33,7 +33,7 @@ from gearfmu.stage.build.meshes import stage_sections, tooth_phases
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.nodal import nodal_sections
 from gearfmu.stage.build.observed import observed_number, observed_sections
-from gearfmu.stage.build.slices import smeared
+from gearfmu.stage.build.slices import smeared, smeared_tip
 from gearfmu.stage.build.spinning import turn_rates
 from gearfmu.stage.build.tables import ROLLS, stored_points
 from gearfmu.stage.build.teeth import gear_section, mismatches
@@ -100,6 +100,7 @@ def general_sections(
         sections |= deviation_sections(i, gear, shape)
         if not stage.even:
             sections[f"smeared{i}"] = smeared(gear, shape, degrees)
+            sections[f"smeared_tip{i}"] = smeared_tip(gear, shape, degrees)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)

@@ -12,6 +12,7 @@ import numpy as np
 
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
 from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import ShaftBody, Stage, SupportSpec, ToothedBody
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.stage.build.free import FreeBody, free_carrier, free_gear, free_shaft
@@ -66,9 +67,17 @@ def place_of(stage: Stage, support: SupportSpec) -> float:
 
 
 def width_degrees(stage: Stage, bodies: Sequence[Any]) -> np.ndarray:
-    """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width."""
+    """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width.
+    ModelError where bodies have more of them than the kernel takes."""
     count = min(body.width_functions for body in bodies)
-    return symmetric_functions(count) if stage.even else np.arange(min(count, MOST_FUNCTIONS))
+    degrees = symmetric_functions(count) if stage.even else np.arange(count)
+    if degrees.size > MOST_FUNCTIONS:
+        most = 2 * MOST_FUNCTIONS if stage.even else MOST_FUNCTIONS
+        raise ModelError(
+            f"bodies with {count} width functions: this stage takes at most {most}: set width_functions = {most} in "
+            "the body of one of its gears, and make that body again with `gearfmu reduce`"
+        )
+    return degrees
 
 
 def stage_layout(

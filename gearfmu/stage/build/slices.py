@@ -26,6 +26,17 @@ def smeared(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray) ->
     return between_functions(gear.face_width, gear.body.strip_half_width, shape.beta_b, arcs, degrees)
 
 
+def smeared_tip(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray) -> np.ndarray:
+    """The section "smeared_tip": (DISTANCES, A, A) 1/m to mirror images beyond the tip edge, at distances along the
+    profile that are squares of even steps, up to twice the length of the flank's profile."""
+    profile = abs(shape.s_tip**2 - shape.s_form**2) / (2 * shape.r_b)
+    z, first, z2, second = _quadrature(gear.face_width, degrees)
+    away = (z[:, None] - z2) / math.cos(shape.beta_b)
+    across = 2 * profile * np.linspace(0.0, 1.0, DISTANCES) ** 2
+    strip = gear.body.strip_half_width
+    return _turned_alike(np.array([first.T @ _of_strips(away, y, strip) @ second for y in across]), degrees)
+
+
 def between_functions(width: float, strip: float, helix: float, arcs: np.ndarray, degrees: np.ndarray) -> np.ndarray:
     """Mean of 1/distance (1/m) between the loads of two width functions, with both end faces as mirrors.
 
@@ -36,10 +47,7 @@ def between_functions(width: float, strip: float, helix: float, arcs: np.ndarray
     of profile per length of roll. degrees: (A,). Returns (R, DISTANCES, A, A) at distances from 0 to `width`; the place
     of higher z has the first function.
     """
-    (z, weight), (z2, weight2) = ((width / 2 * x, w / 2) for x, w in map(leggauss, POINTS))
-    highest = int(degrees.max())
-    first = legvander(2 * z / width, highest)[:, degrees] * weight[:, None]
-    second = legvander(2 * z2 / width, highest)[:, degrees] * weight2[:, None]
+    z, first, z2, second = _quadrature(width, degrees)
     away, mirrored = z[:, None] - z2, z[:, None] + z2
     result = np.empty((len(arcs), DISTANCES, len(degrees), len(degrees)))
     for r, slope in enumerate(arcs * math.tan(helix)):
@@ -47,13 +55,28 @@ def between_functions(width: float, strip: float, helix: float, arcs: np.ndarray
             across = slope * (apart - away)
             along = np.stack([away, mirrored - width, mirrored + width]) / math.cos(helix)
             result[r, d] = first.T @ _of_strips(along, across, strip).sum(axis=0) @ second
-    return result
+    return _turned_alike(result, degrees)
 
 
-def _of_strips(x: np.ndarray, y: np.ndarray, strip: float) -> np.ndarray:
+def _turned_alike(table: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """Half a turn exchanges both places and their functions; quadrature alone does not keep this to the last bit."""
+    sign = (-1.0) ** degrees
+    return (table + np.swapaxes(table, -1, -2) * sign[:, None] * sign) / 2
+
+
+def _quadrature(width: float, degrees: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Places across the width and densities there times weights of quadrature, (n,) and (n, A), for two loads."""
+    result: list[np.ndarray] = []
+    for count in POINTS:
+        x, weight = leggauss(count)
+        result += [width / 2 * x, legvander(x, int(degrees.max()))[:, degrees] * weight[:, None] / 2]
+    return tuple(result)
+
+
+def _of_strips(x: np.ndarray, y: np.ndarray | float, strip: float) -> np.ndarray:
     """Mean of 1/√(x² + (y + t)²) over the t between two points of ±strip: a second difference."""
 
-    def twice(v: np.ndarray) -> np.ndarray:
+    def twice(v: np.ndarray | float) -> np.ndarray:
         return v * np.arcsinh(v / np.abs(x)) - np.hypot(x, v)
 
     return (twice(y + 2 * strip) - 2 * twice(y) + twice(y - 2 * strip)) / (4 * strip**2)

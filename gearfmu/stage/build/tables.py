@@ -55,12 +55,12 @@ def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def symmetric_functions(count: int) -> np.ndarray:
-    """Degrees of the Legendre functions that a load symmetric about mid-width can excite, at most MOST_FUNCTIONS.
+    """Degrees of the Legendre functions that a load symmetric about mid-width can excite.
 
     A spur pair without lead modification loads its slices symmetrically: odd functions and antisymmetric modes stay
     at rest exactly.
     """
-    return np.arange(0, count, 2)[:MOST_FUNCTIONS]
+    return np.arange(0, count, 2)
 
 
 def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:

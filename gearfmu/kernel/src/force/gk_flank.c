@@ -70,20 +70,19 @@ static void take_deviations(const gk_posed *q, const gk_place *p, int strip, gk_
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
-/* The section of a part that carries: that of the flank, and what the gap grows past the tip edges in its ends, in the
- * mean */
+/* The section of a part that carries: that of the flank nearest to its middle, and in the mean what the gap grows past
+ * the tip edges at its ends */
 static void section_of(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], const gk_part *part,
                        gk_point *p, gk_touch *t)
 {
     gk_section_at(q, f, roll, part->flank, p, t);
+    const double gap = p->gap;
     for (int i = 0; i < 2; i++) {
         if (part->past[i] == 0.0) continue;
         gk_point end;
         gk_touch there;
-        const double gap = p->gap;
         gk_section_at(q, f, roll, part->end[i], &end, &there);
         p->gap += part->past[i] * (end.gap - gap);
-        for (int d = 0; d < POSE; d++) p->gradient[d] += part->past[i] * (end.gradient[d] - p->gradient[d]);
     }
 }
 
@@ -94,13 +93,13 @@ static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2]
 {
     const gk_flank_side *s = f->side;
     const int spur = q->mesh->helix[0] == 0.0 && q->mesh->helix[1] == 0.0;
-    const double *depth[2] = {NULL, NULL}, overlap = f->closer - s->gap;
+    const double *depth[2] = {NULL, NULL};
     gk_point plane;
     gk_touch t;
     place->gap = GK_OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
-        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, overlap, i);
+        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
         take_deviations(q, place, i, f);
         if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
             section_of(q, f, roll, &part, &plane, &t);

@@ -60,6 +60,7 @@ typedef struct gk_gear {
     int rotor, z, modes;
     int points, low, mirrored; /* where rows are stored; modes of nodal diameter 0 and 1; flank 1 is the image of 0 */
     const double *smeared;     /* (rolls, distances, functions, functions) 1/m (gk_slices.c); NULL: not known */
+    const double *smeared_tip; /* (distances, functions, functions) */
     int nodes[2];              /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta;
     const double *resample;              /* (rolls, points) weights of the points on the even grid of rolls */

@@ -216,6 +216,7 @@ void gk_model_gear(gk_reader *r, gk_model *m, int i)
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
     if (!r->outcome) g->smeared = gk_read_bounded(r, F_GEAR_smeared, 1e9);
+    if (!r->outcome) g->smeared_tip = gk_read_bounded(r, F_GEAR_smeared_tip, 1e9);
     if (!r->outcome) read_lead(r, g);
     if (!r->outcome) read_flanks(r, g);
     if (!r->outcome) read_observed(r, m, g);

@@ -244,7 +244,7 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
     double roll[2];
     roll[own] = p->middle;
     roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
-    const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, INFINITY, strip);
+    const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, strip);
     if (part.share >= 1.0) return;
     const double slice = n->e->width / n->setup->slices, half = 0.5 * part.share * slice;
     const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;

@@ -9,8 +9,8 @@
 
 typedef struct gk_spot { /* a candidate's strip at a node */
     int flank, offset;
-    gk_grid grid;                   /* of where contact is */
-    double middle, nominal, roll;   /* length of roll on the line of action at mid-width, here; where contact is */
+    gk_grid grid;                 /* of where contact is */
+    double middle, nominal, roll; /* length of roll on the line of action at mid-width, here; where contact is */
     double z, length, width[MAX_FUNCTIONS]; /* part that carries: middle, length, weights on the width functions */
 } gk_spot;
 

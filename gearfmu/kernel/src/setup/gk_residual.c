@@ -9,7 +9,8 @@ size_t gk_residual_size(const gk_model *model, const gk_gear *gear, size_t point
 {
     GK_ASSERT(model && gear);
     const size_t square = points * points, along = model->rubbing ? 2 * square : 0;
-    return 2 * square + along + (2 * points + 1) * most_lanes(gear) + points * (size_t)gk_padded(gk_node_motions(gear));
+    return 2 * square + along + MAX_SLICES * MAX_SLICES + (2 * points + 1) * most_lanes(gear) +
+           points * (size_t)gk_padded(gk_node_motions(gear));
 }
 
 double *gk_residual_begin(gk_residual *r, const gk_node *n, double *room)
@@ -24,6 +25,8 @@ double *gk_residual_begin(gk_residual *r, const gk_node *n, double *room)
     r->middle = room, room += points * lanes;
     r->share = room, room += points * lanes;
     r->square = room, room += lanes;
+    r->patches = room, room += MAX_SLICES * MAX_SLICES;
+    if (n->gear->smeared) gk_slices_fill(n, r->patches);
     r->loaded = room, room += points * (size_t)gk_padded(gk_node_motions(n->gear));
     for (int k = 0; k < m->n; k++) r->square[k] = m->omega2[k] > 0 ? (double)m->omega2[k] : 1.0;
     return room;
@@ -91,17 +94,29 @@ static double carried_halfway(const gk_residual *r, const gk_node *n, int i, int
     return sum_of(lane);
 }
 
+/* to the compliance of a candidate by itself, (strips, strips) */
+static void add_local(const gk_residual *r, const gk_node *n, int candidate, double *cell)
+{
+    const int strips = n->setup->strips, first = candidate * strips;
+    for (int s = 0; s < strips; s++)
+        for (int t = 0; t <= s; t++) {
+            const double local = gk_slices_local(n, r->patches, first + s, first + t);
+            cell[s * strips + t] += local;
+            if (t < s) cell[t * strips + s] += local;
+        }
+}
+
 /* Two candidates. Of a tooth with itself what no stored mode carries, too: what its damper is parallel to. */
 static void gather_block(const gk_residual *r, const gk_node *n, int at, int halfway, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
     double cell[MAX_BLOCK];
-    const int near = tabulated(n, p, q, cell), own = p == q && n->gear->smeared;
+    const int near = tabulated(n, p, q, cell);
+    if (p == q && n->gear->smeared) add_local(r, n, p, cell);
     for (int c = 0; c < square; c++) {
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = (size_t)i * (size_t)n->points + (size_t)j;
-        if (own) cell[c] += gk_slices_local(n, &n->at[i], &n->at[j]);
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
         if (p == q && !halfway) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
         if (p == q && j > i) continue; /* it is symmetric */

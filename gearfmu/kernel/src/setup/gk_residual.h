@@ -12,6 +12,7 @@ typedef struct gk_residual {
     double *whole, *taken;  /* (points, points): of the gear group, all of it; what its dynamic modes carry of that */
     double *normal, *along; /* with friction: normal displacement and that along the profile by force along it */
     double *middle, *share; /* (points, lanes): rows halfway to the next node times 2, and a quarter of that */
+    double *patches;        /* (strips, strips): gk_slices_fill */
     double *square;         /* (lanes): ω² of the dynamic modes, 1 in padding */
     double *loaded;         /* (points, stride): what the ground oscillators yield under a load at every point */
 } gk_residual;

@@ -142,7 +142,6 @@ typedef struct gk_mesh { /* an engagement */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
     double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
-    double growth[2];              /* corner gap there per square of that length (1/m) */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
     gk_deviation deviation[2];     /* of gear A and of gear B, by strip */
     double protrusion;             /* what places of teeth and flanks may close of a gap, m */
@@ -322,7 +321,7 @@ void gk_runout_follow(const double *turn, double *motion);
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
-                       const double roll[2], double overlap, int strip);
+                       const double roll[2], int strip);
 void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
 /* entries of whole quads that hold n */
 static inline int gk_padded(int n)

@@ -3,6 +3,8 @@
 #define GK_SLICES_H
 #include "setup/gk_node.h"
 
-/* m/N, between two slices of one flank: that of their own patches less that of their width functions */
-GK_HOT double gk_slices_local(const gk_node *n, const gk_spot *p, const gk_spot *q);
+/* patches (strips, strips): of whole slices */
+GK_HOT void gk_slices_fill(const gk_node *n, double *patches);
+/* m/N, between two points of one flank: that of their patches less that of their width functions */
+GK_HOT double gk_slices_local(const gk_node *n, const double *patches, int i, int j);
 #endif

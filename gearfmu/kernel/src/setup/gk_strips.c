@@ -70,19 +70,11 @@ static double mean_past(double from, double to, double length)
     return (to - from > 0.0 ? (to - from) / length : 1.0) * (from * from + from * to + to * to) / (3.0 * to * to);
 }
 
-/* how far past a tip edge teeth touch that overlap by so much (m) */
-static double reach(const gk_mesh *mesh, int w, double overlap)
-{
-    static const double SHARE = 0.4; /* of the distance at which the corner gap is the overlap */
-    if (!(overlap < 1.0)) return mesh->past[w];
-    return copysign(gk_min(fabs(mesh->past[w]), sqrt(SHARE * gk_max(overlap, 0.0) / mesh->growth[w])), mesh->past[w]);
-}
-
 /* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks
- * and past their ends by their reach under an overlap (m), INFINITY: the farthest; of a strip that has left them the
- * end next to them. A roll at z is s + sg z tan β_b, β_b of its own gear. */
+ * and past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s +
+ * sg z tan β_b, β_b of its own gear. */
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
-                       const double roll[2], double overlap, int strip)
+                       const double roll[2], int strip)
 {
     GK_ASSERT(strip >= 0 && strip < setup->strips);
     GK_ASSERT(sg == 1.0 || sg == -1.0);
@@ -93,7 +85,7 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
     for (int w = 0; w < 2; w++) {
         const double slope = sg * mesh->helix[w], edge = model->gear[e->gear[w]].s_tip - roll[w];
         if (slope == 0.0) continue;
-        const double end = (edge + reach(mesh, w, overlap)) / slope;
+        const double end = (edge + mesh->past[w]) / slope;
         if ((slope > 0.0) == (w == 0 || e->kind != MESH_INTERNAL))
             to = gk_min(to, end), high = gk_min(high, edge / slope);
         else
@@ -121,21 +113,6 @@ static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_g
     const double span = fabs(helix) * e->width / setup->slices, least = 1e-6;
     const double outwards = gear->s_tip > gear->s_form ? 1.0 : -1.0;
     return outwards * gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
-}
-
-/* Corner gap past a tip edge per square of the roll past it: that of two circles, whose contact would lie s_tip/r_b as
- * far along the profile */
-static double growth(const gk_model *model, const gk_engagement *e, int w)
-{
-    const gk_gear *tip = &model->gear[e->gear[w]];
-    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
-    const double R = gk_base_reach(model, e), L = sqrt(gk_max(x * x + y * y - R * R, 0.0)), along = tip->s_tip / tip->r_b;
-    double curvature = 1.0 / tip->s_tip;
-    if (e->kind != MESH_INTERNAL)
-        curvature += 1.0 / gk_max(L - tip->s_tip, 1e-4);
-    else
-        curvature = fabs(curvature - 1.0 / gk_max(w ? tip->s_tip - L : tip->s_tip + L, 1e-4));
-    return gk_max(0.5 * curvature * along * along, 1e-3);
 }
 
 /* a gear's lead at x, −1 … 1 of its half-width */
@@ -197,7 +174,6 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
         const gk_gear *gear = &model->gear[e->gear[w]];
         mesh->helix[w] = tan_of(gear->helix);
         mesh->past[w] = past_end(setup, e, gear, mesh->helix[w]);
-        mesh->growth[w] = e->kind == MESH_FLAT ? 1.0 : growth(model, e, w);
         mesh->strip_term += gear->local * (gk_log(4.0 * gear->strip) - 1.0);
     }
 }
