@@ -3,8 +3,6 @@
  * that a flank is near a load the patches of the slices take the place of these. End faces and tip edge are mirrors. */
 #include "setup/gk_slices.h"
 
-static const double TIP =
-    0.6; /* weight of images beyond the tip edge: between none and a tooth that ends square there */
 static const double FAR_OFF = 4.0; /* half-widths of a strip from which on its image is a line */
 
 /* ---- mean of 1/distance ------------------------------------------------------------------------------------------ */
