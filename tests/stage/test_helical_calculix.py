@@ -40,22 +40,24 @@ def compared(bodies: list[Any], table: str) -> list[dict[str, Any]]:
     return found
 
 
-def test_on_one_layer_an_element(bodies: list[Any]) -> None:
-    """Mean transmission error within 4 %. Share of the load on a layer, of the largest share: within 3 % where all
-    lines of contact cross the whole width, within 9 % where a line ends at the pinion's tip edge. At the wheel's
-    tip edge, position 0, CalculiX's layers are too coarse (30 %, next test)."""
+def test_one_layer_an_element_mean_te_within_4_percent_and_whole_lines_within_4(bodies: list[Any]) -> None:
+    """Share of the load on a layer, of the largest: within 4 % where all lines of contact cross the whole width and 9 %
+    where a line ends at the pinion's tip edge. At the wheel's, position 0, CalculiX's layers are too coarse (30 %)."""
     rows = compared(bodies, "helical.csv")
     assert {"parallel", "tilted"} == {row["load"][0] for row in rows}
     for load in {row["load"] for row in rows}:
         here = [row for row in rows if row["load"] == load]
         assert np.mean([row["our_te"] for row in here]) == pytest.approx(np.mean([row["te"] for row in here]), rel=0.04)
     for row in rows:
-        assert row["off"] < {0.0: 0.3, 0.25: 0.03, 0.5: 0.08, 0.75: 0.09}[row["position"]]
+        assert row["off"] < {0.0: 0.3, 0.25: 0.04, 0.5: 0.08, 0.75: 0.09}[row["position"]]
 
 
-def test_on_fine_layers_where_lines_of_contact_end(bodies: list[Any]) -> None:
-    """Elements of 0.6 mm there instead of 2.4 mm: shares within 12 % of the largest, transmission error within 2 %."""
+def test_fine_layers_te_within_2_percent_peak_to_peak_10_and_layer_loads_8(bodies: list[Any]) -> None:
+    """Elements of 0.6 mm where lines of contact end, instead of 2.4 mm."""
     rows = compared(bodies, "helical_fine.csv")
-    assert {(row["load"][1], row["position"]) for row in rows} >= {(40.0, 0.0), (110.0, 0.5)}
+    for torque in (40.0, 110.0):
+        here = [row for row in rows if row["load"][1] == torque]
+        assert [row["position"] for row in sorted(here, key=lambda row: row["position"])] == [0.0, 0.25, 0.5, 0.75]
+        assert np.ptp([row["our_te"] for row in here]) == pytest.approx(np.ptp([row["te"] for row in here]), rel=0.1)
     for row in rows:
-        assert row["off"] < 0.12 and row["our_te"] == pytest.approx(row["te"], rel=0.02)
+        assert row["off"] < 0.08 and row["our_te"] == pytest.approx(row["te"], rel=0.02)

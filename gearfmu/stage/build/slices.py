@@ -1,4 +1,4 @@
-"""What width functions make of the load of a slice near it (docs/theory.md, eq. 8h).
+"""What width functions make of the load of a slice near it (docs/theory.md, eq. 8g′).
 
 The body's tables know a load across the width by a few polynomials at one length of roll, so a slice's load is smeared
 over much of the width. Near the load a flank is a half-space. There the mean of 1/distance between two smeared loads is
@@ -17,6 +17,7 @@ from gearfmu.spec.tables.gear import GearSpec
 
 ROLLS, DISTANCES = 9, 17  # places of the table: mean length of roll, distance of the slices
 POINTS = (40, 56)  # of quadrature across the width; unlike, so that no two coincide where 1/r is infinite
+GRADED = 40  # of quadrature over the distance along the line, dense as its cube where 1/r is infinite
 
 
 def smeared(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray) -> np.ndarray:
@@ -48,13 +49,15 @@ def between_functions(width: float, strip: float, helix: float, arcs: np.ndarray
     of higher z has the first function.
     """
     z, first, z2, second = _quadrature(width, degrees)
-    away, mirrored = z[:, None] - z2, z[:, None] + z2
+    away, mirrored = z[:, None] - z2, np.stack([z[:, None] + z2 - width, z[:, None] + z2 + width]) / math.cos(helix)
+    apart, weight = _graded(width)
+    shared = weight[:, None, None] * _correlation(width, apart, degrees)
     result = np.empty((len(arcs), DISTANCES, len(degrees), len(degrees)))
     for r, slope in enumerate(arcs * math.tan(helix)):
-        for d, apart in enumerate(np.linspace(0.0, width, DISTANCES)):
-            across = slope * (apart - away)
-            along = np.stack([away, mirrored - width, mirrored + width]) / math.cos(helix)
-            result[r, d] = first.T @ _of_strips(along, across, strip).sum(axis=0) @ second
+        for d, distance in enumerate(np.linspace(0.0, width, DISTANCES)):
+            mean = _of_strips(apart / math.cos(helix), slope * (distance - apart), strip)
+            images = _of_strips(mirrored, slope * (distance - away), strip).sum(axis=0)
+            result[r, d] = np.tensordot(mean, shared, 1) + first.T @ images @ second
     return _turned_alike(result, degrees)
 
 
@@ -62,6 +65,24 @@ def _turned_alike(table: np.ndarray, degrees: np.ndarray) -> np.ndarray:
     """Half a turn exchanges both places and their functions; quadrature alone does not keep this to the last bit."""
     sign = (-1.0) ** degrees
     return (table + np.swapaxes(table, -1, -2) * sign[:, None] * sign) / 2
+
+
+def _graded(width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from −width to width and weights of quadrature, for functions that are infinite as a logarithm at 0."""
+    x, weight = leggauss(GRADED)
+    u = (x + 1) / 2
+    distance, weight = width * u**3, 3 * width * u**2 * weight / 2
+    return np.concatenate([-distance[::-1], distance]), np.concatenate([weight[::-1], weight])
+
+
+def _correlation(width: float, apart: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """(n, A, A) 1/m: ∫ P_a(2z/b) P_b(2(z − apart)/b) dz/b² over the z at which both places are on the width."""
+    highest = int(degrees.max())
+    x, weight = leggauss(highest + 1)
+    length, middle = width - np.abs(apart[:, None]), apart[:, None] / 2
+    z = middle + length / 2 * x
+    first, second = (legvander(2 * place / width, highest)[..., degrees] for place in (z, z - apart[:, None]))
+    return np.einsum("nq,nqa,nqb->nab", length / 2 * weight / width**2, first, second)
 
 
 def _quadrature(width: float, degrees: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -70,8 +70,8 @@ static void take_deviations(const gk_posed *q, const gk_place *p, int strip, gk_
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
-/* The section of a part that carries: that of the flank nearest to its middle, and in the mean what the gap grows past
- * the tip edges at its ends */
+/* The section of a part that carries: that of its place on the flank, and in the mean what the gap grows past the tip
+ * edges towards its ends */
 static void section_of(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], const gk_part *part,
                        gk_point *p, gk_touch *t)
 {

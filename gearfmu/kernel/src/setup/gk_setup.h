@@ -101,9 +101,9 @@ typedef struct gk_side {
 
 typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
     double middle, share; /* share: of the strip's length, never 0 */
-    double flank;         /* the place on both flanks that is nearest to its middle */
+    double flank;         /* its place on both flanks that is nearest to its middle, else the one next to them */
     double end[2];        /* its ends */
-    double past[2];       /* what of the corner gap at that end is the mean of the part past the edge; 0: on the flank */
+    double past[2];       /* share in its mean gap of what the gap grows from there to an end past a tip edge */
 } gk_part;
 
 typedef enum gk_friction_law { FRICTION_CONSTANT, FRICTION_BENEDICT_KELLEY, FRICTION_ISO_TR_14179 } gk_friction_law;

@@ -1,6 +1,7 @@
-/* What a slice yields beside its neighbours on one tooth, near its load (docs/theory.md, eq. 8h). Tables of compliance
- * know a slice's load by the width functions at one length of roll, so smeared over much of the width. On the half-space
- * that a flank is near a load the patches of the slices take the place of these. End faces and tip edge are mirrors. */
+/* What a slice yields beside its neighbours on one tooth, near its load (docs/theory.md, eq. 8g′). Tables of compliance
+ * know a slice's load by the width functions at one length of roll, so smeared over much of the width. On the half-
+ * space that a flank is near a load the patches of the slices take the place of these. End faces and tip edge are
+ * mirrors. */
 #include "setup/gk_slices.h"
 
 static const double FAR_OFF = 4.0; /* half-widths of a strip from which on its image is a line */
@@ -23,7 +24,7 @@ static double twofold(double x, double y)
     return x * gk_log((x + r) / y) - r;
 }
 
-/* between two patches ±strip wide: their half-lengths, their middles `apart` along the line of contact and `across` it */
+/* between two patches ±strip wide: half-lengths, middles `apart` along the line of contact and `across` it */
 static double between_patches(const double half[2], double apart, double across, double strip)
 {
     const int line = across > FAR_OFF * strip;

@@ -61,13 +61,14 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
         row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
 }
 
-/* Past a tip edge the gap grows as the square of the distance u from it: its mean over u from … to, as a share of what
- * it is at `to`, times the part of `length` that lies there. */
+/* Past a tip edge the gap grows as the square of the distance from it, here from … to. Its mean over a part of `length`
+ * that ends there, between what it is at the part's place on the flank, or next to it, and at the end. */
 static double mean_past(double from, double to, double length)
 {
     if (!(to > 0.0)) return 0.0;
+    const double share = from < 0.0 ? to / length : 1.0;
     from = gk_max(from, 0.0);
-    return (to - from > 0.0 ? (to - from) / length : 1.0) * (from * from + from * to + to * to) / (3.0 * to * to);
+    return share * (to + 2.0 * from) / (3.0 * (to + from));
 }
 
 /* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks
@@ -97,7 +98,7 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
     part.end[0] = part.middle - 0.5 * length, part.end[1] = part.middle + 0.5 * length;
     part.flank = part.middle;
     if (!(low < high)) return part; /* nothing of it is on both flanks anywhere */
-    part.flank = gk_clamp(part.middle, low, high);
+    part.flank = gk_clamp(gk_clamp(part.middle, low, high), part.end[0], part.end[1]);
     part.past[0] = mean_past(low - part.end[1], low - part.end[0], length);
     part.past[1] = mean_past(part.end[0] - high, part.end[1] - high, length);
     return part;
