@@ -90,9 +90,9 @@ def test_slices_yield_more_by_themselves_and_as_much_together() -> None:
     assert 1e9 * local * smeared[5, 5] == pytest.approx(2.74, abs=0.02)
 
 
-@pytest.mark.parametrize(("torque", "swing"), [(150.0, 0.05), (450.0, 0.2)])
+@pytest.mark.parametrize(("torque", "swing"), [(150.0, 0.1), (450.0, 0.2)])
 def test_te_hardly_depends_on_the_number_of_slices(torque: float, swing: float) -> None:
-    """5, 7 and 10 slices: mean within 0.3 %, peak to peak 5 and 20 %; by width functions alone 20 and 35 %."""
+    """5, 7 and 10 slices: mean within 0.3 %, peak to peak 10 and 20 %; by width functions alone 20 and 35 %."""
     found = [loaded_te(involute(), (torque,), 16, rigid_bearings=True, slices=float(n)).te[0] for n in (5, 7, 10)]
     means, swings = [te.mean() for te in found], [np.ptp(te) for te in found]
     print(means, swings)
