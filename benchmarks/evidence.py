@@ -9,7 +9,8 @@ evidence.json has one entry a target: `command`; `needs`, input → hash when th
 `makes`, file → hash; `made` (date), `minutes`, `ended` (last line that the command printed). Inputs: `kernel` (the
 golden digests of the shipped build: a rewrite that leaves all bits ages nothing), `stage NAME` (the assembled model,
 so stage file, bodies and assembly), `reduction` (the version of bodies), and files, by patterns. Comments and
-docstrings of Python files do not count. `kernel friction` is the golden runs with friction, which `kernel` leaves out.
+docstrings of Python files do not count. `kernel` leaves out the golden runs with friction, `kernel friction`, and those
+of stages whose slices have gaps of their own, as helical ones, `kernel slices`.
 A command that fails leaves its target stale.
 """
 
@@ -38,7 +39,8 @@ from gearfmu.stage.build.blob import rounded_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = "tests/reference/golden_runs.json"
-KERNEL = ("kernel", "kernel friction")
+KERNEL = ("kernel", "kernel friction", "kernel slices")
+SLICES = ("helical", "deviating", "train")  # in the names of golden runs
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 Entry = dict[str, Any]
 
@@ -68,10 +70,16 @@ def content(path: Path) -> bytes:
     return "\n".join(line for line in lines if line.strip()).encode()
 
 
-def golden_runs(path: Path, friction: bool) -> bytes:
-    """The golden digests of the shipped kernel's runs with friction, or of all others."""
+def golden_runs(path: Path, need: str) -> bytes:
+    """The golden digests of the shipped kernel's runs that one of KERNEL stands for."""
     runs = json.loads(path.read_bytes())["float"]
-    chosen = {name: bits for name, bits in runs.items() if ("friction" in name) == friction}
+
+    def of(name: str) -> str:
+        if any(word in name for word in SLICES):
+            return KERNEL[2]
+        return KERNEL["friction" in name]
+
+    chosen = {name: bits for name, bits in runs.items() if of(name) == need}
     return json.dumps(chosen, sort_keys=True).encode()
 
 
@@ -93,7 +101,7 @@ class Ledger:
         if need == "reduction":
             return f"version {ALGORITHM_VERSION}"
         if need in KERNEL:
-            return short(golden_runs(self.root / GOLDEN, need != KERNEL[0]))
+            return short(golden_runs(self.root / GOLDEN, need))
         paths = sorted(self.root.glob(need))
         return short(b"\0".join(content(path) for path in paths)) if paths else "missing"
 

@@ -95,7 +95,7 @@ def source_hash(files: Sequence[Path]) -> str:
 
 def fingerprint() -> str:
     """The kernel's part of the key of stored results, hex: the variable GEARFMU_BEHAVIOUR (`make evidence` sets it to
-    the hashes of the golden runs without and with friction, "+" between them, after it has checked them), else the
+    the hashes of the golden runs, those with friction and those with slices apart, after it has checked them), else the
     SHA-256 of the host's library."""
     return os.environ.get(BEHAVIOUR) or hashlib.sha256(library_path().read_bytes()).hexdigest()
 

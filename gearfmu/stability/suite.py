@@ -122,18 +122,19 @@ def _nothing(outcome: str, case: Case, message: str) -> Finding:
 
 
 def key_of(scene: str) -> str:
-    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`; its part behind "+" only where the scene has
-    friction) and what the scene is made from: the file of the scene and those of this package that it imports, the
-    assembled stages (bodies, damping, cuts), files of scenes.
+    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`; its parts behind "+" only where a scene has
+    friction, or slices with gaps of their own) and what the scene is made from: the file of the scene and those of
+    this package that it imports, the assembled stages (bodies, damping, cuts), files of scenes.
     """
     used, left = set[str](), [SCENES[scene].__module__.rpartition(".")[2]]
-    kernel, _, friction = fingerprint().partition("+")
+    kernel, friction, slices, *_ = [*fingerprint().split("+"), "", ""]
     while left:
         name = left.pop()
         if name not in used:
             used.add(name)
             left += re.findall(r"^from gearfmu\.stability\.(\w+) import", _source(name), flags=re.MULTILINE)
-    digest = hashlib.sha256((kernel + friction if used & RUBBING else kernel).encode())
+    parts = kernel, friction if used & RUBBING else "", slices if "trains" in used else ""
+    digest = hashlib.sha256("".join(parts).encode())
     for name in sorted(used):
         digest.update(_source(name).encode())
         digest.update(_made_from(name, (PLAIN, RELIEVED)).encode())
