@@ -110,12 +110,13 @@ def cases() -> Iterator[Case]:
     for name, slip in (("clutch_closure", "40 rad/s"), ("clutch_dump", "45 rad/s")):
         changes = {"start.slip": slip, "coupling.step": "50 us", "duration": "0.2 s"}
         yield Case("clutch", load_scene(name, changes))
+    closing = {"start.slip": "45 rad/s", "coupling.step": "50 us", "duration": "0.2 s"}
     for torque, rpm in ((100, 1500), (60, 2500), (160, 800)):
         yield Case("train", _rig(f"train_{torque}_{rpm}", torque, rpm, "two_stage"), ("te", "seat.pinion1.fx"))
     for stage in (("planetary54", 4, 450, 85), ("planetary54", 4, 200, 60), ("helical_set", 90 / 26, 400, 85)):
         yield Case("planetary", _set(*stage), SETS)
     yield Case("planetary", load_scene("planetary_backfire", {"shaft_loads.carrier.constant": "130 N*m"}), SETS)
-    yield Case("planetary", load_scene("planetary_closure", {"start.slip": "45 rad/s", "duration": "0.2 s"}), SETS)
+    yield Case("planetary", load_scene("planetary_closure", closing), SETS)
 
 
 def _rig(name: str, torque: float, rpm: float, stage: str = "fzg_c/stage_relief") -> SceneSpec:
