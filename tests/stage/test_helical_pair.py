@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from slices import by_functions_alone
 
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
@@ -147,12 +146,11 @@ def with_bearings(spec: StageSpec) -> StageSpec:
 def test_spur_gears_that_may_tilt_are_those_that_may_not(
     relief_spec: StageSpec, bodies: list[ReducedBody], level: float
 ) -> None:
-    """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give. What strips yield beside
-    their neighbours, which planar models leave out, moves the transmission error by less than 0.1 %."""
+    """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give."""
     planar = assemble(relief_spec.model_copy(update={"ports": HELD}), bodies)
     spatial = assemble(with_bearings(relief_spec), bodies)
     results = []
-    for model in (planar, by_functions_alone(spatial), spatial):
+    for model in (planar, spatial):
         kernel = model.kernel(level=level)
         kernel.set("pinion.tau", TORQUE)
         kernel.initialize()
@@ -161,7 +159,6 @@ def test_spur_gears_that_may_tilt_are_those_that_may_not(
         results.append([kernel.get(n) for n in ("mesh.te", "mesh.force", "bearing.pinion.fx", "bearing.wheel.fy")])
     print(results)
     assert results[1] == pytest.approx(results[0], rel=1e-6)
-    assert results[2] == pytest.approx(results[0], rel=1e-3)
 
 
 def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:

@@ -98,7 +98,7 @@ def general_sections(
         place = stage.place(gear.name, None)
         sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
         sections |= deviation_sections(i, gear, shape)
-        if not stage.even:
+        if shape.beta_b != 0.0:
             sections[f"smeared{i}"] = smeared(gear, shape, degrees)
             sections[f"smeared_tip{i}"] = smeared_tip(gear, shape, degrees)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
