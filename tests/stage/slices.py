@@ -9,6 +9,6 @@ from gearfmu.stage.build.blob import read_blob, write_blob
 
 
 def by_functions_alone(model: StageModel) -> StageModel:
-    """The model without what slices yield of their own near the load, as planar models are."""
+    """The model without what slices yield of their own near the load, as spur gears are."""
     sections = {name: value for name, value in read_blob(model.blob).items() if not name.startswith("smeared")}
     return replace(model, blob=write_blob(sections))

@@ -217,6 +217,7 @@ void gk_model_gear(gk_reader *r, gk_model *m, int i)
     if (!r->outcome) read_index(r, g);
     if (!r->outcome) g->smeared = gk_read_bounded(r, F_GEAR_smeared, 1e9);
     if (!r->outcome) g->smeared_tip = gk_read_bounded(r, F_GEAR_smeared_tip, 1e9);
+    if (!r->outcome && !g->smeared != !g->smeared_tip) gk_read_refuse(r, "loads of width functions", "are not whole");
     if (!r->outcome) read_lead(r, g);
     if (!r->outcome) read_flanks(r, g);
     if (!r->outcome) read_observed(r, m, g);

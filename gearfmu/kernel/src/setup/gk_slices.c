@@ -20,6 +20,7 @@ static double fourfold(double x, double y)
 /* ∫∫ dx dx, y > 0 */
 static double twofold(double x, double y)
 {
+    x = fabs(x);
     const double r = sqrt(x * x + y * y);
     return x * gk_log((x + r) / y) - r;
 }
