@@ -1,5 +1,6 @@
 """Coupled frequencies of the shipped train – elastic helical gears, elastic shafts, seats, bearings, ports, both
-meshes – against a linear model that shares nothing with the kernel but which slices carry load (`train_by_parts`)."""
+meshes – against a linear model that shares nothing with the kernel but which slices carry load (`train_by_parts`). It
+knows slices by their width functions; what they yield of their own is in tests/stage/test_slices.py."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from slices import by_functions_alone
 from train_by_parts import Load, frequencies
 
 from gearfmu.body import load_bodies
@@ -35,7 +37,7 @@ def plain(stage: Stage) -> Stage:
 @pytest.fixture(scope="module")
 def train() -> tuple[Stage, list[Any], StageModel]:
     stage, bodies = plain(load_stage("two_stage")), load_bodies(load_stage("two_stage"))
-    return stage, bodies, assemble(stage, bodies)
+    return stage, bodies, by_functions_alone(assemble(stage, bodies))
 
 
 def at(model: StageModel, position: float) -> tuple[Linearised, list[Load], dict[str, float]]:
