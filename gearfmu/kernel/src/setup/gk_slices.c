@@ -86,8 +86,7 @@ static void blend_smeared(const gk_gear *gear, int cells, const gk_spot *high, c
     const double x = u - i, y = v - j, z = w - k;
     for (int c = 0; c < cells; c++)
         out[c] = (1.0 - x) * ((1.0 - y) * at[c] + y * at[cells + c]) +
-                 x * ((1.0 - y) * at[row + c] + y * at[row + cells + c]) +
-                 (1.0 - z) * tip[c] + z * tip[cells + c];
+                 x * ((1.0 - y) * at[row + c] + y * at[row + cells + c]) + (1.0 - z) * tip[c] + z * tip[cells + c];
 }
 
 /* ---- what slices yield ------------------------------------------------------------------------------------------- */
