@@ -1,15 +1,15 @@
 """Helical gears against CalculiX: loaded transmission error, load over the width, one pair with a tilted axis.
 
-    python benchmarks/calculix/helical.py [POSITION …] [--torque T …] [--tilted] [--fine] [--work DIR] [--compare]
+    python benchmarks/calculix/helical.py [CASE …] [--work DIR] [--out helical.csv] [--compare]
 
-The pair is `helical_demo` with 12 mm of width (overlap ratio 0.58) and without modifications. Both gears are whole and
-twisted, with quadratic elements and five layers across the width; fine zones follow the slanting lines of contact. Both
-codes have rigid bores that are held. --tilted: the wheel's axis turned by 1 µm over 1 mm across the
-line of centres. The way to the torque asked is that of positions.py. Table: helical.csv beside this file, one row a
-solution with the load share of every layer in both codes; what it has is not run again unless its position is named.
---fine: layers have elements of 0.6 mm where a line of contact ends at a tip edge inside the width (table:
-helical_fine.csv). The bodies are reduced into the work folder first (some minutes). `--compare` runs nothing. Needs
-CalculiX's ccx; a minute or two a run, fine ones up to five.
+The pair is `helical_demo` with 12 mm of width, without modifications (overlap ratio 0.58), and the same teeth with a
+helix angle of 30° (0.85). CASES are helix angle, axes (`tilted`: the wheel's axis turned by 1 µm over 1 mm across the
+line of centres), torque on the pinion and positions. Both gears are whole and twisted, with quadratic elements in five
+layers across the width; fine zones follow the slanting lines of contact, and layers where a line ends at a tip edge
+have elements of 0.6 mm. Both codes have rigid bores that are held. The way to the torque asked is that of positions.py.
+Table: helical.csv beside this file, one row a solution with the load share of every layer in both codes. A row of the
+same mesh at nearly its torque is not solved again: its error is computed anew. The bodies are reduced into the work
+folder first (some minutes). `--compare` runs nothing. Needs CalculiX's ccx; four to nine minutes a solution.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from case import digest
 from ccx import first_solved, require_ccx, run_deck
 from deck import Problem
 from helical_section import Zone, twisted
@@ -44,14 +45,48 @@ from gearfmu.stage.run.te import TANGENT, place_of, statics_of  # noqa: E402
 
 WIDTH, LAYERS, SLICES = 12e-3, 5, 10
 POSITIONS = 4
-TORQUES = (40.0, 110.0)  # N·m on the pinion
 TILT = 1e-3  # rad, of the wheel's axis across the line of centres
 MARGIN = 0.4e-3  # m beyond the ends of the path where tooth pairs are still in the deck
 PATCH, ZONE = 1.5, Zone()  # half length of the fine zones in Hertz half-widths, elements
 MESH = MeshSpec(flank=14, thickness=4, root=5, rim=3, width=6)
 ROLLS, FUNCTIONS = 20, 6
-FINE = {0: (1, 2, 4, 4, 1), 1: (1,) * 5, 2: (1, 2, 4, 4, 1), 3: (4, 3, 1, 2, 4)}  # elements of each layer, by position
-TABLE = Path(__file__).with_suffix(".csv")
+NEAR = 0.05  # parts of the torque asked, up to which a solution's torque is carried to it
+HERE = Path(__file__).parent
+WHOLE = (1,) * LAYERS
+FINE = {  # elements of each layer by helix angle (degrees) and position: fine where lines of contact end
+    (20, 0): (1, 2, 4, 4, 1), (20, 1): WHOLE, (20, 2): (1, 2, 4, 4, 1), (20, 3): (4, 3, 1, 2, 4),
+    (30, 0): (1, 2, 4, 4, 1), (30, 1): (2, 4, 2, 4, 2), (30, 2): (2, 4, 4, 2, 1), (30, 3): (4, 2, 1, 2, 4),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """helix: degrees. axes: "parallel" or "tilted". torque: N·m on the pinion. position: of POSITIONS in a pitch."""
+
+    helix: int
+    axes: str
+    torque: float
+    position: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.helix}_{self.axes}_{self.torque:g}_{self.position}"
+
+    @property
+    def divisions(self) -> tuple[int, ...]:
+        """Elements of each layer."""
+        return FINE[self.helix, self.position]
+
+
+SOLVED = {
+    (20, "parallel", 40.0): (0, 1, 2, 3),
+    (20, "parallel", 110.0): (0, 1, 2, 3),
+    (20, "tilted", 40.0): (1,),
+    (20, "tilted", 110.0): (0, 1, 2, 3),
+    (30, "parallel", 110.0): (0, 1, 2, 3),
+    (30, "tilted", 110.0): (0, 2),
+}
+CASES = {case.name: case for load, places in SOLVED.items() for case in (Case(*load, place) for place in places)}
 
 
 @dataclass(frozen=True)
@@ -63,34 +98,38 @@ class Ours:
     share: np.ndarray
 
 
-def stage(tilted: bool) -> StageSpec:
-    """The pair of this comparison."""
+def stage(helix: int = 20, axes: str = "parallel") -> StageSpec:
+    """The pair of this comparison. Another helix angle keeps the normal section: teeth, depths and profile shifts."""
     demo = load_stage("helical_demo")
-    error = Misalignment(in_plane=0.0, out_of_plane=TILT * WIDTH, span=WIDTH) if tilted else None
+    error = Misalignment(in_plane=0.0, out_of_plane=TILT * WIDTH, span=WIDTH) if axes == "tilted" else None
+    beta = math.radians(helix)
+    wider = demo.pair.normal_module * (1 / math.cos(beta) - 1 / math.cos(demo.pair.helix_angle))  # a tooth's diameter
     gears = []
     for gear in demo.gears:
         body = gear.body.model_copy(update={"mesh": MESH, "roll_points": ROLLS, "width_functions": FUNCTIONS})
         changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body, "bore_coupling": "rigid"}
-        gears.append(gear.model_copy(update=changes))
-    pair = demo.pair.model_copy(update={"misalignment": error})
+        gears.append(gear.model_copy(update=changes | {"tip_diameter": gear.tip_diameter + gear.teeth * wider}))
+    distance = demo.pair.center_distance + sum(gear.teeth for gear in gears) * wider / 2
+    pair = demo.pair.model_copy(update={"misalignment": error, "helix_angle": beta, "center_distance": distance})
     return demo.model_copy(update={"gears": tuple(gears), "pair": pair})
 
 
-def bodies(work: Path) -> list[ReducedBody]:
+def bodies(work: Path, helix: int = 20) -> list[ReducedBody]:
     """The reduced gears with rigid bores, kept in the work folder."""
-    files, spec = [work / f"helical_{name}.h5" for name in ("pinion", "wheel")], stage(False)
+    files = [work / f"helical_{helix}_{name}.h5" for name in ("pinion", "wheel")]
     if not all(file.exists() for file in files):
         work.mkdir(parents=True, exist_ok=True)
-        for body, file in zip(bodies_of(spec), files, strict=True):
+        for body, file in zip(bodies_of(stage(helix)), files, strict=True):
             save_body(body, file)
     return [load_body(file) for file in files]
 
 
-def ours(spec: StageSpec, gears: list[ReducedBody], torque: float, position: int) -> Ours:
-    """The kernel's answer at a position (of POSITIONS) with bores held."""
+def ours(case: Case, gears: list[ReducedBody]) -> Ours:
+    """The kernel's answer with bores held."""
+    spec, torque = stage(case.helix, case.axes), case.torque
     model = assemble(spec, gears)
     kernel = statics_of(model, **{"effect.bearings": 0.0, "slices": float(SLICES)})
-    at = -position / POSITIONS * place_of(model, None).pitch
+    at = -case.position / POSITIONS * place_of(model, None).pitch
     state = kernel.transmission(at, torque)
     ends = [kernel.transmission(at, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
     slices = np.sum(list(state.forces.values()), axis=0).reshape(LAYERS, -1).sum(axis=1)
@@ -116,19 +155,20 @@ def levels_of(divisions: tuple[int, ...]) -> np.ndarray:
     return np.concatenate([*inner, ends[-1:]])
 
 
-def problem_at(spec: StageSpec, torque: float, position: int, te: float, divisions: tuple[int, ...]) -> Problem:
-    """The contact problem of a place."""
+def problem_at(case: Case, te: float) -> Problem:
+    """The contact problem of a case at the transmission error te (m)."""
+    spec = stage(case.helix, case.axes)
     pair = PairGeometry.of(spec)
-    turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
+    turn = 2 * math.pi / pair.gears[0].z * case.position / POSITIONS
     contacts = touching(pair, turn)
     steel = spec.gears[0].material
     e_star = hertz.contact_modulus((steel.youngs_modulus,) * 2, (steel.poisson_ratio,) * 2)
     radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
-    wide = hertz.half_width(torque / pair.gears[0].r_b / WIDTH, radius, e_star)
+    wide = hertz.half_width(case.torque / pair.gears[0].r_b / WIDTH, radius, e_star)
     fine = Fineness(
         patch=PATCH * wide, growth=2.0, thickness=2, depth_growth=2.6, rim=2, root=2, far_root=1, far_flank=1
     )
-    levels = levels_of(divisions)
+    levels = levels_of(case.divisions)
     solids = [
         twisted(gear, {teeth[g]: rolls[g] for teeth, rolls in contacts.items()}, levels, fine, ZONE).solid
         for g, gear in enumerate(pair.gears)
@@ -147,93 +187,107 @@ def problem_at(spec: StageSpec, torque: float, position: int, te: float, divisio
     )
 
 
-def solved(chosen: Any, gears: list[ReducedBody], torque: float, position: int) -> dict[str, Any]:
-    """The table's row of one place; te is moved by up to 2 % where ccx does not settle. chosen: tilted, fine, work."""
-    spec, tilted, work = stage(chosen.tilted), chosen.tilted, chosen.work
-    divisions = FINE[position] if chosen.fine else (1,) * LAYERS
-    mine, r_b = ours(spec, gears, torque, position), PairGeometry.of(spec).gears[0].r_b
-    folder = work / f"helical_{position}_{torque:g}{'_tilted' if tilted else ''}"
+def row(case: Case, gears: list[ReducedBody], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+    """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
+    2 % where ccx does not settle. RuntimeError when ccx gives up."""
+    mine, r_b = ours(case, gears), PairGeometry.of(stage(case.helix, case.axes)).gears[0].r_b
+    folder = work / f"helical_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "load_0.inp"
+    write_spatial_deck(problem_at(case, 0.0), deck)
+    mesh = digest(deck)
+    theirs = known if known and known["mesh_sha256"] == mesh and _near(known) else solution(case, mine.te, deck)
+    te, torque = 1e-6 * float(theirs["solved_te_um"]), float(theirs["solved_torque_Nm"])
+    found = {
+        "helix_deg": case.helix,
+        "axes": case.axes,
+        "torque_Nm": f"{case.torque:g}",
+        "position": f"{case.position / POSITIONS:.6f}",
+        "te_um": f"{1e6 * (te + (case.torque - torque) / r_b / mine.stiffness):.4f}",
+        "gearfmu_te_um": f"{1e6 * mine.te:.4f}",
+    }
+    found |= {f"gearfmu_share_{k + 1}": f"{value:.5f}" for k, value in enumerate(mine.share)}
+    return found | {name: value for name, value in theirs.items() if name not in found} | {"mesh_sha256": mesh}
+
+
+def _near(row: dict[str, Any]) -> bool:
+    return abs(float(row["solved_torque_Nm"]) / float(row["torque_Nm"]) - 1) < NEAR
+
+
+def solution(case: Case, te: float, deck: Path) -> dict[str, Any]:
+    """What ccx says at te (m) or, where it does not settle, near it."""
 
     def attempt(nudge: float) -> tuple[float, Problem, float]:
-        te = nudge * mine.te
-        problem = problem_at(spec, torque, position, te, divisions)
+        problem = problem_at(case, nudge * te)
         write_spatial_deck(problem, deck)
-        return te, problem, run_deck(deck)
+        return nudge * te, problem, run_deck(deck)
 
     te, problem, seconds = first_solved(NUDGES, attempt)
     loads, layers = bore_loads(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
-    moment = abs(loads[0, 5])
-    share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *divisions[:-1]))) / layers.sum()
-    row = {
-        "case": "tilted" if tilted else "parallel",
-        "torque_Nm": f"{torque:g}",
-        "position": f"{position / POSITIONS:.6f}",
-        "te_um": f"{1e6 * (te + (torque - moment) / r_b / mine.stiffness):.4f}",
+    share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *case.divisions[:-1]))) / layers.sum()
+    return {f"share_{k + 1}": f"{value:.5f}" for k, value in enumerate(share)} | {
         "solved_te_um": f"{1e6 * te:.4f}",
-        "solved_torque_Nm": f"{moment:.3f}",
-        "gearfmu_te_um": f"{1e6 * mine.te:.4f}",
+        "solved_torque_Nm": f"{abs(loads[0, 5]):.3f}",
         "axial_N": f"{loads[0, 2]:.2f}",
         "pairs": len(problem.pairs),
         "nodes": sum(len(gear.solid.nodes) for gear in problem.gears),
         "seconds": f"{seconds:.0f}",
     }
-    row |= {f"share_{k + 1}": f"{value:.5f}" for k, value in enumerate(share)}
-    return row | {f"gearfmu_share_{k + 1}": f"{value:.5f}" for k, value in enumerate(mine.share)}
+
+
+def case_of(row: dict[str, Any]) -> Case:
+    """The case of a row."""
+    place = round(POSITIONS * float(row["position"]))
+    return Case(int(row["helix_deg"]), row["axes"], float(row["torque_Nm"]), place)
+
+
+def shares(row: dict[str, Any], who: str = "") -> np.ndarray:
+    """Load of each layer (LAYERS,), parts of the whole. who: "" CalculiX, "gearfmu_" ours."""
+    return np.array([float(row[f"{who}share_{k + 1}"]) for k in range(LAYERS)])
 
 
 def compare(rows: list[dict[str, Any]]) -> None:
-    """Print te (µm) of both codes and the largest difference of a layer's share, of the largest share."""
-    print("case,torque_Nm,position,calculix_um,gearfmu_um,difference_%,largest difference of a share_%")
-    for row in rows:
-        shares = np.array([[float(row[f"{who}share_{k + 1}"]) for k in range(LAYERS)] for who in ("", "gearfmu_")])
-        off = np.abs(shares[1] - shares[0]).max() / shares[0].max()
-        a, b = float(row["te_um"]), float(row["gearfmu_te_um"])
-        print(
-            f"{row['case']},{row['torque_Nm']},{row['position']},{a:.3f},{b:.3f},{100 * (b / a - 1):+.2f},"
-            f"{100 * off:.1f}"
-        )
-    for case, torque in sorted({(row["case"], row["torque_Nm"]) for row in rows}):
-        here = [row for row in rows if (row["case"], row["torque_Nm"]) == (case, torque)]
-        a, b = (np.mean([float(row[name]) for row in here]) for name in ("te_um", "gearfmu_te_um"))
-        print(f"# {case}, {torque} N·m, {len(here)} positions: mean {a:.3f} and {b:.3f} µm, {100 * (b / a - 1):+.2f} %")
+    """Print te (µm) of both codes, the largest difference of a layer's share, of the largest share; means and peak to
+    peak where all positions are there."""
+    print("helix_deg,axes,torque_Nm,position,calculix_um,gearfmu_um,difference_%,largest difference of a share_%")
+    loads: dict[tuple[int, str, float], list[tuple[float, float]]] = {}
+    for line in rows:
+        case, theirs = case_of(line), shares(line)
+        off = np.abs(shares(line, "gearfmu_") - theirs).max() / theirs.max()
+        a, b = float(line["te_um"]), float(line["gearfmu_te_um"])
+        loads.setdefault((case.helix, case.axes, case.torque), []).append((a, b))
+        print(f"{case.name.replace('_', ',')},{a:.3f},{b:.3f},{100 * (b / a - 1):+.2f},{100 * off:.1f}")
+    for (helix, axes, torque), pairs in loads.items():
+        if len(pairs) == POSITIONS:
+            (a, b), (p, q) = np.mean(pairs, axis=0), np.ptp(pairs, axis=0)
+            print(f"# {helix}°, {axes}, {torque:g} N·m: mean {a:.3f} and {b:.3f} µm, {100 * (b / a - 1):+.2f} %;"
+                  f" peak to peak {p:.3f} and {q:.3f} µm, {100 * (q / p - 1):+.1f} %")  # fmt: skip
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("positions", nargs="*", type=int, metavar="POSITION", help=f"0 … {POSITIONS - 1}")
-    parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
-    parser.add_argument("--tilted", action="store_true")
-    parser.add_argument("--fine", action="store_true")
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="bodies, decks, logs and results")
-    parser.add_argument("--out", type=Path)
+    parser.add_argument("--out", type=Path, default=HERE / "helical.csv")
     parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
-    chosen.out = chosen.out or (TABLE.with_stem("helical_fine") if chosen.fine else TABLE)
-    rows = read(chosen.out)
+    if unknown := [name for name in chosen.cases if name not in CASES]:
+        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
+    rows, failed = {case_of(row).name: row for row in read(chosen.out)}, []
     if chosen.compare:
-        return compare(rows)
+        return compare(list(rows.values()))
     require_ccx()
-    gears, failed, case = bodies(chosen.work), [], "tilted" if chosen.tilted else "parallel"
-    done = {_place(row) for row in rows}
-    for torque in chosen.torque or TORQUES:
-        for position in chosen.positions or [k for k in range(POSITIONS) if (case, torque, k) not in done]:
-            try:
-                fresh = solved(chosen, gears, torque, position)
-            except RuntimeError as failure:
-                failed.append(f"{torque:g} N·m, position {position}: {failure}")
-                continue
-            rows = [row for row in rows if _place(row) != (case, torque, position)] + [fresh]
-            write(chosen.out, sorted(rows, key=_place))
-            print(", ".join(f"{name} {value}" for name, value in fresh.items()), file=sys.stderr, flush=True)
+    for name in chosen.cases or CASES:
+        case = CASES[name]
+        try:
+            rows[name] = row(case, bodies(chosen.work, case.helix), chosen.work, rows.get(name))
+        except RuntimeError as failure:
+            failed.append(f"{name}: {failure}")
+            continue
+        write(chosen.out, [rows[name] for name in CASES if name in rows])
+        print(", ".join(f"{key} {value}" for key, value in rows[name].items()), file=sys.stderr, flush=True)
     if failed:
         raise SystemExit("\n".join(failed))
-
-
-def _place(row: dict[str, Any]) -> tuple[str, float, int]:
-    """Case, torque (N·m) and number of the position of a row."""
-    return row["case"], float(row["torque_Nm"]), round(POSITIONS * float(row["position"]))
 
 
 if __name__ == "__main__":

@@ -1,16 +1,16 @@
-"""Loaded transmission error over one pitch by CalculiX: 12 positions, three torques, beside what `gearfmu te` says.
+"""Loaded transmission error over one pitch by CalculiX: 12 positions, some torques, beside what `gearfmu te` says.
 
-    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--bores averaged|clamped] [--work DIR]
-                                            [--increments N] [--out FILE] [--compare]
+    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--pair fzg_c|sun_planet] [--work DIR]
+                                    [--bores averaged|clamped] [--increments N] [--out FILE] [--compare]
 
 Bores averaged: their mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does), into
 positions.csv. Clamped: all nodes of a bore move as one rigid body, in both codes (`rigid_bores.py`: minutes before the
-first run), into positions_clamped.csv. The pinion is turned to where gearfmu expects the torque; from the torque that
-comes out (within a few per cent) te is moved to the one asked by gearfmu's tangent stiffness. Where ccx ends with teeth
-that stick, or goes round in circles, te is moved by up to 2 % and solved again. A position whose deck is that of the
-table is not run again unless it is named; its te is moved by the tangent stiffness of today.
-`--compare` runs nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute
-to some minutes a run.
+first run), into positions_clamped.csv. `sun_planet` (sun_planet.py), bores averaged, goes into sun_planet.csv. The
+pinion is turned to where gearfmu expects the torque; from the torque that comes out (within a few per cent) te is moved
+to the one asked by gearfmu's tangent stiffness. Where ccx ends with teeth that stick, or goes round in circles, te is
+moved by up to 2 % and solved again. A position whose deck is that of the table is not run again unless it is named; its
+te is moved by the tangent stiffness of today. `--compare` runs nothing: it prints both codes side by side. Needs
+CalculiX's ccx (Debian: calculix-ccx); half a minute to some minutes a run.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from case import Case, Load, Solution, digest, prepared, solve
 from ccx import first_solved, require_ccx
 from rigid_bores import rigid_bore_bodies
 from section import Fineness
+from sun_planet import TORQUES as OF_SET
+from sun_planet import set_bodies, sun_planet
 
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
@@ -36,7 +38,7 @@ from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
 
 POSITIONS = 12
-TORQUES = (80.0, 302.0, 600.0)  # N·m on the pinion
+TORQUES = {"fzg_c": (80.0, 302.0, 600.0), "sun_planet": OF_SET}  # N·m on the pinion
 MARGIN = 2.5e-3  # m: pairs as far beyond the ends of the path may touch with their tip edges
 PATCH, SIZE = 1.35, 0.3  # fine zone and its elements, in Hertz half-widths of one pair that carries everything
 NUDGES = (1.0, 1.01, 0.99, 1.02, 0.98, 1.005, 0.995, 1.015, 0.985)  # of te, in turn, until no teeth stick
@@ -56,9 +58,11 @@ class Place:
 
 def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
     """Transmission error and tangent stiffness at all torques and positions."""
-    bodies = load_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
-    model = assemble(spec, bodies)
-    return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True)
+    if spec.name == "sun_planet":
+        bodies = set_bodies()
+    else:
+        bodies = load_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
+    return loaded_te(assemble(spec, bodies), TORQUES[spec.name], POSITIONS, rigid_bearings=True)
 
 
 def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> Case:
@@ -78,8 +82,9 @@ def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> C
 def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of one torque and position, made by running it unless `known` comes from the same deck."""
     torque, position = place.torque, place.position
-    pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
-    folder = work / f"position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
+    pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES[spec.name].index(torque)
+    prefix = "" if spec.name == "fzg_c" else f"{spec.name}_"
+    folder = work / f"{prefix}position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
     case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)
 
     def load_of(te_um: float) -> Load:
@@ -130,10 +135,10 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-def compare(ours: np.ndarray, rows: list[dict[str, Any]]) -> None:
+def compare(ours: TeResult, rows: list[dict[str, Any]]) -> None:
     """Print te (µm) of both codes, and mean and peak to peak over the positions that there are."""
     print("torque_Nm,position,calculix_um,gearfmu_um,difference_%")
-    for torque, curve in zip(TORQUES, ours, strict=True):
+    for torque, curve in zip(ours.torque, 1e6 * ours.te, strict=True):
         here = [row for row in rows if float(row["torque_Nm"]) == torque]
         index = [round(POSITIONS * float(row["position"])) for row in here]
         te = np.array([float(row["te_um"]) for row in here])
@@ -150,22 +155,25 @@ def compare(ours: np.ndarray, rows: list[dict[str, Any]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("positions", nargs="*", type=int, metavar="POSITION", help=f"0 … {POSITIONS - 1}")
-    parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
-    parser.add_argument("--stage", default="fzg_c")
+    parser.add_argument("--torque", type=float, action="append", help="N·m on the pinion; may repeat")
+    parser.add_argument("--pair", choices=TORQUES, default="fzg_c")
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
     parser.add_argument("--bores", choices=("averaged", "clamped"), default="averaged")
     parser.add_argument("--increments", type=int, default=1, help="in which the load is brought up; give --out as well")
-    parser.add_argument("--out", type=Path, help="table; positions.csv or positions_clamped.csv beside this file")
+    parser.add_argument("--out", type=Path, help="table; the one said above, beside this file")
     parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
-    out = chosen.out or HERE / ("positions.csv" if chosen.bores == "averaged" else "positions_clamped.csv")
-    spec, rows = load_stage(chosen.stage), read(out)
+    if chosen.pair == "sun_planet" and chosen.bores == "clamped":
+        parser.error("sun_planet has averaged bores alone")
+    table = "positions" if chosen.pair == "fzg_c" else chosen.pair
+    out = chosen.out or HERE / f"{table}{'' if chosen.bores == 'averaged' else '_clamped'}.csv"
+    spec, rows = load_stage("fzg_c") if chosen.pair == "fzg_c" else sun_planet(), read(out)
     ours = te_of_gearfmu(spec, chosen.bores)
     if chosen.compare:
-        return compare(1e6 * ours.te, rows)
+        return compare(ours, rows)
     require_ccx()
     failed = []
-    for torque in chosen.torque or TORQUES:
+    for torque in chosen.torque or TORQUES[spec.name]:
         for position in chosen.positions or range(POSITIONS):
             place = Place(torque, position, chosen.bores, chosen.increments)
             known = next((row for row in rows if _place(row) == (torque, position)), None)

@@ -72,6 +72,22 @@ def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.
         assert np.allclose(here, values, rtol=0.015)
 
 
+def test_sun_and_planet_within_3_percent_at_two_loads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shipped bodies of `planetary54` as a pair; single positions, mean within 2 %, peak to peak within 3 %."""
+    monkeypatch.syspath_prepend(str(TABLES))
+    positions, of_set = (importlib.import_module(name) for name in ("positions", "sun_planet"))
+    ours, rows = positions.te_of_gearfmu(of_set.sun_planet(), "averaged"), positions.read(TABLES / "sun_planet.csv")
+    for curve, torque in zip(1e6 * ours.te, ours.torque, strict=True):
+        here = [row for row in rows if float(row["torque_Nm"]) == torque]
+        theirs = np.array([float(row["te_um"]) for row in here])
+        mine = curve[[round(positions.POSITIONS * float(row["position"])) for row in here]]
+        print(f"{torque} N·m, {len(here)} positions: {100 * (mine / theirs - 1).min():+.2f} … "
+              f"{100 * (mine / theirs - 1).max():+.2f} %")  # fmt: skip
+        assert len(here) >= 11 and np.allclose(mine, theirs, rtol=0.03)
+        assert mine.mean() == pytest.approx(theirs.mean(), rel=0.02)
+        assert np.ptp(mine) == pytest.approx(np.ptp(theirs), rel=0.03)
+
+
 def test_goldens_are_those_of_the_tables() -> None:
     with open(TABLES / "pitch_point.csv", newline="", encoding="utf-8") as file:
         assert {row["case"]: float(row["secant_N_per_mm_um"]) for row in csv.DictReader(file)} == SECANT

@@ -1,0 +1,28 @@
+"""Sun and first planet of `planetary54` as a pair on fixed axes, without tip relief, to compare with CalculiX."""
+
+from __future__ import annotations
+
+from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.spec.forms.planetary import SetGearSpec
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import GearSpec
+
+TORQUES = (37.5, 75.0)  # N·m on the sun: its share at 600 N·m on the carrier, and twice that
+
+
+def sun_planet() -> StageSpec:
+    """The pair."""
+    of_set, form = load_stage("planetary54"), load_stage("fzg_c")
+    fields = {name: getattr(of_set.set, name) for name in type(form.pair).model_fields if hasattr(of_set.set, name)}
+    gears = tuple(_gear(*both) for both in zip(form.gears, (of_set.sun, of_set.planet), strict=True))
+    return form.model_copy(update={"name": "sun_planet", "pair": form.pair.model_copy(update=fields), "gears": gears})
+
+
+def _gear(form: GearSpec, gear: SetGearSpec) -> GearSpec:
+    fields = {name: getattr(gear, name) for name in type(form).model_fields if hasattr(gear, name)}
+    return form.model_copy(update=fields | {"name": form.name, "tip_relief": None})
+
+
+def set_bodies() -> list[ReducedBody]:
+    """The two reduced gears of the set, as they are shipped."""
+    return load_bodies(load_stage("planetary54"))[:2]
