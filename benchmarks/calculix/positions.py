@@ -42,6 +42,7 @@ TORQUES = {"fzg_c": (80.0, 302.0, 600.0), "sun_planet": OF_SET}  # N·m on the p
 MARGIN = 2.5e-3  # m: pairs as far beyond the ends of the path may touch with their tip edges
 PATCH, SIZE = 1.35, 0.3  # fine zone and its elements, in Hertz half-widths of one pair that carries everything
 NUDGES = (1.0, 1.01, 0.99, 1.02, 0.98, 1.005, 0.995, 1.015, 0.985)  # of te, in turn, until no teeth stick
+INCREMENTS = 3  # of the load, where it does not settle in one
 PENALTY = 1e16  # Pa/m: two pairs do not converge at 3e16; costs 0.3 % of stiffness at the pitch point
 HERE = Path(__file__).parent
 
@@ -90,18 +91,22 @@ def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path, known: dic
     def load_of(te_um: float) -> Load:
         return Load(2 * math.pi / pair.gears[0].z * position / POSITIONS, 1e-6 * te_um, MARGIN)
 
-    def attempt(nudge: float) -> tuple[float, Solution]:
+    def attempt(nudge: float, case: Case = case) -> tuple[float, Solution]:
         te_um = round(1e6 * nudge * ours.te[row, position], 4)
         return te_um, solve(case, pair, width, [load_of(te_um)], folder)
 
-    def of_same_deck(row: dict[str, Any]) -> bool:
+    def of_same_deck(row: dict[str, Any], case: Case) -> bool:
         deck, _ = prepared(case, pair, width, load_of(float(row["solved_te_um"])), folder)
         return digest(deck) == row["deck_sha256"]
 
-    if known and of_same_deck(known):
+    slower = replace(case, increments=INCREMENTS)
+    if known and any(of_same_deck(known, way) for way in (case, slower)):
         found = known
     else:
-        te_um, solution = first_solved(NUDGES, attempt)
+        try:
+            te_um, solution = first_solved(NUDGES, attempt)
+        except RuntimeError:
+            te_um, solution = first_solved(NUDGES, lambda nudge: attempt(nudge, slower))
         force, wheel = solution.line_load[0] * width
         found = {
             "torque_Nm": f"{torque:g}",
