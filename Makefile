@@ -26,8 +26,8 @@ demo: $(VENV)/.base
 test: lint
 	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
-## make test-full   all tests, the slow ones too; how it ended is kept in benchmarks/evidence.json
-test-full: $(STAMP)
+## make test-full   make test, then the slow tests; how those ended is kept in benchmarks/evidence.json
+test-full: test
 	$(EVIDENCE) make --again test-full
 
 ## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists

@@ -1,25 +1,22 @@
-"""The hard cases themselves: at level fast and the default step in every test run, the others under make test-full; of
-those on planetary sets, which take ten seconds each, a few; the longest of the others there too."""
+"""The hard cases themselves, at level fast and the default step: those that take less than ten seconds, so of those on
+planetary sets a few. All of them, at every level and step, are run by `make stability`; test_table.py judges its table.
+"""
 
 from __future__ import annotations
 
 import pytest
 
-from gearfmu.stability.case import LEVELS, STEPS, Case
+from gearfmu.stability.case import Case
 from gearfmu.stability.scenes import SCENES
 from gearfmu.stability.suite import Row, Task, judge
 
 QUICK = ("fast", "default")
-SLOW = [(level, step) for level in LEVELS for step in STEPS if (level, step) != QUICK]
-
-
 LONG = (  # more than ten seconds
     "ten_million_steps", "train_closing_clutch", "train_reversal", "train_torque_step", "rubbing_turns_for_long",
     "rubbing_standstill", "run_up_and_down", "standstill",
 )  # fmt: skip
-OF_SETS = ("set_jammed", "set_floating_sun", "set_planet_without_contact")  # in every test run
-EVERY_RUN = [name for name in SCENES if name in OF_SETS or not (name.startswith("set_") or name in LONG)]
-LATER = [pytest.param(name, marks=pytest.mark.full) for name in SCENES if name not in EVERY_RUN]
+OF_SETS = ("set_jammed", "set_floating_sun", "set_planet_without_contact")
+SHORT = [name for name in SCENES if name in OF_SETS or not (name.startswith("set_") or name in LONG)]
 
 
 def found(scene: str, level: str, step: str) -> Row:
@@ -30,7 +27,7 @@ def found(scene: str, level: str, step: str) -> Row:
     return Row(scene, case, finding, "")
 
 
-@pytest.mark.parametrize("scene", [*EVERY_RUN, *LATER])
+@pytest.mark.parametrize("scene", SHORT)
 def test_every_scene_runs_through_at_level_fast(scene: str) -> None:
     row = found(scene, *QUICK)
     assert not row.failed, row.finding
@@ -39,12 +36,4 @@ def test_every_scene_runs_through_at_level_fast(scene: str) -> None:
 def test_a_grazed_mesh_leaves_no_step_unsolved() -> None:
     """Its friction changes by rounding for ever: with that as the measure four steps of this run found no end."""
     row = found("rubbing_light_load", "fast", "half")
-    assert not row.failed, row.finding
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("scene", list(SCENES))
-@pytest.mark.parametrize("level, step", SLOW)
-def test_every_scene_at_every_level_and_step(scene: str, level: str, step: str) -> None:
-    row = found(scene, level, step)
     assert not row.failed, row.finding
