@@ -202,7 +202,6 @@ def unsolved(made: Record) -> list[str]:
 
 FOUND = {  # by the first 200 draws, not cured yet
     **dict.fromkeys((49, 56, 74, 75, 95, 131), "energy balance leaves 1e-4 to 4e-4"),
-    102: "energy balance leaves 3e-3: friction, pairs that end under load",
 }
 
 
