@@ -78,8 +78,9 @@ def carrier_of(spec: Form) -> CarrierMember:
 
 
 def body_names(spec: Form) -> tuple[str, ...]:
-    """Names of the reduced bodies: toothed ones, then the carrier. Shafts need no reduction."""
-    return *members(spec), *carriers(spec)
+    """Names of the reduced bodies: toothed ones, then carriers. Shafts need no reduction."""
+    own = [carrier.name for carrier in spec.carriers] if isinstance(spec, Stage) else list(carriers(spec))
+    return *members(spec), *own
 
 
 def pair_gear(gear: GearSpec, pair: PairSpec, hand: int) -> GearBody:

@@ -1,0 +1,189 @@
+"""Stages of every kind for the relations: each in the terms of any stage, with its bodies by name, a load and a speed.
+
+A relation changes the stage (`Kind.model(change)`), runs both (`Kind.run`) and compares channels by name. No stored
+numbers. Assembled models and reduced bodies are made once a process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body import load_bodies
+from gearfmu.body.toothed import reduced_gear
+from gearfmu.spec.forms.expand import as_general, spread
+from gearfmu.spec.forms.general import Stage, SupportSpec, ToothedBody
+from gearfmu.spec.forms.members import body_names, members
+from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
+from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.trace import Trace
+
+ROOT = Path(__file__).parents[2]
+COARSE = BodySpec(
+    strip_half_width=4.5e-4,
+    modes=24,
+    roll_points=8,
+    width_functions=3,
+    mesh=MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2),
+)
+Change = Callable[[Stage], Stage]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A stage with its load: torque (N·m) and speed (rad/s) of its input; step between samples and duration, s."""
+
+    name: str
+    file: str
+    torque: float
+    speed: float
+    step: float = 20e-6
+    duration: float = 2e-3
+
+    @property
+    def stage(self) -> Stage:
+        return _stage(self.file)
+
+    def model(self, change: Change | None = None) -> StageModel:
+        """The assembled model, of the stage as it is or as `change` returns it."""
+        return _model(self.file) if change is None else assembled(change(self.stage), bodies_of(self.file))
+
+    def run(self, model: StageModel, parameters: Mapping[str, float] | None = None, scale: float = 1.0) -> Trace:
+        """A few milliseconds under `scale` times the torque, at level fast unless `parameters` say another."""
+        driven = model.driven_by_springs()
+        inputs = Steady(driven, self.speed, scale * self.torque)
+        fast = {"level": float(level_number(driven, "fast"))}
+        return simulate(driven, inputs, self.duration, self.step, fast | dict(parameters or {}))
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("pair", "fzg_c/stage_relief", 302.0, 209.0),
+        Kind("helical", "helical_demo", 100.0, 209.0),
+        Kind("internal", "internal", 80.0, 150.0),
+        Kind("train", "two_stage", 150.0, 150.0),
+        Kind("set", "planetary54", 600.0, 85.0, duration=1e-3),
+        Kind("helical_set", "helical_set", 300.0, 60.0, duration=1e-3),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Drawn(Kind):
+    """A stage of one of the kinds with drawn numbers: supports, backlash, pin errors, runout, pitch errors."""
+
+    seed: int = 0
+
+    @property
+    def stage(self) -> Stage:
+        return _drawn(self.file, self.seed)
+
+    def model(self, change: Change | None = None) -> StageModel:
+        """The assembled model, of the stage as drawn or as `change` returns it."""
+        return assembled((change or (lambda stage: stage))(self.stage), bodies_of(self.file))
+
+
+def drawn(seed: int) -> Drawn:
+    """The same stage for every run of the tests."""
+    kind = list(KINDS.values())[seed % len(KINDS)]
+    return Drawn(f"{kind.name}-{seed}", kind.file, kind.torque, kind.speed, kind.step, kind.duration, seed)
+
+
+@cache
+def _drawn(file: str, seed: int) -> Stage:
+    dice = np.random.default_rng(seed)
+    stage = _stage(file)
+
+    def times(value: float | str | None) -> float | str | None:
+        return value * float(np.exp(dice.uniform(-1, 1))) if isinstance(value, float) else value
+
+    def support(old: SupportSpec) -> SupportSpec:
+        stiff = {name: times(getattr(old, name)) for name in ("radial", "axial", "tilt", "torsion")}
+        return old.model_copy(update=stiff | {"damping_ratio": float(dice.uniform(0.005, 0.2))})
+
+    def gear(old: ToothedBody) -> ToothedBody:
+        runout = Eccentricity(amount=float(dice.uniform(0, 2e-5)), angle=float(dice.uniform(-3, 3)))
+        quality = DeviationClass(tolerance_class=int(dice.integers(4, 9)), seed=int(dice.integers(1, 4)))
+        return old.model_copy(update={"eccentricity": runout, "deviations": quality})
+
+    bodies = {name: gear(body) if isinstance(body, ToothedBody) else body for name, body in stage.bodies.items()}
+    meshes = tuple(
+        mesh.model_copy(update={"backlash": mesh.backlash * dice.uniform(0.8, 1.5)}) for mesh in stage.engagements
+    )
+    rotors = {
+        name: rotor.model_copy(update={"offset": tuple(dice.uniform(-1e-5, 1e-5, 2))}) if rotor.carried_by else rotor
+        for name, rotor in stage.rotors.items()
+    }
+    return stage.model_copy(
+        update={
+            "bodies": bodies,
+            "engagements": meshes,
+            "rotors": rotors,
+            "supports": tuple(map(support, stage.supports)),
+        }
+    )
+
+
+def assembled(stage: Stage, bodies: Mapping[str, Any]) -> StageModel:
+    """The model of a stage whose bodies are found by name, in whatever order the stage has them."""
+    return assemble(stage, [bodies[name] for name in body_names(stage)])
+
+
+def level_number(model: StageModel, level: str) -> int:
+    """The kernel's number of a fidelity level."""
+    variable = next(v for v in model.kernel_variables() if v.name == "level")
+    return variable.items.index(level)
+
+
+def channels(trace: Trace) -> dict[str, np.ndarray]:
+    """Values of all real channels of a trace, by name."""
+    return {name: channel.values for name, channel in trace.channels.items() if channel.values.dtype == float}
+
+
+def differences(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """Largest difference of every channel over the largest value of its family (what follows the last dot) in either:
+    a bearing without load is judged by the bearings that carry."""
+    assert one.keys() == other.keys(), one.keys() ^ other.keys()
+    size: dict[str, float] = {}
+    for name, values in (*one.items(), *other.items()):
+        family = name.rpartition(".")[2]
+        size[family] = max(size.get(family, 0.0), float(np.abs(values).max()))
+    return {
+        name: float(np.abs(values - other[name]).max()) / (size[name.rpartition(".")[2]] or 1.0)
+        for name, values in one.items()
+    }
+
+
+@cache
+def _stage(file: str) -> Stage:
+    if file == "internal":
+        spec = load_stage(ROOT / "benchmarks" / "calculix" / "internal" / "stage.toml")
+        coarse = {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}
+        spring = {"kind": "spring", "k": 2e4, "c": 1.0}
+        ports = {name: port.model_copy(update=spring) for name, port in spec.ports.items()}
+        rotors = {name: rotor.model_copy(update={"stands": False}) for name, rotor in spec.rotors.items()}
+        return spec.model_copy(update={"bodies": coarse, "ports": ports, "rotors": rotors})
+    return as_general(load_stage(file))
+
+
+@cache
+def bodies_of(file: str) -> dict[str, Any]:
+    """Reduced bodies of a stage file by the names of its general form."""
+    if file == "internal":
+        return {name: reduced_gear(member, "0" * 64) for name, member in members(_stage(file)).items()}
+    spec = load_stage(file)
+    return spread(spec, load_bodies(spec))
+
+
+@cache
+def _model(file: str) -> StageModel:
+    return assembled(_stage(file), bodies_of(file))
