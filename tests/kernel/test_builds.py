@@ -80,8 +80,8 @@ def apart(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(line, capture_output=True, text=True)
 
 
-def test_no_check_fails_in_runs_at_level_fast() -> None:
-    done = apart("golden.py", "--library", checked_library(), "--only", "/fast")
+def test_no_check_fails_in_runs_of_the_pair() -> None:
+    done = apart("golden.py", "--library", checked_library(), "--only", "pair/")
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -287,27 +287,39 @@ void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, c
     work->run_h = h;
 }
 
+/* The largest step of the ladder, and at most `limit`, that meets the bound with γ = 1; where none does, the one that
+ * comes nearest: below it stiff modes count with their κ, which lowers γ further. */
+static double default_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                           double limit, int corrected)
+{
+    GK_ASSERT(limit > 0.0);
+    static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
+                                    4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
+    const int rungs = (int)(sizeof ladder / sizeof *ladder);
+    double nearest = INFINITY, h = limit;
+    for (int i = 0; i < rungs; i++) {
+        if (i + 1 < rungs && ladder[i + 1] >= limit) continue;
+        const double rung = gk_min(ladder[i], limit);
+        const double mu = corrected ? limit_mu(model, setup, work, data, rung, 1.0) : 0.0;
+        if (mu <= MU_MOST) return rung;
+        if (mu < nearest) nearest = mu, h = rung;
+    }
+    return h;
+}
+
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE])
 {
     GK_ASSERT(message && model->period_min > 0.0);
     const double wished = data->stage[V_H];
     GK_ASSERT(!(wished < 0.0));
-    static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
-                                    4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
     const double period = model->period_min;
-    const int corrected = gk_scheme_of(setup->integrator)->corrected, rungs = (int)(sizeof ladder / sizeof *ladder);
+    const int corrected = gk_scheme_of(setup->integrator)->corrected;
     const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work, data)
                                                        : INFINITY; /* explicit: a limit of stability */
     double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
     if (corrected) keep_all(model, setup, work, data);
-    if (!(wished > 0.0))
-        for (int i = 0; i < rungs; i++) {
-            h = gk_min(ladder[i], limit);
-            if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
-                (!corrected || limit_mu(model, setup, work, data, h, 1.0) <= MU_MOST))
-                break;
-        }
+    if (!(wished > 0.0)) h = default_step(model, setup, work, data, limit, corrected);
     if (h > period / 8.0) {
         snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h,
                  period / 8.0);
@@ -325,8 +337,11 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
         setup->gamma_at[i] = corrected ? gamma_for(model, setup, work, data, at) : 0.0;
     if (corrected && setup->gamma_at[0] < 0.7)
         snprintf(message, GK_MESSAGE,
-                 "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is "
-                 "more accurate",
+                 wished > 0.0
+                     ? "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; the "
+                       "default h, where 0 is given, comes nearest to the limit"
+                     : "no step meets the accuracy limit of dg4 for this model: h = %.3g s comes nearest, gamma "
+                       "lowered to %.2f; less contact damping or more modes bring it down",
                  h, setup->gamma_at[0]);
     return GK_OK;
 }
