@@ -43,6 +43,7 @@ CARRIED = {"carried": ints(0), "carried_place": np.zeros((1, 2)), "carried_rows0
         (CARRIED | {"carried_rows0": np.zeros((2, 2, 1))}, "carried_rows has the wrong length"),
         ({"support_turn": ints(*[0] * 50)}, "support_turn has the wrong length"),
         ({"tooth_shift": ints(10**6)}, "engagements are out of range"),
+        ({"direction": np.array([9.0])}, "directions of engagements are out of range"),
     ],
 )
 def test_each_rule_of_turning_axes(sections: dict[str, Any], words: str) -> None:

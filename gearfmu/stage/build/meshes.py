@@ -68,9 +68,11 @@ def _placed(stage: Stage) -> tuple[dict[str, float], list[int]]:
 
 
 def direction_of(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
-    """Angle (rad, in (−π, π]) from A's axis to B's; of a ring from its own to A's: the branch that the kernel takes."""
+    """Angle (rad) from A's axis to B's, of a ring from its own to A's: above −π; π along −x, whichever way that is
+    rounded."""
     sense = -1 if isinstance(pair, RingMesh) else 1
-    return math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
+    gamma = math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
+    return gamma + 2 * math.pi if gamma < SAME_ANGLE - math.pi else gamma
 
 
 def _phase_of_b(pair: MeshShape, first: float, gamma: float) -> float:
@@ -90,13 +92,14 @@ def _phase_of_a(pair: MeshShape, second: float, gamma: float) -> float:
 def stage_sections(stage: Stage) -> dict[str, Any]:
     """Sections of names, limits and engagements."""
     gears = [gear.name for gear in stage.gears]
-    engaged, numbers, periods = [], [], []
+    engaged, numbers, directions, periods = [], [], [], []
     for mesh in stage.engagements:
         pair, (a, b) = mesh_shape(stage, mesh), mesh_axes(stage, mesh)
         engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
         place = _axes_as_they_are(stage, mesh)
         numbers.append([*place, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
+        directions.append(direction_of(pair, a, b))
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
     shifts = _placed(stage)[1]
     looped = {"tooth_shift": np.array(shifts, np.int32)} if any(shifts) else {}
@@ -110,6 +113,7 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
             "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
             "engaged": np.array(engaged, np.int32),
             "engagement": np.array(numbers),
+            "direction": np.array(directions),
         }
     )
 

@@ -218,14 +218,11 @@ static int find_flat(const gk_posed *q, double search_distance, gk_position posi
     return p->gap < search_distance;
 }
 
-/* t of both flanks where the gears stand without load: not cut at ±π, so that both count teeth alike */
+/* t of both flanks by the direction that teeth are counted from, wherever ±π lies and the axes have gone */
 static void nominal_action(const gk_posed *q, gk_mesh *mesh)
 {
-    const double turn = gk_is_internal(q) ? -1.0 : 1.0;
-    double d[2];
-    gk_apart(q, d);
-    const double towards = gk_atan2(turn * d[1], turn * d[0]), alpha = gk_acos(gk_base_distance(q) / mesh->distance);
-    mesh->action[0] = towards - alpha, mesh->action[1] = towards + alpha;
+    const double alpha = gk_acos(gk_base_distance(q) / mesh->distance);
+    mesh->action[0] = q->e->direction - alpha, mesh->action[1] = q->e->direction + alpha;
 }
 
 /* Gaps of both flanks of a tooth together depend on the centre distance alone: straight but for its square */

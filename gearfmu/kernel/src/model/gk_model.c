@@ -1,6 +1,7 @@
 /* Blob → gk_model: every field present, of the right size and plausible, or one message that says which is not.
  * Nothing is trusted before it is checked. */
 #include "base/gk_lanes.h"
+#include "base/gk_math.h"
 #include "model/gk_model_gear.h"
 #include "model/gk_read.h"
 #include "model/gk_vars.h"
@@ -205,6 +206,12 @@ static double squared_distance(const gk_engagement *e)
     return x * x + y * y;
 }
 
+static double direction_of(const gk_engagement *e)
+{
+    const double sense = e->kind == MESH_INTERNAL ? -1.0 : 1.0;
+    return gk_atan2(sense * (e->position[1][1] - e->position[0][1]), sense * (e->position[1][0] - e->position[0][0]));
+}
+
 static void read_engagement(gk_reader *r, gk_model *m, int i, const int32_t *who, int shift, const double *v)
 {
     gk_engagement *e = &m->engagement[i];
@@ -244,12 +251,14 @@ static void read_engagements(gk_reader *r, gk_model *m)
     char names[MAX_ENGAGEMENTS][NAME_LENGTH];
     const int32_t *who = gk_read_take(r, F_MODEL_engaged);
     const int32_t *shift = gk_read_take(r, F_MODEL_tooth_shift);
-    const double *v = gk_read_take(r, F_MODEL_engagement);
+    const double *v = gk_read_take(r, F_MODEL_engagement), *direction = gk_read_take(r, F_MODEL_direction);
     read_names(r, F_MODEL_engagement_names, m->engagements, names);
     for (int i = 0; i < m->engagements && !r->outcome; i++) {
         memcpy(m->engagement[i].name, names[i], NAME_LENGTH);
         gk_read_demand(r, !shift || gk_read_counted(shift + i, -10000, 10000), "engagements");
+        gk_read_demand(r, !direction || gk_read_between(direction[i], -4.0, 4.0), "directions of engagements");
         if (!r->outcome) read_engagement(r, m, i, who + 4 * i, shift ? shift[i] : 0, v + 10 * i);
+        if (!r->outcome) m->engagement[i].direction = direction ? direction[i] : direction_of(&m->engagement[i]);
     }
 }
 

@@ -95,6 +95,7 @@ typedef struct gk_engagement {
     int gear[2];
     int shift[2];          /* B's tooth of A's tooth k: shift − k, in a ring shift + k, by flank */
     double position[2][2]; /* x, y of both gears */
+    double direction;      /* from A to B, of a ring from it to A: teeth are placed and counted by it */
     double backlash, nominal_backlash, damping, force_max; /* backlash j_wt: of the pair; of the teeth as they are */
     double width;                                          /* common face width */
     double tilt[2];                                        /* of B's axis against A's, about x and y */

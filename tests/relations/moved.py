@@ -1,0 +1,104 @@
+"""Runs of a stage that stands elsewhere, turned or mirrored: where it starts, and its channels seen from there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from kinds import Kind, channels, level_number
+
+from gearfmu.spec.forms.general import Stage, ToothedBody
+from gearfmu.spec.forms.turning import turns
+from gearfmu.spec.tables.flanks import Eccentricity, Wobble
+from gearfmu.stage import StageModel, Steady
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.run.simulate import simulate
+
+WHOLE = 1e-6  # of a pitch
+Vector = tuple[float, float]
+
+
+def turned_vector(vector: Vector, angle: float) -> Vector:
+    """A vector (x, y) turned by an angle (rad)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]
+
+
+def speeds(stage: Stage) -> dict[str, float]:
+    """Speeds of all rotors per speed of the input."""
+    return {name: float(speed) for name, speed in turns(stage, next(iter(stage.ports))).items()}
+
+
+def start_of(stage: Stage, places: Mapping[str, float]) -> tuple[float, dict[str, int]]:
+    """Angle (rad) of the input from which the teeth of a stage stand at `places`: angles (rad) of tooth 0 by gear, up
+    to whole pitches; and by gear how many pitches tooth 0 is behind its place."""
+    first = stage.engagements[0].gears[0]
+    phases, speed = tooth_phases(stage), speeds(stage)
+    pitches = {gear.name: 2 * math.pi / gear.teeth for gear in stage.gears}
+
+    def behind(start: float) -> dict[str, float]:
+        return {
+            name: math.remainder(place - phases[name] - start * speed[stage.rotor_of(name)], 2 * math.pi)
+            / pitches[name]
+            for name, place in places.items()
+        }
+
+    for n in range(1000):
+        start = (places[first] - phases[first] + n * pitches[first]) / speed[stage.rotor_of(first)]
+        off = behind(start)
+        if all(abs(number - round(number)) < WHOLE for number in off.values()):
+            return start, {name: round(number) for name, number in off.items()}
+    raise AssertionError("no start of the input brings all teeth to their places")
+
+
+def renamed(stage: Stage, behind: Mapping[str, int]) -> Stage:
+    """The stage whose deviations by tooth are where they would be if tooth 0 stood `behind` pitches farther on."""
+    bodies = dict(stage.bodies)
+    for name, number in behind.items():
+        gear = bodies[name]
+        assert isinstance(gear, ToothedBody)
+        angle = 2 * math.pi * number / gear.teeth
+        update: dict[str, object] = {
+            "index_deviation": {(tooth + number) % gear.teeth: value for tooth, value in gear.index_deviation.items()}
+        }
+        for field in ("eccentricity", "wobble"):
+            old: Eccentricity | Wobble | None = getattr(gear, field)
+            if old is not None:
+                update[field] = old.model_copy(update={"angle": old.angle + angle})
+        assert gear.deviations is None or number == 0, "deviations of a class are drawn for the number of a tooth"
+        bodies[name] = gear.model_copy(update=update)
+    return stage.model_copy(update={"bodies": bodies})
+
+
+def run(
+    kind: Kind, model: StageModel, steady: Steady, start: float = 0.0, sense: float = 1.0, **parameters: float
+) -> dict[str, np.ndarray]:
+    """Channels of `kind.duration` from `start` (rad) of the input, driven as `steady` drives: forwards, or backwards
+    where `sense` is −1. Angles (gear.phi) count from the start."""
+    driven, speed = model.driven_by_springs(), speeds(model.stage)
+    ahead = {port: start * speed[model.stage.rotor_of(p.body)] for port, p in driven.stage.ports.items()}
+
+    def inputs(time: float) -> dict[str, float]:
+        values = {name: sense * value for name, value in steady(time).items()}
+        return {name: value + ahead[name[:-4]] if name.endswith(".phi") else value for name, value in values.items()}
+
+    fast = {"level": float(level_number(driven, "fast"))}
+    found = channels(simulate(driven, inputs, kind.duration, kind.step, fast | parameters))
+    for rotor, own in speed.items():
+        if f"{rotor}.gear.phi" in found:
+            found[f"{rotor}.gear.phi"] = found[f"{rotor}.gear.phi"] - start * own
+    return found
+
+
+def each_vector(found: Mapping[str, np.ndarray], change: Callable[[str, np.ndarray, np.ndarray], tuple]) -> dict:
+    """Channels with `change` of every vector: its kind ("" of motion, "r" of rotations, "f", "m"), its x and y."""
+    out = dict(found)
+    for name in found:
+        head, dot, last = name.rpartition(".")
+        kind, axis, mean = last[:-1], last[-1:], ""
+        if last.endswith("_mean"):
+            kind, axis, mean = last[:-6], last[-6:-5], "_mean"
+        if axis == "x" and kind in ("", "r", "f", "m") and (other := f"{head}{dot}{kind}y{mean}") in found:
+            out[name], out[other] = change(kind, found[name], found[other])
+    return out

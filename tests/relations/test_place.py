@@ -1,0 +1,179 @@
+"""R2: results do not depend on where a stage stands.
+
+Turned as a whole, a stage has equal forces, speeds and energies, and its vectors turn with it; a deviation on another
+planet gives the results of that planet. Teeth that are found by an angle with a branch see a layout across −x.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from kinds import KINDS, Kind, differences, drawn
+from moved import each_vector, renamed, run, start_of, turned_vector
+
+from gearfmu.spec.forms.general import Stage, ToothedBody
+from gearfmu.spec.tables.flanks import Eccentricity
+from gearfmu.spec.tables.lead import Misalignment
+from gearfmu.stage import Steady
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.te import statics_of
+
+ANGLES = (math.pi, -math.pi, 0.5 * math.pi, -2.0, 0.7)
+OFFSETS = ((4e-6, -7e-6), (-3e-6, 5e-6), (2e-6, 6e-6))  # m: of rotors, one after the other
+SAME = 1e-5
+
+
+def whole(stage: Stage, angle: float) -> float:
+    """The next angle that brings the teeth of every engagement into mesh where they were. A train's second pinion has
+    its tooth 0 on +x, whichever way the first wheel stands on the same rotor: multiples of 2π/((z1 + z2) z3) do."""
+    if len(stage.engagements) == 1:
+        return angle
+    z = [gear.teeth for gear in stage.gears]
+    part = 2 * math.pi / ((z[0] + z[1]) * z[2])
+    return round(angle / part) * part
+
+
+def deviating(stage: Stage) -> Stage:
+    """With deviations of axes and runout of every gear, so that the place on a gear matters."""
+    bodies = {
+        name: body.model_copy(update={"eccentricity": Eccentricity(amount=8e-6, angle=0.3 + i)})
+        if isinstance(body, ToothedBody) and body.eccentricity is None
+        else body
+        for i, (name, body) in enumerate(stage.bodies.items())
+    }
+    if len(stage.engagements) > 1:  # drawn by the number of a tooth, which another start counts from elsewhere
+        bodies = {
+            n: b.model_copy(update={"deviations": None}) if isinstance(b, ToothedBody) else b for n, b in bodies.items()
+        }
+    rotors = {
+        name: rotor.model_copy(update={"offset": offset})
+        for (name, rotor), offset in zip(stage.rotors.items(), OFFSETS, strict=False)
+    }
+    meshes = stage.engagements
+    if not stage.planar:
+        skew = Misalignment(out_of_plane=8e-6, in_plane=-5e-6, span=0.1)
+        meshes = tuple(mesh.model_copy(update={"misalignment": skew}) for mesh in meshes)
+    return stage.model_copy(update={"bodies": bodies, "rotors": rotors, "engagements": meshes})
+
+
+def turned(stage: Stage, angle: float) -> Stage:
+    """The whole layout turned about the origin."""
+    rotors = {
+        name: rotor.model_copy(
+            update={"axis": turned_vector(rotor.axis, angle), "offset": turned_vector(rotor.offset, angle)}
+        )
+        for name, rotor in stage.rotors.items()
+    }
+    return stage.model_copy(update={"rotors": rotors})
+
+
+def check_turned(kind: Kind, angles: tuple[float, ...]) -> None:
+    kind = dataclasses.replace(kind, duration=10 * kind.step)
+    stage = deviating(kind.stage)
+    model = kind.model(lambda _: stage)
+    steady = Steady(model.driven_by_springs(), kind.speed, kind.torque)
+    expected, places = run(kind, model, steady), tooth_phases(stage)
+    for angle in (whole(stage, angle) for angle in angles):
+        other = turned(stage, angle)
+        start, behind = start_of(other, {name: place + angle for name, place in places.items()})
+        found = run(kind, kind.model(lambda _, moved=renamed(other, behind): moved), steady, start)
+        found = each_vector(found, lambda _, x, y, angle=angle: turned_vector((x, y), -angle))
+        apart = differences(expected, found)
+        worst = max(apart, key=apart.__getitem__)
+        print(kind.name, angle, worst, apart[worst])
+        assert apart[worst] < SAME, f"{worst} differs by {apart[worst]:.2g} where the layout is turned by {angle:.3g}"
+
+
+@pytest.mark.parametrize("name", ["pair", "helical", "internal", "train"])
+def test_a_layout_turned_as_a_whole(name: str) -> None:
+    """Sees a tooth that is found across −x, a tilt or an offset that does not turn with the layout."""
+    check_turned(KINDS[name], ANGLES if name == "pair" else ANGLES[:1])
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["helical", "internal", "train"])
+def test_a_layout_turned_as_a_whole_by_any_angle(name: str) -> None:
+    """A carrier's bolts are in their places by its body: planets change places instead, as below."""
+    check_turned(KINDS[name], ANGLES[1:])
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(20))
+def test_a_drawn_layout_turned_as_a_whole(seed: int) -> None:
+    kind = drawn(seed)
+    if not kind.stage.carriers:
+        check_turned(kind, ANGLES)
+    else:
+        check_planets(kind, EACH)
+
+
+# ---- planets ---------------------------------------------------------------------------------------------------------
+Change = tuple[str, float]
+EACH = tuple((what, sign) for what in ("radial", "tangential", "runout") for sign in (1.0, -1.0))
+SIZE = {"radial": 3e-6, "tangential": 0.7e-6, "runout": 5e-6}  # m
+
+
+def even(stage: Stage) -> Stage:
+    """With equal planets."""
+    own = stage.bodies["planet1"]
+    bodies = {
+        name: own.model_copy(update={"name": name, "deviations": None}) if name.startswith("planet") else body
+        for name, body in stage.bodies.items()
+    }
+    rotors = {name: rotor.model_copy(update={"offset": (0.0, 0.0)}) for name, rotor in stage.rotors.items()}
+    return stage.model_copy(update={"bodies": bodies, "rotors": rotors})
+
+
+def with_error(stage: Stage, planet: str, change: Change) -> Stage:
+    """A set with one planet's pin out of its place, or its toothing beside its axis."""
+    what, amount = change[0], change[1] * SIZE[change[0]]
+    rotor, gear = stage.rotors[planet], stage.bodies[planet]
+    if what == "runout":
+        assert isinstance(gear, ToothedBody)
+        runout = Eccentricity(amount=abs(amount), angle=0.4 if amount > 0 else 0.4 + math.pi)
+        return stage.model_copy(
+            update={"bodies": stage.bodies | {planet: gear.model_copy(update={"eccentricity": runout})}}
+        )
+    vector = (amount, 0.0) if what == "radial" else (0.0, amount)
+    offset = turned_vector(vector, math.atan2(rotor.axis[1], rotor.axis[0]))
+    return stage.model_copy(update={"rotors": stage.rotors | {planet: rotor.model_copy(update={"offset": offset})}})
+
+
+def loads(kind: Kind, stage: Stage, angle: float) -> np.ndarray:
+    """(2, 2, N): transmission error (m) and force (N) of all meshes at sun and ring where the sun has turned by `angle`
+    (rad) in the axes of the carrier."""
+    model = kind.model(lambda _: stage)
+    kernel, place = statics_of(model), place_of(model, "sun_planet1")
+    at = -angle * stage.gears[0].teeth / (2 * math.pi) * place.pitch
+    states = [kernel.transmission(at, kind.torque, mesh, keep=mesh > 0) for mesh in range(len(stage.engagements))]
+    found = [[state.te for state in states], [sum(map(sum, state.forces.values())) for state in states]]
+    return np.reshape(found, (2, 2, -1))
+
+
+def check_planets(kind: Kind, changes: Sequence[Change], planets: Sequence[int] | None = None) -> None:
+    """An error of planet k shows where an error of the first shows once sun and ring have turned to it: forces change
+    places with the planets."""
+    stage = even(kind.stage)
+    for change in changes:
+        expected = loads(kind, with_error(stage, "planet1", change), 0.0)
+        for k in planets or range(1, expected.shape[2]):
+            x, y = stage.rotors[f"planet{k + 1}"].axis
+            found = loads(kind, with_error(stage, f"planet{k + 1}", change), math.atan2(y, x))
+            apart = np.abs(np.roll(found, -k, axis=2) - expected).max(axis=(1, 2)) / np.abs(expected).max(axis=(1, 2))
+            assert apart.max() < SAME, f"{change} of planet {k + 1}: {found} for {expected} of planet 1"
+
+
+def test_an_error_of_another_planet() -> None:
+    """Sees a planet across −x whose teeth are counted from the other side: with its pin ahead it carried nothing."""
+    check_planets(KINDS["set"], (("tangential", 1.0),), (2,))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["set", "helical_set"])
+def test_each_error_of_each_planet(name: str) -> None:
+    check_planets(KINDS[name], EACH)
