@@ -121,6 +121,11 @@ typedef gk_real gk_four __attribute__((vector_size(4 * sizeof(gk_real)), may_ali
 #define GK_WIDENED(four) __builtin_convertvector(four, gk_quad)
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
                                        aligned(sizeof(gk_real)))); /* states start anywhere */
+/* a half in double, to and fro, and its quads: the form that compilers turn into single instructions */
+typedef double gk_eight __attribute__((vector_size(LANES / 2 * sizeof(double)), may_alias, aligned(sizeof(double))));
+#define GK_WIDER(half) __builtin_convertvector(half, gk_eight)
+#define GK_ROUNDED(eight) __builtin_convertvector(eight, gk_half)
+#define GK_QUAD_OF(eight, j) (((gk_quad *)&(eight))[j])
 
 static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
 {

@@ -28,24 +28,37 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
 }
 
 /* ---- prediction -------------------------------------------------------------------------------------------------- */
-static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                         const gk_coefficients *k, int g)
+/* pairs of a gear group that Coriolis forces couple */
+static int turns(const gk_setup *setup, int g) { return GK_HAS(gyroscopic) ? setup->modal[g].turns : 0; }
+
+/* Ωh of a gear */
+static double angle_of(const gk_model *model, const gk_data *data, const gk_coefficients *k, int g)
 {
-    const int n = GK_LANES(setup, g), halves = 2 * n / LANES;
-    const gk_half *q = SEEN_HALVES(gk_modal_seen(setup, data, g)), *v = q + halves, *f = v + halves;
-    if (GK_HAS(gyroscopic) && setup->modal[g].turns) {
-        gk_frame_turn_gear(&setup->modal[g], k->h * GK_OF(data, v)[model->gear[g].rotor], (const gk_real *)v,
-                           work->turned_speed[g]);
-        v = SEEN_HALVES(work->turned_speed[g]);
-    }
-    const gk_flow *w = &k->flow[g];
+    return k->h * GK_OF(data, v)[model->gear[g].rotor];
+}
+
+/* predicts oscillators of a gear group as if alone, those of its n from `from` on */
+static void predict_modes(const gk_flow *w, const gk_real *state, int n, int from, int to, gk_work *work, int g)
+{
+    const int halves = 2 * n / LANES;
+    const gk_half *q = SEEN_HALVES(state), *v = q + halves, *f = v + halves;
     const gk_half *d11 = SEEN_HALVES(w->d11), *a12 = SEEN_HALVES(w->a12), *b0q = SEEN_HALVES(w->b0q);
     const gk_half *a21 = SEEN_HALVES(w->a21), *d22 = SEEN_HALVES(w->d22), *b0v = SEEN_HALVES(w->b0v);
     gk_half *qp = HALVES(work->qp[g]), *vp = HALVES(work->vp[g]);
-    for (int i = 0; i < halves; i++) {
+    for (int i = 2 * from / LANES; i < 2 * to / LANES; i++) {
         qp[i] = q[i] + (d11[i] * q[i] + a12[i] * v[i] + b0q[i] * f[i]);
         vp[i] = v[i] + (a21[i] * q[i] + d22[i] * v[i] + b0v[i] * f[i]);
     }
+}
+
+static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                         const gk_coefficients *k, int g)
+{
+    const int n = GK_LANES(setup, g), pairs = setup->modal[g].pairs, turned = turns(setup, g);
+    const gk_flow *w = &k->flow[g];
+    const gk_real *state = gk_modal_seen(setup, data, g);
+    if (turned) gk_frame_predict(&setup->modal[g], w, angle_of(model, data, k, g), state, work, g);
+    for (int i = 0; i < n; i += pairs) predict_modes(w, state, n, i + turned, i + pairs, work, g);
     work->y[g] = work->qp[g];
     if (!k->curved_read) return;
     for (int i = 0; i < n; i++) work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];
@@ -103,11 +116,8 @@ static const double *force_with_dampers(const gk_system *s) { return s->last; }
 static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                                     const gk_coefficients *k, int g)
 {
-    const gk_modal *m = &setup->modal[g];
-    if (!GK_HAS(gyroscopic) || !m->turns) return k->flow[g].bv;
-    gk_real *v = work->vp[g];
-    for (int i = 0; i < m->n; i++) v[i] += k->flow[g].bv[i] * work->force[g][i];
-    gk_frame_turn_gear(m, k->h * GK_OF(data, v)[model->gear[g].rotor], v, v);
+    if (!turns(setup, g)) return k->flow[g].bv;
+    gk_frame_finish(&setup->modal[g], &k->flow[g], angle_of(model, data, k, g), work, g);
     return work->zero;
 }
 

@@ -37,20 +37,82 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
     }
 }
 
-/* Speeds of a gear group turned by half a step of Coriolis forces, member into member of every pair (17j): by the angle
- * Ωh times its rate, with the cosine and sine of Cayley's form. angle: Ωh. */
-void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to)
+/* ---- gear groups ------------------------------------------------------------------------------------------------- */
+/* A slow gear turns by less than the last place of a speed in single precision: rounded after its turn, the small member
+ * of a pair would gain energy and the large one not lose it. So speeds are in double from the first turn of a step to the
+ * second, and rounded once with all that changes them. */
+
+/* turns members v, w of eight pairs by half a step (17j): by the angle Ωh times the rate, with the cosine and sine of
+ * Cayley's form. half: ½Ωh. */
+GK_INLINE void turn_members(gk_real half, const gk_real *rate, gk_eight *v, gk_eight *w)
 {
-    GK_ASSERT(m->turns && m->pairs % LANES == 0);
-    const int halves = 2 * m->pairs / LANES;
-    const gk_real half = (gk_real)(0.5 * angle);
-    const gk_half *rate = (const gk_half *)m->turn_rate, *v = (const gk_half *)from, *w = v + halves;
-    gk_half *first = (gk_half *)to, *second = first + halves;
-    for (int i = 0; i < halves; i++) {
-        const gk_half t = half * rate[i], s = (t + t) / (1 + t * t), a = v[i], b = w[i];
-        first[i] = a + s * (b - t * a);
-        second[i] = b - s * (a + t * b);
+    const gk_half tangent = half * *(const gk_half *)rate, sine = (tangent + tangent) / (1 + tangent * tangent);
+    gk_eight t = GK_WIDER(tangent), s = GK_WIDER(sine);
+    for (int j = 0; j < 2; j++) {
+        const gk_quad x = GK_QUAD_OF(*v, j), y = GK_QUAD_OF(*w, j);
+        GK_QUAD_OF(*v, j) = x + GK_QUAD_OF(s, j) * (y - GK_QUAD_OF(t, j) * x);
+        GK_QUAD_OF(*w, j) = y - GK_QUAD_OF(s, j) * (x + GK_QUAD_OF(t, j) * y);
     }
+}
+
+/* predicts eight oscillators of a gear group, from the i-th on, whose speeds are v */
+GK_INLINE void predict_members(const gk_flow *w, const gk_real *q, const gk_real *f, int i, gk_eight *v, gk_eight *to)
+{
+    const gk_half x = *(const gk_half *)(q + i), force = *(const gk_half *)(f + i);
+    gk_eight a12 = GK_WIDER(*(const gk_half *)(w->a12 + i)), d22 = GK_WIDER(*(const gk_half *)(w->d22 + i));
+    gk_eight moved = GK_WIDER(*(const gk_half *)(w->d11 + i) * x + *(const gk_half *)(w->b0q + i) * force);
+    gk_eight pushed = GK_WIDER(*(const gk_half *)(w->a21 + i) * x + *(const gk_half *)(w->b0v + i) * force);
+    gk_eight from = GK_WIDER(x);
+    for (int j = 0; j < 2; j++) {
+        const gk_quad speed = GK_QUAD_OF(*v, j);
+        GK_QUAD_OF(to[0], j) = GK_QUAD_OF(from, j) + (GK_QUAD_OF(moved, j) + GK_QUAD_OF(a12, j) * speed);
+        GK_QUAD_OF(to[1], j) = speed + (GK_QUAD_OF(pushed, j) + GK_QUAD_OF(d22, j) * speed);
+    }
+}
+
+/* Predicts the oscillators of gear group g that Coriolis forces couple, after the first half step of these. angle: Ωh;
+ * state: q, v, f. */
+void gk_frame_predict(const gk_modal *m, const gk_flow *w, double angle, const gk_real *state, gk_work *work, int g)
+{
+    GK_ASSERT(m->turns <= m->pairs && m->turns % (LANES / 2) == 0);
+    const gk_real *v = state + m->n;
+    for (int i = 0; i < m->turns; i += LANES / 2) {
+        gk_eight speed[2] = {GK_WIDER(*(const gk_half *)(v + i)), GK_WIDER(*(const gk_half *)(v + m->pairs + i))};
+        turn_members((gk_real)(0.5 * angle), m->turn_rate + i, &speed[0], &speed[1]);
+        for (int part = 0; part < 2; part++) {
+            const int k = part * m->pairs + i;
+            gk_eight to[2];
+            predict_members(w, state, state + 2 * m->n, k, &speed[part], to);
+            *(gk_half *)(work->qp[g] + k) = GK_ROUNDED(to[0]);
+            *(gk_half *)(work->vp[g] + k) = GK_ROUNDED(to[1]);
+            for (int j = 0; j < 2; j++) ((gk_quad *)(work->turned_speed[g] + k))[j] = GK_QUAD_OF(to[1], j);
+        }
+    }
+}
+
+/* eight predicted speeds, from the i-th on, with what the forces z of the step give them */
+GK_INLINE void push_members(const gk_real *bv, const gk_real *z, const double *predicted, int i, gk_eight *v)
+{
+    *v = GK_WIDER(*(const gk_half *)(bv + i) * *(const gk_half *)(z + i));
+    for (int j = 0; j < 2; j++) GK_QUAD_OF(*v, j) += ((const gk_quad *)(predicted + i))[j];
+}
+
+/* Brings predicted speeds of gear group g to the end of the step, with the second half step of Coriolis forces. angle:
+ * Ωh. */
+void gk_frame_finish(const gk_modal *m, const gk_flow *w, double angle, gk_work *work, int g)
+{
+    const gk_real *z = work->force[g];
+    gk_real *to = work->vp[g];
+    for (int i = 0; i < m->turns; i += LANES / 2) {
+        gk_eight v[2];
+        for (int part = 0; part < 2; part++)
+            push_members(w->bv, z, work->turned_speed[g], part * m->pairs + i, &v[part]);
+        turn_members((gk_real)(0.5 * angle), m->turn_rate + i, &v[0], &v[1]);
+        for (int part = 0; part < 2; part++) *(gk_half *)(to + part * m->pairs + i) = GK_ROUNDED(v[part]);
+    }
+    for (int i = m->turns; i < m->pairs; i += LANES / 2)
+        for (int k = i; k < m->n; k += m->pairs)
+            *(gk_half *)(to + k) += *(const gk_half *)(w->bv + k) * *(const gk_half *)(z + k);
 }
 
 /* adds the same as accelerations, for explicit integrators */

@@ -9,7 +9,9 @@
 GK_HOT gk_step_function gk_step_once;
 /* gk_frame.c */
 GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
-GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
+GK_HOT void gk_frame_predict(const gk_modal *m, const gk_flow *w, double angle, const gk_real *state, gk_work *work,
+                             int g);
+GK_HOT void gk_frame_finish(const gk_modal *m, const gk_flow *w, double angle, gk_work *work, int g);
 GK_HOT void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
 GK_HOT double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
                              const gk_data *data, double *v);

@@ -99,7 +99,7 @@ struct gk_work {
     uint64_t clock;
     /* of every gear group: predicted state, modal force of the rows, of the ground group the same in double */
     gk_real *qp[MAX_GEARS], *vp[MAX_GEARS], *force[MAX_GEARS], *next[MAX_GEARS];
-    gk_real *turned_speed[MAX_GEARS]; /* speeds after half a step of Coriolis forces */
+    double *turned_speed[MAX_GEARS]; /* predicted speeds where Coriolis forces turn them, before they are rounded */
     double *ground_q, *ground_v, *ground_force, *ground_next, *ground_reading,
         *ground_start;           /* speeds after half a step of the supports' dashpots and of turning axes */
     double pressed;              /* work of centrifugal loads in the first half */

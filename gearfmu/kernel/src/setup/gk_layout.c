@@ -289,9 +289,9 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
-        gk_real **array[] = {&work->qp[g],   &work->vp[g],      &work->force[g],
-                             &work->next[g], &work->reading[g], &work->turned_speed[g]};
+        gk_real **array[] = {&work->qp[g], &work->vp[g], &work->force[g], &work->next[g], &work->reading[g]};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(&b, n);
+        work->turned_speed[g] = doubles(&b, n);
         for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
         work->trial[g] = reals(&b, 2 * n);
         widest = n > widest ? n : widest;

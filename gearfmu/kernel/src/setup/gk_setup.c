@@ -30,6 +30,14 @@ static void fill_modal(const gk_gear *gear, gk_modal *m)
     }
 }
 
+/* pairs up to the last that Coriolis forces couple, in whole halves */
+static int turning(const gk_modal *m)
+{
+    int last = m->pairs;
+    while (last > 0 && m->turn_rate[last - 1] == 0) last--;
+    return (last + LANES / 2 - 1) / (LANES / 2) * (LANES / 2);
+}
+
 /* the dynamic columns of rows over all ground oscillators */
 static void select_rows(const gk_base *base, const double *rows, int count, int all, double *out)
 {
@@ -326,7 +334,7 @@ void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const 
     int coasts[MAX_ENGAGEMENTS];
     for (int g = 0; g < model->gears; g++) {
         fill_modal(&model->gear[g], &setup->modal[g]);
-        setup->modal[g].turns = GK_ON(setup, gyroscopic) && model->gear[g].turn_rate;
+        if (GK_ON(setup, gyroscopic)) setup->modal[g].turns = turning(&setup->modal[g]);
     }
     fill_base(model, setup, which);
     fill_ports(model, setup);

@@ -29,7 +29,7 @@ typedef struct gk_modal { /* dynamic modes of a gear group: n lanes, [first memb
     gk_real *omega2;
     int32_t *lane;          /* (count) lane of every dynamic mode */
     gk_real *cosine, *sine; /* (z, pairs) */
-    int turns;              /* Coriolis forces couple the members of pairs: the effect is on and known */
+    int turns;              /* so many pairs are coupled by Coriolis forces; 0 where the effect is off or unknown */
     gk_real *turn_rate;     /* (pairs) */
 } gk_modal;
 
