@@ -12,7 +12,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 5
+ABI = 6
 MESSAGE = 512
 OUTCOMES = (
     "ok",
@@ -27,6 +27,7 @@ OUTCOMES = (
     "penetration",
     "energy",
 )
+REFUSALS = tuple(map(OUTCOMES.index, ("bad_variable", "bad_value", "bad_call")))
 TYPES = ("Real", "Integer", "Boolean", "Enumeration")
 CAUSALITIES = ("input", "output", "parameter")
 
@@ -45,6 +46,23 @@ class VariableInfo(ctypes.Structure):
         ("start", c_double),
         ("minimum", c_double),
         ("maximum", c_double),
+    ]
+
+
+class RecordingInfo(ctypes.Structure):
+    """gk_recording."""
+
+    _fields_ = [
+        ("H", c_double),
+        ("first", c_uint64),
+        ("steps", c_uint64),
+        ("given", c_uint64),
+        ("kept", c_uint64),
+        ("inputs", c_void_p),
+        ("outputs", c_void_p),
+        ("input", c_void_p),
+        ("output", c_void_p),
+        ("done", c_uint64),
     ]
 
 
@@ -70,6 +88,7 @@ _SIGNATURES = {
     "gk_initialize": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double]),
     "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double]),
     "gk_time": (c_double, [c_void_p]),
+    "gk_record": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, POINTER(RecordingInfo)]),
     "gk_te": (
         c_int,
         [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, c_int, POINTER(c_double), POINTER(c_int)],

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearfmu.errors import ModelError, SimulationError
-from gearfmu.kernel.binding import CAUSALITIES, OUTCOMES, TYPES, VariableInfo, aligned, blank_message, load
+from gearfmu.kernel.binding import CAUSALITIES, OUTCOMES, TYPES, RecordingInfo, VariableInfo, aligned, blank_message, load
 
 if TYPE_CHECKING:
     from gearfmu.kernel.linear import LinearModel
@@ -158,6 +158,11 @@ class Kernel:
         """Fast path: outcome number of gk_get, the value in `out`."""
         return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
 
+    def references(self, names: Iterable[str]) -> ctypes.Array:
+        """Value references (c_uint32) of variables; ModelError for one that there is not."""
+        known = list(map(self._reference, names))
+        return (ctypes.c_uint32 * len(known))(*known)
+
     def set_many(self, references: ctypes.Array, values: ctypes.Array | int) -> int:
         """Inputs by value reference (c_uint32) and number (c_double; an array or its address), all or none: outcome
         number."""
@@ -179,19 +184,23 @@ class Kernel:
     def initialize(self, time: float = 0.0) -> None:
         """Prepare and start from static equilibrium. SimulationError(no_equilibrium) when there is none."""
         self.prepare()
-        self._check(self._lib.gk_initialize(self._model, self._setup, self._work, self._data, time))
+        self.check(self._lib.gk_initialize(self._model, self._setup, self._work, self._data, time))
 
     def step(self, time: float, h: float) -> None:
         """One communication step from `time` over `h` (s). SimulationError with the named outcome; the state then
         stands at `self.time`."""
         outcome = self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
         if outcome:
-            self._check(outcome)
+            self.check(outcome)
 
     def try_step(self, time: float, h: float) -> int:
         """Fast path: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call
         alone costs."""
         return self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
+
+    def record(self, info: RecordingInfo) -> int:
+        """Outcome number of gk_record."""
+        return self._lib.gk_record(self._model, self._setup, self._work, self._data, ctypes.byref(info))
 
     def save(self) -> bytes:
         """The state: a copy of its bytes."""
@@ -227,7 +236,7 @@ class Kernel:
         out = (ctypes.c_double * (3 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
         known = (self._model, self._setup, self._work, self._data, phi_out, torque, mesh)
-        self._check(self._lib.gk_te(*known, int(keep), out, ctypes.byref(count)))
+        self.check(self._lib.gk_te(*known, int(keep), out, ctypes.byref(count)))
         width = 2 + int(self.get("slices"))
         rows = [out[3 + i * width : 3 + (i + 1) * width] for i in range(count.value)]
         return TeState(out[0], out[1], out[2], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
@@ -245,7 +254,7 @@ class Kernel:
         names = self.ports
         phi, given = (ctypes.c_double * len(names))(), [torques.get(name, 0.0) for name in names]
         torque = (ctypes.c_double * len(names))(*given)
-        self._check(self._lib.gk_rest(self._model, self._setup, self._work, self._data, torque, phi))
+        self.check(self._lib.gk_rest(self._model, self._setup, self._work, self._data, torque, phi))
         return dict(zip(names, phi, strict=True))
 
     def linearise(self) -> LinearModel:
@@ -254,9 +263,9 @@ class Kernel:
         from gearfmu.kernel.linear import LinearInfo, linear_model, room_for
 
         info = LinearInfo()
-        self._check(self._lib.gk_linearise_room(self._model, self._setup, ctypes.byref(info)))
+        self.check(self._lib.gk_linearise_room(self._model, self._setup, ctypes.byref(info)))
         arrays = room_for(info)
-        self._check(self._lib.gk_linearise(self._model, self._setup, self._work, self._data, ctypes.byref(info)))
+        self.check(self._lib.gk_linearise(self._model, self._setup, self._work, self._data, ctypes.byref(info)))
         return linear_model(info, arrays)
 
     def profile(self) -> dict[str, int]:
@@ -271,7 +280,8 @@ class Kernel:
     def _text(self, outcome: int) -> str:
         return self._lib.gk_outcome_text(outcome).decode()
 
-    def _check(self, outcome: int) -> None:
+    def check(self, outcome: int) -> None:
+        """SimulationError with the words of an outcome number that is not 0."""
         if outcome:
             raise SimulationError(
                 f"{self.name}: {self._text(outcome)} (last good time {self.time:.9g} s)", OUTCOMES[outcome], self.time

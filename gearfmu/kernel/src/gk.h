@@ -19,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 5
+#define GK_ABI 6
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {
@@ -92,6 +92,21 @@ GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk
 GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time,
                           double H);
 GK_API double gk_time(const gk_data *data);
+
+/* `steps` communication steps of H (s), step n beginning at n·H; rows of numbers by value reference. */
+typedef struct gk_recording {
+    double H;
+    uint64_t first, steps;   /* number of the first one; how many                                                 */
+    uint64_t given, kept;    /* how many inputs and outputs                                                       */
+    const uint32_t *inputs;  /* (given)                                                                           */
+    const uint32_t *outputs; /* (kept)                                                                            */
+    const double *input;     /* (steps, given): set before each step                                              */
+    double *output;          /* (steps, kept): taken after each step                                              */
+    uint64_t done;           /* steps that were made: as many rows of `output` are written                        */
+} gk_recording;
+/* Ends at the first input that is refused or step that fails, with its outcome. */
+GK_API gk_outcome gk_record(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                            gk_recording *recording);
 
 /* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the
  * second held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.run.simulate import Steady
+from gearfmu.stage.run.simulate import Steady, Wound
 
 BETWEEN = 8  # largest part of the range of torques between two of them whose winding is computed: 1/BETWEEN
 BACKLASH = 0.02  # of the largest torque: within it a torque that changes its sign passes the backlash
@@ -27,42 +27,47 @@ class Line:
         steps = 0.5 * (self.values[1:] + self.values[:-1]) * np.diff(self.time)
         return np.concatenate([[0.0], np.cumsum(steps)])
 
-    def at(self, time: float) -> tuple[float, float, float]:
-        """Value, slope and integral from the first point on. The slope at a corner is that behind it."""
-        k = int(np.searchsorted(self.time, time, side="right")) - 1
-        since = time - self.time[max(k, 0)]
-        if k < 0 or k == self.time.size - 1:
-            value = float(self.values[max(k, 0)])
-            return value, 0.0, float(self._areas[max(k, 0)]) + value * since
-        slope = float(self.values[k + 1] - self.values[k]) / float(self.time[k + 1] - self.time[k])
-        first = float(self.values[k])
-        return first + slope * since, slope, float(self._areas[k]) + (first + 0.5 * slope * since) * since
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        return np.append(np.diff(self.values) / np.diff(self.time), 0.0)
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, slopes and integrals from the first point on at times (n,). The slope at a corner is that behind
+        it."""
+        k = np.searchsorted(self.time, times, side="right") - 1
+        point = np.maximum(k, 0)
+        since, first, slope = times - self.time[point], self.values[point], np.where(k < 0, 0.0, self._slopes[point])
+        return first + slope * since, slope, self._areas[point] + (first + 0.5 * slope * since) * since
 
 
 @dataclass(frozen=True)
-class Profiled:
+class Profiled(Wound):
     """Inputs of a stage whose input follows a speed over time (Line, rad/s) while shafts and meshes are wound up by a
     torque over time (Line, N·m, on the input), as `Steady` does for constant ones. For spring ports without a chain.
 
-    What the stage takes up under a torque, its mean over a pitch, is computed at the torques of the points and between
+    parameters: as of `Steady`. What the stage takes up under a torque, its mean over a pitch, is computed at the torques of the points and between
     them at eighths of their range, and follows straight lines over the torque.
     """
 
     model: StageModel
     torque: Line
     speed: Line
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def winding(self) -> Line:
         """Angle of the input (rad) over the torque on it (N·m, in place of the time)."""
         torques = winding_torques(self.torque.values)
-        still = Steady(self.model, 0.0, 0.0)
+        still = Steady(self.model, 0.0, 0.0, parameters=self.parameters)
         return Line(torques, np.array([replace(still, torque=float(torque)).winding for torque in torques]))
 
-    def __call__(self, time: float) -> Mapping[str, float]:
+    def under(self, parameters: Mapping[str, float]) -> Profiled:
+        return replace(self, parameters=parameters)
+
+    def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}
-        torque, growing, _ = self.torque.at(time)
-        speed, rate, angle = self.speed.at(time)
+        torque, growing, _ = self.torque.at(times)
+        speed, rate, angle = self.speed.at(times)
         taken, yielding, _ = self.winding.at(torque)
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
             stiffness = self.model.stage.ports[port].k

@@ -3,47 +3,68 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from typing_extensions import Self
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
+from gearfmu.kernel.recording import Recording
 from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Channel, Trace
 
 WINDING_POSITIONS = 16
+CHUNKS, LEAST_CHUNK = 200, 16  # a run is made in at most so many calls of the kernel, of at least so many steps
 
 Inputs = Callable[[float], Mapping[str, float]]
 
 
+class Wound(ABC):
+    """Inputs under which a stage carries a torque: functions of time that know the run's parameters, for its effects
+    decide what it takes up."""
+
+    @abstractmethod
+    def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Values (n,) by input name at times (n,), s."""
+
+    @abstractmethod
+    def under(self, parameters: Mapping[str, float]) -> Self:
+        """The same torque and speed in a run with these parameters of the kernel."""
+
+    def __call__(self, time: float) -> dict[str, float]:
+        """Values by input name at a time, s."""
+        return {name: float(values[0]) for name, values in self.over(np.array([time])).items()}
+
+
 @dataclass(frozen=True)
-class Steady:
+class Steady(Wound):
     """Inputs of a stage under a constant load: the outer ends of its input and output turn at constant speed, or gather
     it at a constant rate, wound up so that shafts and meshes carry the torque on average: τ/k on either port and the
     mean loaded transmission between them.
 
-    speed: of the input at the start, rad/s; torque: on the input, N·m; rate: of the speed, rad/s². For spring ports
-    without a chain.
+    speed: of the input at the start, rad/s; torque: on the input, N·m; rate: of the speed, rad/s²; parameters: of the
+    kernel in the run, which `simulate` fills in. For spring ports without a chain.
     """
 
     model: StageModel
     speed: float
     torque: float
     rate: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def winding(self) -> float:
         """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh."""
-        kernel, ratio = statics_of(self.model), self.model.shafts.ratio
-        angles = [-self._pitch * i / WINDING_POSITIONS for i in range(WINDING_POSITIONS)]
-        return float(np.mean([kernel.transmission(at, self.torque).phi - ratio * at for at in angles]))
+        angles = tuple(-self._pitch * i / WINDING_POSITIONS for i in range(WINDING_POSITIONS))
+        known = tuple(sorted(self.parameters.items()))
+        return _winding(self.model.blob, known, self.torque, angles, float(self.model.shafts.ratio))
 
     @property
     def _pitch(self) -> float:
@@ -55,18 +76,42 @@ class Steady:
         near = [m for mesh, m in zip(stage.engagements, own, strict=True) if rotor in map(stage.rotor_of, mesh.gears)]
         return 2 * np.pi / min(abs(float(m.relative(speeds))) * m.teeth for m in near or own)
 
-    def __call__(self, time: float) -> Mapping[str, float]:
+    def under(self, parameters: Mapping[str, float]) -> Steady:
+        return replace(self, parameters=parameters)
+
+    def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
             stiffness = self.model.stage.ports[port].k
             assert stiffness is not None, "the port is a spring"
             sense = 1.0 if port == shafts.input else -1.0
             wound = sense * self.torque / turn / stiffness + (self.winding if port == shafts.input else 0.0)
-            values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * time) * time
-            values[f"{port}.w"] = turn * (self.speed + self.rate * time)
+            values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * times) * times
+            values[f"{port}.w"] = turn * (self.speed + self.rate * times)
             if self.rate:
-                values[f"{port}.a"] = turn * self.rate
+                values[f"{port}.a"] = np.full(times.size, turn * self.rate)
         return values
+
+
+@lru_cache(maxsize=8)
+def _winding(
+    blob: bytes, parameters: tuple[tuple[str, float], ...], torque: float, angles: tuple[float, ...], ratio: float
+) -> float:
+    """`Steady.winding`; angles: of the output, rad."""
+    kernel = statics_of_run(blob, dict(parameters))
+    return float(np.mean([kernel.transmission(at, torque).phi - ratio * at for at in angles]))
+
+
+def statics_of_run(blob: bytes, parameters: Mapping[str, float]) -> Kernel:
+    """A kernel prepared for the statics of runs with these parameters, which do not depend on level, integrator and
+    step: level rigid. But level paper and contact by nodes know less compliance, and their statics are their own."""
+    kernel = Kernel(blob, parameters)
+    chosen = {name: kernel.variables[name].items[int(kernel.get(name))] for name in ("level", "contact")}
+    if chosen["level"] != "paper" and chosen["contact"] != "nodal":
+        for name in ("level", "integrator", "h"):
+            kernel.set(name, 0.0)
+    kernel.prepare()
+    return kernel
 
 
 def simulate(
@@ -80,32 +125,51 @@ def simulate(
     """Run from static equilibrium at t = 0 for `duration` (s) with communication steps `step` (s); every output is
     recorded at every step.
 
-    inputs: time (s) → values by input name, asked at the start of each step. progress: called with the part done, 0 …
-    1. A run that stops early keeps its samples; the trace's meta says the outcome and the last good time.
+    inputs: time (s) → values by input name, asked for the start of each step, some steps ahead; those of `Wound` are
+    told the parameters. progress: called with the part done, 0 … 1. A run that stops early keeps its samples; the
+    trace's meta says the outcome and the last good time.
     """
     kernel = Kernel(model.blob, parameters)
+    if isinstance(inputs, Wound):
+        inputs = inputs.under(parameters or {})
     names = [v.name for v in kernel.variables.values() if v.causality == "output"]
     count = round(duration / step)
-    samples = np.empty((count + 1, len(names)))
-    started, outcome, done = clock.process_time(), "completed", 0
-    _set(kernel, inputs(0.0))
+    started, outcome = clock.process_time(), "completed"
+    for name, value in inputs(0.0).items():
+        kernel.set(name, value)
     kernel.initialize(0.0)
-    samples[0] = [kernel.get(name) for name in names]
+    record = Recording(kernel, names, count, step)
     try:
-        for i in range(count):
-            _set(kernel, inputs(i * step))
-            kernel.step(i * step, step)
-            samples[i + 1] = [kernel.get(name) for name in names]
-            done = i + 1
-            if progress and i % max(1, count // 200) == 0:
-                progress(i / count)
+        for first, times in _chunks(count, step):
+            record.advance(times.size, _given(inputs, times, kernel))
+            if progress:
+                progress(first / count)
     except SimulationError as error:
         outcome = error.outcome
-    cpu = clock.process_time() - started
-    channels = _channels(kernel, names, samples[: done + 1])
+    cpu, done = clock.process_time() - started, record.done
+    channels = _channels(kernel, names, record.rows[: done + 1])
     price = {"cpu_s": cpu, "realtime_factor": cpu / (done * step) if done else None}
     run = {"outcome": outcome, "simulated_s": done * step, "H": step, "energy_residual": relative_residual(channels)}
     return Trace(np.arange(done + 1) * step, channels, _meta(model, kernel) | run | price)
+
+
+def _chunks(count: int, step: float) -> Iterator[tuple[int, np.ndarray]]:
+    """Number of the first step, and times (s) of steps that are made by one call."""
+    size = max(LEAST_CHUNK, -(-count // CHUNKS))
+    for first in range(0, count, size):
+        yield first, np.arange(first, min(first + size, count)) * step
+
+
+def _given(inputs: Inputs, times: np.ndarray, kernel: Kernel) -> dict[str, np.ndarray]:
+    """Values (n,) by input name at times (n,); an input that is not named keeps its value."""
+    if isinstance(inputs, Wound):
+        return inputs.over(times)
+    asked = [inputs(time) for time in times.tolist()]
+    now, rows = {name: kernel.get(name) for values in asked for name in values}, []
+    for values in asked:
+        now.update(values)
+        rows.append(tuple(now.values()))
+    return dict(zip(now, np.array(rows, float).T, strict=True))
 
 
 def relative_residual(channels: Mapping[str, Channel]) -> float | None:
@@ -114,11 +178,6 @@ def relative_residual(channels: Mapping[str, Channel]) -> float | None:
     work, stored, residual = (channels[f"energy.{name}"].values for name in ("work", "stored", "residual"))
     exchanged = float(np.abs(work).max() + stored.max())
     return float(residual[-1]) / exchanged if exchanged else None
-
-
-def _set(kernel: Kernel, values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        kernel.set(name, value)
 
 
 def _channels(kernel: Kernel, names: Sequence[str], samples: np.ndarray) -> dict[str, Channel]:

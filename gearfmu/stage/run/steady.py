@@ -145,7 +145,8 @@ def steady_run(
 def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Inputs:
     if drive.profile is not None:
         return Profiled(model, torque, speed)
-    return Steady(model, float(speed.values[0]), float(torque.values[0]), speed.at(0.0)[1])
+    rate = speed.at(np.zeros(1))[1]
+    return Steady(model, float(speed.values[0]), float(torque.values[0]), float(rate[0]))
 
 
 def _range(variable: Variable) -> Range:
