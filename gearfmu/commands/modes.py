@@ -65,9 +65,9 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     if torque == 0:
         raise click.BadParameter("must not be 0: flanks have to carry load", param_hint="--torque")
     from gearfmu.modes.linear import stage_modes
-    from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
+    from gearfmu.report.campbell import campbell_columns, crossings, mesh_families, write_campbell
     from gearfmu.stage import assemble
-    from gearfmu.stage.run.limits import engagements_per_turn, largest_speed, largest_torque
+    from gearfmu.stage.run.limits import largest_speed, largest_torque
     from gearfmu.stage.run.trace import write_columns
 
     model = assemble(spec, bodies)
@@ -76,13 +76,13 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
         warn_of_limits(model, (torque,))
     for line in stage_table(found):
         click.echo(line)
-    name, cycles, speed_max = model.shafts.input, engagements_per_turn(model), largest_speed(model)
-    for line in crossing_lines(crossings(found, cycles, speed_max), name, len(cycles) > 1):
+    name, families, speed_max = model.shafts.input, mesh_families(model), largest_speed(model)
+    for line in crossing_lines(crossings(found, families, speed_max), name, len(found.meshes) > 1):
         click.echo(line)
     out.mkdir(parents=True, exist_ok=True)
     paths = out / f"{spec.name}_frequencies.csv", out / f"{spec.name}_campbell.png"
     write_columns(paths[0], campbell_columns(found))
-    write_campbell(found, name, cycles, speed_max, paths[1])
+    write_campbell(found, name, families, speed_max, paths[1])
     click.echo(f"{paths[0]}, {paths[1]}")
 
 
@@ -98,18 +98,25 @@ def stage_table(found: Any) -> list[str]:
             f"{1e-6 * found.mesh_force[:, k].mean(axis=0).max():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} "
             f"{share[3]:6.0f}"
         )
+    if found.rigid.size:
+        low, high = found.rigid.min(), found.rigid.max()
+        lines.append(
+            f"not among them: free rotation of the whole stage, {low:.0f} … {high:.0f} Hz by its loads alone, as no "
+            "spring port holds it"
+        )
     return lines
 
 
-def crossing_lines(found: Any, shaft: str, train: bool) -> list[str]:
-    """A line for each mode and mesh: the orders that meet it, and where."""
+def crossing_lines(found: Any, shaft: str, several: bool) -> list[str]:
+    """A line for each mode and each kind of equal meshes: the orders that meet it, and where. several: the stage has
+    several meshes, whose names are told."""
     lines: dict[tuple[str, int], list[str]] = {}
     for crossing in found:
         rpm = 30 / math.pi * crossing.speed
-        lines.setdefault((crossing.mesh, crossing.mode), []).append(f"{crossing.order} at {rpm:.0f}")
+        lines.setdefault((crossing.family.name, crossing.mode), []).append(f"{crossing.order} at {rpm:.0f}")
     return [
-        f"mode {mode} meets mesh order {', '.join(orders)} rpm of the {shaft}" + (f" ({mesh})" if train else "")
-        for (mesh, mode), orders in lines.items()
+        f"mode {mode} meets mesh order {', '.join(orders)} rpm of the {shaft}" + (f" ({name})" if several else "")
+        for (name, mode), orders in lines.items()
     ]
 
 

@@ -6,13 +6,14 @@ quasi-static (docs/theory.md, 8):
 
     x = W q,   λ = −(Q + S)⁻¹ x     ⇒     M q̈ + [diag(ω²) + Wᵀ (Q + S)⁻¹ W] q = 0                              (29)
 
-The position is frozen; gears do not turn.
+The position is frozen; gears do not turn. Where neither meshes nor springs of ports resist a rotation of the whole
+stage, that rotation is no mode: its frequency, near 0 or imaginary, is only how its loads change with its position.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +22,9 @@ import scipy.linalg as sl
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
-from gearfmu.spec.forms.general import ShaftBody
+from gearfmu.modes.followed import followed
+from gearfmu.spec.forms.general import ShaftBody, Stage
+from gearfmu.spec.forms.turning import rolling
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.assembly import mount_sets
 from gearfmu.stage.build.groups import Group
@@ -30,15 +33,17 @@ from gearfmu.stage.run.limits import places_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 FULL = 3.0  # level at which every oscillator is dynamic
-RIGID_HZ = 1.0  # below it a mode is rigid rotation of the stage
+SPARE = 10  # modes followed beyond those asked for: some leave the lowest ones on their way through the pitch
+RIGID = 0.5  # of a mode's kinetic energy in free rotation of the stage: beyond it the mode is that rotation
 
 
 @dataclass(frozen=True)
 class StageModes:
-    """Natural frequencies over one pitch. torque N·m on the input; position (P,) in pitches; frequency (P, n) Hz,
-    ascending at each position, none rigid; damping_ratio (P, n); shares (P, n, 4): of the strain energy in `GROUPS`;
-    mesh_force (P, n, E): N/m, amplitude of the force of each engagement at resonance per amplitude of a transmission
-    error there that drives it; meshes (E,): their names."""
+    """Natural frequencies over one pitch. torque N·m on the input; position (P,) in pitches; frequency (P, n) Hz, each
+    column one mode followed over the positions, their means ascending; damping_ratio (P, n); shares (P, n, 4): of the
+    strain energy in `GROUPS`; mesh_force (P, n, E): N/m, amplitude of the force of each engagement at resonance per
+    amplitude of a transmission error there that drives it; meshes (E,): their names; rigid (P, d): Hz, of the free
+    rotations of the whole stage, which are no modes, 0 where the position is unstable."""
 
     torque: float
     position: np.ndarray
@@ -47,6 +52,7 @@ class StageModes:
     shares: np.ndarray
     mesh_force: np.ndarray
     meshes: tuple[str, ...] = ("mesh",)
+    rigid: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def stage_modes(
@@ -58,13 +64,35 @@ def stage_modes(
     SimulationError(no_equilibrium) where the stage finds none.
     """
     position, kernel, shafts = np.arange(positions) / positions, full_kernel(model), shaft_rows(model, bodies)
-    found = [linearised(model, torque, part, kernel, shafts).modes(count) for part in position]
-    n = min(part[0].size for part in found)
+    found = [_at(model, torque, part, (kernel, shafts, count + SPARE)) for part in position]
+    orders = followed(found[0].mass, [own.shapes for own in found])
+    frequency = np.stack([own.values[0][order] for own, order in zip(found, orders, strict=True)])
+    lowest = np.argsort(frequency.mean(axis=0), kind="stable")[:count]
     frequency, damping_ratio, shares, mesh_force = (
-        np.stack([values[:n] for values in part]) for part in zip(*found, strict=True)
+        np.stack([own.values[k][order[lowest]] for own, order in zip(found, orders, strict=True)]) for k in range(4)
     )
     meshes = tuple(mesh.name for mesh in model.stage.engagements)
-    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes)
+    rigid = np.stack([own.rigid for own in found])
+    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, rigid)
+
+
+@dataclass(frozen=True)
+class _Position:
+    """Modes at one position: masses, shapes, what `Linearised.modes` returns, Hz of free rotations."""
+
+    mass: np.ndarray
+    shapes: np.ndarray
+    values: tuple[np.ndarray, ...]
+    rigid: np.ndarray
+
+
+def _at(model: StageModel, torque: float, position: float, how: tuple[Kernel, np.ndarray | None, int]) -> _Position:
+    """how: kernel, `shaft_rows`, number of modes."""
+    kernel, shafts, count = how
+    system = linearised(model, torque, position, kernel, shafts)
+    squared, shapes, rigid = system.shapes(count)
+    turning = np.sqrt(np.maximum(rigid, 0.0)) / (2 * np.pi)
+    return _Position(system.linear.mass, shapes, system.values(squared, shapes), turning)
 
 
 def linearised(
@@ -75,7 +103,28 @@ def linearised(
     kernel = kernel or full_kernel(model)
     pitch = max((place.pitch for place in places_of(model)), key=abs)
     kernel.transmission(-position * pitch, torque)
-    return Linearised(kernel.linearise(), shafts)
+    linear = kernel.linearise()
+    return Linearised(linear, shafts, free_rotations(model.stage, linear))
+
+
+def free_rotations(stage: Stage, linear: LinearModel) -> np.ndarray:
+    """(n, d): rotations of the stage that neither its meshes, as rigid gears, nor springs of ports resist, orthonormal
+    by the mass."""
+    spins = np.flatnonzero(linear.group == SPIN)
+    rolls = np.array([[float(own.get(name, 0)) for name in stage.rotors] for own in rolling(stage)])
+    of_rotors = np.zeros((len(rolls), len(spins)))
+    number = linear.number[spins]
+    known = number < len(stage.rotors)
+    of_rotors[:, known] = rolls[:, number[known]]
+    springs = linear.rows[linear.label[:, 0] < 0][:, spins]
+    root, found = np.sqrt(linear.mass[spins]), np.zeros((len(linear.mass), 0))
+    if spins.size:
+        rows = np.vstack([of_rotors, springs]) / root
+        largest = np.abs(rows).max(axis=1, keepdims=True)
+        free = sl.null_space(rows / np.where(largest > 0, largest, 1.0), rcond=1e-6)
+        found = np.zeros((len(linear.mass), free.shape[1]))
+        found[spins] = free / root[:, None]
+    return found
 
 
 def full_kernel(model: StageModel) -> Kernel:
@@ -105,10 +154,12 @@ def _elastic(group: Group, body: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Linearised:
-    """Equation (29). linear: of the kernel; shafts: `shaft_rows`, whose strain energy counts as that of shafts."""
+    """Equation (29). linear: of the kernel; shafts: `shaft_rows`, whose strain energy counts as that of shafts; free:
+    `free_rotations`, none when None."""
 
     linear: LinearModel
     shafts: np.ndarray | None = None
+    free: np.ndarray | None = None
 
     @cached_property
     def compliance(self) -> np.ndarray:
@@ -123,10 +174,13 @@ class Linearised:
         return np.diag(linear.mass * linear.omega**2) + 0.5 * (coupling + coupling.T)
 
     def modes(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Frequencies (count,) Hz above `RIGID_HZ`, ascending, damping ratios, shares (count, 4) of the strain energy,
-        and of each engagement (count, E) the mesh force at resonance per transmission error (N/m): Γ²/(2ζω²), Γ the
+        """`values` of the `count` lowest modes."""
+        return self.values(*self.shapes(count)[:2])
+
+    def values(self, squared: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of modes with ω² (k,) and shapes (n, k): frequencies (k,) Hz, damping ratios, shares (k, 4) of the strain
+        energy, and of each engagement (k, E) the mesh force at resonance per transmission error (N/m): Γ²/(2ζω²), Γ the
         force of a mode φ along the line of action, −τᵀ(Q + S)⁻¹Wφ, τ derivative of the gaps by the error."""
-        squared, shapes = self.shapes(count)
         omega = np.sqrt(squared)
         forces = np.linalg.solve(self.compliance, self.linear.rows @ shapes)
         ratio = self._loss(forces, shapes) / (2 * omega)
@@ -134,14 +188,16 @@ class Linearised:
         mesh_force = np.stack(drive, axis=1) ** 2 / (2 * ratio * squared)[:, None]
         return omega / (2 * np.pi), ratio, self._energies(forces, shapes) / squared[:, None], mesh_force
 
-    def shapes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """ω² (count,) of the modes above `RIGID_HZ`, ascending, and mass-normalised shapes (n, count)."""
+    def shapes(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """ω² (count,) of the lowest modes, ascending, mass-normalised shapes (n, count), and ω² (d,) of the free
+        rotations of the stage, which are not among them."""
         scale = 1 / np.sqrt(self.linear.mass)
-        spins = int((self.linear.group == SPIN).sum())
-        last = min(count + spins, len(scale)) - 1  # no more modes are rigid than there are spins
+        free = np.zeros((len(scale), 0)) if self.free is None else self.free
+        last = min(count + free.shape[1], len(scale)) - 1
         squared, shapes = sl.eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, last])
-        first = int(np.searchsorted(squared, (2 * np.pi * RIGID_HZ) ** 2))
-        return squared[first : first + count], scale[:, None] * shapes[:, first : first + count]
+        shapes = scale[:, None] * shapes
+        rigid = ((free.T @ (self.linear.mass[:, None] * shapes)) ** 2).sum(axis=0) > RIGID
+        return squared[~rigid][:count], shapes[:, ~rigid][:, :count], squared[rigid]
 
     def _error(self, engagement: int) -> np.ndarray:
         """(m,): derivative of the gaps by the transmission error of one engagement."""

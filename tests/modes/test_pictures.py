@@ -15,7 +15,7 @@ from gearfmu.modes.linear import StageModes
 from gearfmu.modes.shapes import Mode
 from gearfmu.modes.vtu import write_mode
 from gearfmu.report import modes as pictures
-from gearfmu.report.campbell import campbell_columns, crossings, loud, write_campbell
+from gearfmu.report.campbell import Family, campbell_columns, crossings, loud, write_campbell
 
 
 def test_vtu_of_a_pair_holds_both_shapes_as_drawn(tmp_path: Path) -> None:
@@ -90,6 +90,9 @@ def test_names(energy: tuple, parity: int, diameter: int, motion: str, name: str
     assert name in pictures.heading(mode) and f"ν = {diameter}" in pictures.heading(mode, short=True)
 
 
+MESH = Family("mesh", (0,), 20.0)
+
+
 def two_modes() -> StageModes:
     frequency = np.array([[500.0, 2000.0], [520.0, 2000.0]])
     shares = np.zeros((2, 2, 4))
@@ -101,9 +104,9 @@ def two_modes() -> StageModes:
 
 def test_crossings_by_hand() -> None:
     """510 Hz and 20 teeth: order 1 at 25.5 rev/s, order 2 at half of that …; a mode that no te drives is left out."""
-    found = crossings(two_modes(), [20], 2 * np.pi * 20)
+    found = crossings(two_modes(), [MESH], 2 * np.pi * 20)
     assert loud(two_modes()).tolist() == [[True], [False]]
-    assert [(c.mesh, c.order, c.mode) for c in found] == [("mesh", k, 1) for k in range(2, 9)]
+    assert [(c.family, c.order, c.mode) for c in found] == [(MESH, k, 1) for k in range(2, 9)]
     assert [c.speed for c in found] == pytest.approx([2 * np.pi * 510 / (20 * k) for k in range(2, 9)])
 
 
@@ -111,5 +114,17 @@ def test_campbell_table_and_picture(tmp_path: Path) -> None:
     columns = campbell_columns(two_modes())
     assert columns["frequency_Hz"].tolist() == [510, 2000] and columns["lowest_Hz"].tolist() == [500, 2000]
     assert columns["mesh_share"].tolist() == [1, 1]
-    write_campbell(two_modes(), "pinion", [20], 2 * np.pi * 20, tmp_path / "campbell.png")
+    write_campbell(two_modes(), "pinion", [MESH], 2 * np.pi * 20, tmp_path / "campbell.png")
     assert min(Image.open(tmp_path / "campbell.png").size) > 600
+
+
+def test_campbell_picture_of_many_meshes_is_whole(tmp_path: Path) -> None:
+    """Fault: a legend of ten entries in rows of six squeezed the diagram into the left half and was cut off."""
+    eight, names = np.repeat(two_modes().mesh_force, 8, axis=2), tuple(f"sun_planet{k}" for k in range(1, 9))
+    modes = replace(two_modes(), mesh_force=eight, meshes=names)
+    families = [Family(name, (k,), 20.0 + k) for k, name in enumerate(names)]
+    write_campbell(modes, "carrier", families, 2 * np.pi * 20, tmp_path / "campbell.png")
+    ink = np.asarray(Image.open(tmp_path / "campbell.png").convert("L")) < 200
+    height, width = ink.shape
+    assert not ink[:, -3:].any() and not ink[:2].any(), "nothing is cut off"
+    assert ink[height // 3 : 2 * height // 3, -width // 10 :].any(), "the diagram reaches the right side"

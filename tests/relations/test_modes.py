@@ -1,0 +1,120 @@
+"""Natural frequencies that `stage_modes` reports are those of the stage at every position, and all of them.
+
+Independent: eigenvalues of M and K alone (no shapes), less the free rotations that are known beforehand: one where no
+port is a spring, else none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+from kinds import KINDS, Kind, bodies_of, drawn
+
+from gearfmu.kernel import Kernel
+from gearfmu.modes import linear
+from gearfmu.report.campbell import LOUD, crossings, mesh_families
+from gearfmu.spec.forms.members import body_names
+from gearfmu.stage import StageModel
+from gearfmu.stage.run.limits import engagements_per_turn
+
+COUNT = 16
+
+
+@pytest.fixture(autouse=True)
+def one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Preparing one takes most of the time: `stage_modes` and the oracle share it."""
+    made, own = {}, linear.full_kernel
+
+    def kernel(model: StageModel) -> Kernel:
+        if id(model) not in made:
+            made[id(model)] = own(model)
+        return made[id(model)]
+
+    monkeypatch.setattr(linear, "full_kernel", kernel)
+
+
+def modes_of(kind: Kind, model: StageModel, positions: int) -> linear.StageModes:
+    bodies = [bodies_of(kind.file)[name] for name in body_names(kind.stage)]
+    return linear.stage_modes(model, bodies, kind.torque, COUNT, positions)
+
+
+def free_rotations(kind: Kind) -> int:
+    return 0 if any(port.kind == "spring" for port in kind.stage.ports.values()) else 1
+
+
+def frequencies(kind: Kind, model: StageModel, position: float) -> np.ndarray:
+    """The lowest natural frequencies (Hz) at a position without the slowest, which are free rotations."""
+    system = linear.linearised(model, kind.torque, position)
+    root = np.sqrt(system.linear.mass)
+    squared = sl.eigvalsh(system.stiffness / root / root[:, None], subset_by_index=[0, min(2 * COUNT, len(root)) - 1])
+    slowest = np.argsort(np.abs(squared))[: free_rotations(kind)]
+    return np.sqrt(np.delete(squared, slowest)) / (2 * np.pi)
+
+
+def require_real_modes(kind: Kind, positions: int) -> None:
+    model = kind.model()
+    found = modes_of(kind, model, positions)
+    assert found.rigid.shape == (positions, free_rotations(kind))
+    for position, own in zip(found.position, found.frequency, strict=True):
+        real = frequencies(kind, model, position)
+        nearest = np.abs(own[:, None] - real).argmin(axis=1)
+        assert len(set(nearest)) == COUNT, "each reported mode is another one of the stage's"
+        assert own == pytest.approx(real[nearest], rel=1e-6)
+        sure = 0.9 * found.frequency[:, COUNT // 2 :].min()  # modes at the end of the list may leave it
+        assert (own < sure).sum() == (real < sure).sum(), f"modes below {sure:.0f} Hz"
+
+
+@pytest.mark.parametrize(
+    ("name", "positions"),
+    [("pair", 12), ("helical", 3), ("internal", 12), ("helical_set", 2),
+     pytest.param("train", 3, marks=pytest.mark.full), pytest.param("set", 12, marks=pytest.mark.full)],
+)  # fmt: skip
+def test_reported_modes_exist_at_every_position_and_none_is_missing(name: str, positions: int) -> None:
+    """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means
+    over the positions ("1197 Hz") were those of different modes."""
+    require_real_modes(KINDS[name], positions)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(20))
+def test_so_do_those_of_drawn_stages(seed: int) -> None:
+    require_real_modes(drawn(seed), 3)
+
+
+def test_modes_are_the_same_at_four_times_as_many_positions() -> None:
+    """A mode followed over 12 positions is one of those followed over 48; frequencies cross on the way. Fault: modes
+    stacked by their number at each position."""
+    model, bodies = KINDS["pair"].model(), list(bodies_of(KINDS["pair"].file).values())
+    coarse, fine = (linear.stage_modes(model, bodies, 302.0, 40, n).frequency for n in (12, 48))
+    assert (np.diff(coarse, axis=1) < 0).any(), "as two 39 kHz modes do"
+    apart = np.abs(fine[::4, None, :] / coarse[:, :, None] - 1).max(axis=0).min(axis=1)
+    assert (apart[:36] < 1e-6).all(), "the last of the list may leave it"
+
+
+@pytest.mark.full
+def test_the_torque_at_which_a_rotation_is_slow_somewhere_adds_no_mode() -> None:
+    """planetary54 at 599 … 601 N·m: free rotation at 1 Hz in one position, at 13 Hz in another."""
+    kinds = [replace(KINDS["set"], torque=torque) for torque in (599.0, 601.0)]
+    lists = [modes_of(kind, kind.model(), 3).frequency.mean(axis=0) for kind in kinds]
+    assert lists[0] == pytest.approx(lists[1], rel=1e-3)
+
+
+def test_equal_meshes_have_one_line_each() -> None:
+    """By hand: four planets' meshes with the sun are one kind, those with the ring another, at the same orders; a mode
+    that drives one of them drives all."""
+    model = KINDS["set"].model()
+    families = mesh_families(model)
+    assert [len(family.meshes) for family in families] == [4, 4]
+    assert {family.cycles for family in families} == set(engagements_per_turn(model)) == {54.0}
+    assert len(mesh_families(KINDS["train"].model())) == 2
+    force = np.zeros((1, 2, 8))
+    force[0, 0, 2] = force[0, 1, :] = 1.0  # mode 1: one mesh of the sun alone; mode 2: all
+    force[0, 1, 2] = 0.5 * LOUD
+    modes = linear.StageModes(1.0, np.zeros(1), np.array([[900.0, 1800.0]]), force[:, :, 0], force, force)
+    found = crossings(modes, families, 1e9)
+    assert [(c.family.name[:8], c.mode) for c in found if c.order == 1] == [
+        ("4 meshes", 1), ("4 meshes", 2), ("4 meshes", 2)
+    ]  # fmt: skip
