@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,8 +65,42 @@ class GearGeometry(ReferenceGear):
 
     @property
     def s_form(self) -> float:
-        """Roll of the root form point, where the trochoid takes over (negative: undercut)."""
-        return float(self.rounding.form_roll)
+        """Roll of the root form point, where the trochoid takes over."""
+        if self.form_angle == self.alpha_t:
+            return max(float(self.rounding.form_roll), 0.0)
+        return float(involute.roll_at_radius(self.rounding.polar(self.form_angle)[0], self.r_b))
+
+    @cached_property
+    def form_angle(self) -> float:
+        """Angle τ (rad) of the trochoid's end at the flank: α_t where both have a common tangent. The trochoid of an
+        undercut tooth crosses the involute instead, between that tangent on the involute's other branch and the base
+        circle (ISO 21771)."""
+        rounding = self.rounding
+        if rounding.form_roll >= 0:
+            return self.alpha_t
+
+        def beside(tau: float) -> float:
+            """Angle (rad) from the involute to the trochoid, positive in the space; inside the base circle −1."""
+            radius, angle = (float(part) for part in rounding.polar(tau))
+            if radius < self.r_b:
+                return -1.0
+            return angle - float(involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b))
+
+        low, high = self.alpha_t, math.pi / 2
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if beside(middle) > 0 else (low, middle)
+        return low
+
+    def least_shift(self, addendum: float) -> float:
+        """Profile shift without undercut by a rack whose straight flank ends `addendum` modules below its pitch line:
+        h − z sin² α_t/(2 cos β) (ISO 21771)."""
+        return addendum - self.z * self.shift_per_tooth
+
+    @property
+    def shift_per_tooth(self) -> float:
+        """Decrease of the least profile shift per tooth, sin² α_t/(2 cos β)."""
+        return math.sin(self.alpha_t) ** 2 / (2 * math.cos(self.beta))
 
     @property
     def s_a(self) -> float:
@@ -104,7 +139,7 @@ class GearGeometry(ReferenceGear):
         few = max(points // 4, 2)
         rounding = self.rounding
         land = self.half_pitch - rounding.land_angle * np.linspace(0, 1, few, endpoint=False)
-        tau = np.linspace(math.pi / 2, self.alpha_t, points, endpoint=False)
+        tau = np.linspace(math.pi / 2, self.form_angle, points, endpoint=False)
         roll = np.linspace(self.s_form, self.s_a, points, endpoint=False)
         tip = self.tip_half_angle * np.linspace(1, 0, few)
         root = self.r_f * np.stack([np.cos(land), np.sin(land)], axis=-1)
@@ -119,7 +154,7 @@ class GearGeometry(ReferenceGear):
         return 2 * (tip + land + self.flank_moment(power, self.s_form, self.s_a) + self._root_moment(power))
 
     def _root_moment(self, power: int) -> float:
-        edges = np.linspace(self.alpha_t, math.pi / 2, 5)
+        edges = np.linspace(self.form_angle, math.pi / 2, 5)
         total = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             tau = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
