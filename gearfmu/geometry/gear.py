@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -70,27 +70,11 @@ class GearGeometry(ReferenceGear):
             return max(float(self.rounding.form_roll), 0.0)
         return float(involute.roll_at_radius(self.rounding.polar(self.form_angle)[0], self.r_b))
 
-    @cached_property
+    @property
     def form_angle(self) -> float:
-        """Angle τ (rad) of the trochoid's end at the flank: α_t where both have a common tangent. The trochoid of an
-        undercut tooth crosses the involute instead, between that tangent on the involute's other branch and the base
-        circle (ISO 21771)."""
-        rounding = self.rounding
-        if rounding.form_roll >= 0:
-            return self.alpha_t
-
-        def beside(tau: float) -> float:
-            """Angle (rad) from the involute to the trochoid, positive in the space; inside the base circle −1."""
-            radius, angle = (float(part) for part in rounding.polar(tau))
-            if radius < self.r_b:
-                return -1.0
-            return angle - float(involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b))
-
-        low, high = self.alpha_t, math.pi / 2
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if beside(middle) > 0 else (low, middle)
-        return low
+        """Angle τ (rad) of the trochoid's end at the flank: α_t where both have a common tangent, else where the
+        trochoid of an undercut tooth crosses the involute."""
+        return self.alpha_t if self.rounding.form_roll >= 0 else _crossing(self)
 
     def least_shift(self, addendum: float) -> float:
         """Profile shift without undercut by a rack whose straight flank ends `addendum` modules below its pitch line:
@@ -174,3 +158,23 @@ class GearGeometry(ReferenceGear):
     def sector_polar_moment(self) -> float:
         """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
         return 0.25 * self.radius_moment(4) - 0.5 * self.half_pitch * self.r_bore**4
+
+
+@lru_cache(maxsize=64)
+def _crossing(gear: GearGeometry) -> float:
+    """Angle τ (rad) at which the trochoid of an undercut tooth crosses its flank (ISO 21771). Its way from the root ends
+    on the involute's other branch; between there and the base circle it passes through the flank once."""
+    rounding = gear.rounding
+
+    def beside(tau: float) -> float:
+        """Angle (rad) from the involute to the trochoid, positive in the space; −1 inside the base circle."""
+        radius, angle = (float(part) for part in rounding.polar(tau))
+        if radius < gear.r_b:
+            return -1.0
+        return angle - float(involute.flank_angle(involute.roll_at_radius(radius, gear.r_b), gear.r_b, gear.psi_b))
+
+    low, high = gear.alpha_t, math.pi / 2
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if beside(middle) > 0 else (low, middle)
+    return low
