@@ -14,6 +14,8 @@ from gearfmu.geometry import involute
 from gearfmu.geometry.reference import GAUSS, ReferenceGear
 from gearfmu.geometry.root import RackRounding
 
+_CLOSE = 3e-4  # of the base radius
+
 
 @dataclass(frozen=True)
 class GearGeometry(ReferenceGear):
@@ -66,8 +68,9 @@ class GearGeometry(ReferenceGear):
     @property
     def s_form(self) -> float:
         """Roll of the root form point, where the trochoid takes over."""
-        if self.form_angle == self.alpha_t:
-            return max(float(self.rounding.form_roll), 0.0)
+        tangent = float(self.rounding.form_roll)
+        if tangent >= -_CLOSE * self.r_b:
+            return max(tangent, -tangent / 2)
         return float(involute.roll_at_radius(self.rounding.polar(self.form_angle)[0], self.r_b))
 
     @property
@@ -162,19 +165,23 @@ class GearGeometry(ReferenceGear):
 
 @lru_cache(maxsize=64)
 def _crossing(gear: GearGeometry) -> float:
-    """Angle τ (rad) at which the trochoid of an undercut tooth crosses its flank (ISO 21771). Its way from the root ends
-    on the involute's other branch; between there and the base circle it passes through the flank once."""
-    rounding = gear.rounding
+    """Angle τ (rad) at which the trochoid of an undercut tooth crosses its flank (ISO 21771).
 
-    def beside(tau: float) -> float:
-        """Angle (rad) from the involute to the trochoid, positive in the space; −1 inside the base circle."""
+    From the root, the trochoid passes through the flank once and ends on the involute's other branch, at a roll s < 0.
+    Close to the limit of undercut, where angles between the two vanish as s³, the crossing is at the roll −s/2.
+    """
+    rounding, nearly = gear.rounding, math.hypot(gear.r_b, gear.rounding.form_roll / 2)
+    close = -rounding.form_roll < _CLOSE * gear.r_b
+
+    def outside(tau: float) -> bool:
         radius, angle = (float(part) for part in rounding.polar(tau))
-        if radius < gear.r_b:
-            return -1.0
-        return angle - float(involute.flank_angle(involute.roll_at_radius(radius, gear.r_b), gear.r_b, gear.psi_b))
+        if close or radius < gear.r_b:
+            return radius > nearly
+        roll = involute.roll_at_radius(radius, gear.r_b)
+        return angle > float(involute.flank_angle(roll, gear.r_b, gear.psi_b))
 
     low, high = gear.alpha_t, math.pi / 2
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if beside(middle) > 0 else (low, middle)
+        low, high = (middle, high) if outside(middle) else (low, middle)
     return low
