@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import click
 
-from gearfmu.console import write_plainly
+from gearfmu.commands.console import write_plainly
 
 USAGE_ERROR = 100
 # Matrices here are many and small: BLAS threads slow a reduction down, on a busy machine from 15 s to minutes. What the

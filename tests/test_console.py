@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.console import plain
+from gearfmu.commands.console import plain
 from gearfmu.stage.run.trace import Channel, Trace
 
 ROOT = Path(__file__).resolve().parents[1]
