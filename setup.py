@@ -59,5 +59,5 @@ class BinaryDistribution(Distribution):
 setup(
     distclass=BinaryDistribution,
     cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
-    setup_requires=["ziglang==0.16.0"] if RELEASE else [],
+    setup_requires=kernel_build().build_requirements(NAMED),
 )

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import click
 
+from gearfmu.commands.console import write_plainly
+
 USAGE_ERROR = 100
 # Matrices here are many and small: BLAS threads slow a reduction down, on a busy machine from 15 s to minutes. What the
 # caller sets wins.
@@ -99,6 +101,7 @@ def outcome(arguments: list[str]) -> int:
     """Run the command line `arguments` and return the exit code: 0 success, 100 wrong usage, 1 any other error,
     130 interrupted; counting verbs return their count, at most 99. Errors go to standard error, one clear message
     each."""
+    write_plainly()
     try:
         code = gearfmu.main(args=arguments, prog_name="gearfmu", standalone_mode=False)
     except click.UsageError as error:

@@ -51,7 +51,7 @@ def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> 
 def read_unknowns(path: Path) -> np.ndarray:
     """Node label and component (n, 2) of each row from a CalculiX .dof file ("17.3"). Raises MeshError."""
     try:
-        words = path.read_text(encoding="utf-8").split()
+        words = path.read_text(encoding="utf-8-sig").split()
         pairs = [word.split(".") for word in words]
         return np.array([(int(node), int(component) - 1) for node, component in pairs])
     except OSError as error:

@@ -54,7 +54,7 @@ def read_dmig(path: Path) -> Labelled:
 def _cards(path: Path) -> list[list[str]]:
     """Bulk data cards as lists of fields, continuation lines joined (eight or four fields a line)."""
     cards: list[list[str]] = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         line = line.split("$")[0].rstrip()
         if not line:
             continue

@@ -65,7 +65,7 @@ def read_deck(path: Path) -> Deck:
 def _blocks(path: Path, depth: int = 0) -> Iterator[_Block]:
     """The keyword blocks of a deck, those of its *INCLUDE files in their place."""
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None
     block: _Block | None = None

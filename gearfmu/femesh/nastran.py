@@ -62,6 +62,6 @@ def _field(line: str, number: int) -> str:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8", errors="replace")
+        return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None

@@ -121,7 +121,7 @@ def _fitting_growth(sum_of_series: float, terms: int) -> float:
 def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
     """Points (P, 2) from the form point over trochoid and root land to mid space, at shares of the way."""
     rounding = gear.rounding
-    tau = np.linspace(rounding.alpha, math.pi / 2, 2001)
+    tau = np.linspace(gear.form_angle, math.pi / 2, 2001)
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rounding.point(tau), axis=0), axis=1))])
     land = rounding.land_angle * gear.r_f
     wanted = share * (run[-1] + land)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike
 from gearfmu.geometry import involute
 from gearfmu.geometry.reference import GAUSS, ReferenceGear
 from gearfmu.geometry.root import RackRounding
+
+_CLOSE = 3e-4  # of the base radius
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,27 @@ class GearGeometry(ReferenceGear):
 
     @property
     def s_form(self) -> float:
-        """Roll of the root form point, where the trochoid takes over (negative: undercut)."""
-        return float(self.rounding.form_roll)
+        """Roll of the root form point, where the trochoid takes over."""
+        tangent = float(self.rounding.form_roll)
+        if tangent >= -_CLOSE * self.r_b:
+            return max(tangent, -tangent / 2)
+        return float(involute.roll_at_radius(self.rounding.polar(self.form_angle)[0], self.r_b))
+
+    @property
+    def form_angle(self) -> float:
+        """Angle τ (rad) of the trochoid's end at the flank: α_t where both have a common tangent, else where the
+        trochoid of an undercut tooth crosses the involute."""
+        return self.alpha_t if self.rounding.form_roll >= 0 else _crossing(self)
+
+    def least_shift(self, addendum: float) -> float:
+        """Profile shift without undercut by a rack whose straight flank ends `addendum` modules below its pitch line:
+        h − z sin² α_t/(2 cos β) (ISO 21771)."""
+        return addendum - self.z * self.shift_per_tooth
+
+    @property
+    def shift_per_tooth(self) -> float:
+        """Decrease of the least profile shift per tooth, sin² α_t/(2 cos β)."""
+        return math.sin(self.alpha_t) ** 2 / (2 * math.cos(self.beta))
 
     @property
     def s_a(self) -> float:
@@ -104,7 +126,7 @@ class GearGeometry(ReferenceGear):
         few = max(points // 4, 2)
         rounding = self.rounding
         land = self.half_pitch - rounding.land_angle * np.linspace(0, 1, few, endpoint=False)
-        tau = np.linspace(math.pi / 2, self.alpha_t, points, endpoint=False)
+        tau = np.linspace(math.pi / 2, self.form_angle, points, endpoint=False)
         roll = np.linspace(self.s_form, self.s_a, points, endpoint=False)
         tip = self.tip_half_angle * np.linspace(1, 0, few)
         root = self.r_f * np.stack([np.cos(land), np.sin(land)], axis=-1)
@@ -119,7 +141,7 @@ class GearGeometry(ReferenceGear):
         return 2 * (tip + land + self.flank_moment(power, self.s_form, self.s_a) + self._root_moment(power))
 
     def _root_moment(self, power: int) -> float:
-        edges = np.linspace(self.alpha_t, math.pi / 2, 5)
+        edges = np.linspace(self.form_angle, math.pi / 2, 5)
         total = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             tau = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
@@ -139,3 +161,27 @@ class GearGeometry(ReferenceGear):
     def sector_polar_moment(self) -> float:
         """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
         return 0.25 * self.radius_moment(4) - 0.5 * self.half_pitch * self.r_bore**4
+
+
+@lru_cache(maxsize=64)
+def _crossing(gear: GearGeometry) -> float:
+    """Angle τ (rad) at which the trochoid of an undercut tooth crosses its flank (ISO 21771).
+
+    From the root, the trochoid passes through the flank once and ends on the involute's other branch, at a roll s < 0.
+    Close to the limit of undercut, where angles between the two vanish as s³, the crossing is at the roll −s/2.
+    """
+    rounding, nearly = gear.rounding, math.hypot(gear.r_b, gear.rounding.form_roll / 2)
+    close = -rounding.form_roll < _CLOSE * gear.r_b
+
+    def outside(tau: float) -> bool:
+        radius, angle = (float(part) for part in rounding.polar(tau))
+        if close or radius < gear.r_b:
+            return radius > nearly
+        roll = involute.roll_at_radius(radius, gear.r_b)
+        return angle > float(involute.flank_angle(roll, gear.r_b, gear.psi_b))
+
+    low, high = gear.alpha_t, math.pi / 2
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if outside(middle) else (low, middle)
+    return low

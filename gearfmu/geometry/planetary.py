@@ -101,7 +101,7 @@ class RingMesh:
     @property
     def least_tip_radius(self) -> float:
         """Smallest tip radius (m) of the ring whose flank does not meet the planet below its form circle."""
-        roll = self.length + max(self.planet.s_form, 0.0)
+        roll = self.length + self.planet.s_form
         return float(involute.radius_at_roll(roll, self.ring.r_b))
 
     @property

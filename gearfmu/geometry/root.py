@@ -43,7 +43,8 @@ class RackRounding:
 
     @property
     def form_roll(self) -> float:
-        """Roll s (m) where involute and trochoid meet with a common tangent; negative: the rack undercuts the flank."""
+        """Roll s (m) where involute and trochoid have a common tangent. Negative: that point is on the involute's other
+        branch, and the trochoid cuts the flank above the base circle."""
         radius = self.radius / self._slant(self.alpha)
         return self.r * np.sin(self.alpha) - self.centre_depth / np.sin(self.alpha) - radius
 

@@ -71,8 +71,8 @@ class Rack:
 
     def least_shift(self, z: int) -> float:
         """Smallest profile shift without undercut."""
-        r_sin = self.gear(z, 0.0, self.m).r * math.sin(self.gear(z, 0.0, self.m).alpha_t) ** 2 / self.m
-        return DEDENDUM - self.fillet * (1 - math.sin(self.alpha)) - r_sin
+        straight = DEDENDUM - self.fillet * (1 - math.sin(self.alpha))
+        return self.gear(z, 0.0, self.m).least_shift(straight)
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def shortcomings(pair: PairGeometry) -> Iterator[str]:
         return
     for gear, other in (pair.gears, pair.gears[::-1]):
         name = f"of {gear.z} teeth (x = {gear.x:.3f})"
-        if gear.s_form <= 0:
+        if gear.rounding.form_roll <= 0:
             yield f"undercut of the gear {name}"
         elif gear.tip_half_angle * 2 * gear.r_a * math.cos(gear.beta) < LEAST_TIP * gear.m:
             yield f"pointed teeth of the gear {name}"

@@ -57,7 +57,8 @@ _EVERY = 5.0  # s between lines of progress
 REBUILD = "python -m gearfmu.kernel"
 BEHAVIOUR = "GEARFMU_BEHAVIOUR"
 _PAGE = 14  # Apple processors have pages of 2^14 bytes
-CROSS = 'pip install "gearfmu[cross]"'
+ZIG = "ziglang==0.16.0"  # a C compiler as a Python package, as in pyproject.toml
+CROSS = f"pip install {ZIG}"
 
 
 class BuildError(GearfmuError):
@@ -281,16 +282,32 @@ def _universal(parts: Sequence[Path], out: Path) -> Path:
 def _compilers(name: str, sanitize: bool) -> list[tuple[str, ...]]:
     """ziglang when installed (old glibc, cross-compiling), else the system's compiler; sanitizers need the latter. More
     than one where the platform's library is for several processors."""
-    serves = name != host_platform() or _platform.machine().lower() in ("x86_64", "amd64")
-    if not sanitize and serves and name in ZIG_TARGETS and importlib.util.find_spec("ziglang"):
+    serves = not sanitize and _zig_serves(name)
+    if serves and importlib.util.find_spec("ziglang"):
         zig = (sys.executable, "-m", "ziglang", "cc", "-fno-sanitize=undefined", "-target")
         return [(*zig, target) for target in ZIG_TARGETS[name]]
     if name != host_platform():
         raise BuildError(f"cross-compiling for {name} needs ziglang: {CROSS}")
-    for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
-        if shutil.which(command):
-            return [(command,)]
-    raise BuildError(f"no C compiler found: install gcc or clang, or {CROSS}")
+    if found := system_compiler():
+        return [(found,)]
+    raise BuildError(f"no C compiler found: install gcc or clang{f', or {CROSS}' if serves else ''}")
+
+
+def _zig_serves(name: str) -> bool:
+    """Whether ziglang's code runs on that platform; on this machine only with an x86-64 processor."""
+    return name in ZIG_TARGETS and (name != host_platform() or _platform.machine().lower() in ("x86_64", "amd64"))
+
+
+def system_compiler() -> str:
+    """The C compiler of this machine: that of the variable CC, else cc, gcc or clang; "" where there is none."""
+    return next(filter(shutil.which, filter(None, (os.environ.get("CC"), "cc", "gcc", "clang"))), "")
+
+
+def build_requirements(platforms: Sequence[str]) -> list[str]:
+    """Packages that a build for these platforms ("none": no library; empty: this machine) asks pip for: ziglang where
+    it cross-compiles or the machine has no compiler."""
+    here = not platforms and not system_compiler() and _zig_serves(host_platform())
+    return [ZIG] if here or set(platforms) - {"none"} else []
 
 
 def _variant_flags(sanitize: bool, pattern: bool, real: str) -> list[str]:

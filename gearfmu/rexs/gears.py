@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gearfmu.errors import Problem
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.proposals.draft import Draft, millimetres
+from gearfmu.spec.proposals.draft import Draft, millimetres, put_proportions
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
 BEARINGS = ("concept_bearing",)
 TOOL_FACTORS = (("addendum_coefficient_reference_profile", "dedendum"), ("tip_radius_factor", "fillet_radius"))
 STIFFEST = 1e12  # N/m: beyond, a stiffness in a file means "rigid"
+_DEEPEST_TIP = 2.5  # modules below r + x m_n: a smaller tip circle is none, such as the 1 mm of unfilled fields
 
 
 @dataclass
@@ -38,6 +38,14 @@ class RexsGear:
         """r = m_n z / (2 cos β), m."""
         return self.module * self.teeth / math.cos(self.helix_angle) / 2
 
+    def drop_placeholder(self, draft: Draft) -> None:
+        """Leaves a tip diameter open that is none, with a note. The profile shift must be known."""
+        least = 2 * (self.reference_radius + ((self.x or 0.0) - _DEEPEST_TIP) * self.module)
+        if self.tip_diameter is not None and self.tip_diameter < least:
+            shown = f"tip_diameter = {millimetres(self.tip_diameter)}"
+            draft.notes.append(f"{self.component}: {shown} is a placeholder and computed anew")
+            self.tip_diameter = None
+
     @property
     def origin(self) -> str:
         """The words of a mark."""
@@ -53,10 +61,12 @@ def gear_of(model: RexsModel, component: Component) -> RexsGear | None:
         "face_width": _agreed(model, places, "face_width", "m"),
         "number_of_teeth": _agreed(model, places, "number_of_teeth", ""),
     }
-    missing = [name for name, value in needed.items() if value is None]
-    for name in missing:
-        model.problems.append(Problem(str(model.path), f"{component}: {name}", "", "this attribute is missing: add it"))
-    if missing:
+    for name, value in needed.items():
+        if value is None:
+            model.refuse(component, name, "", "this attribute is missing: add it")
+        elif value == 0 or (value < 0 and name != "number_of_teeth"):
+            model.refuse(component, name, f"{value:g}", "a placeholder: write the value of the gear")
+    if any(not value for value in needed.values()):
         return None
     tip = _agreed(model, places, "tip_diameter", "m")
     return RexsGear(
@@ -78,16 +88,17 @@ def _agreed(model: RexsModel, places: list[Component], name: str, unit: str) -> 
     if values and max(values) - min(values) > 1e-9 * max(abs(value) for value in values):
         shown = ", ".join(f"{value:g}" for value in values)
         remedy = "left and right flank, or gear and flank, differ; gears with unequal flanks are not known here"
-        model.problems.append(Problem(str(model.path), f"{places[0]}: {name}", shown, remedy))
+        model.refuse(places[0], name, shown, remedy)
     return values[0] if values else None
 
 
 def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
-    """Teeth, width, tool and material of a gear at `place` of the draft; not profile shift and diameters."""
+    """Teeth, width, tip edge and material of a gear at `place` of the draft; not profile shift and diameters."""
     draft.put(f"{place}.teeth", gear.teeth, gear.origin)
     draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
     for part in ("tip_relief", "lead", "index_deviation", "import"):
         draft.drop(f"{place}.{part}")
+    put_proportions(draft, place, gear.module, gear.face_width)
     _put_material(model, draft, place, gear.component)
 
 
@@ -110,8 +121,9 @@ def _put_material(model: RexsModel, draft: Draft, place: str, component: Compone
         for name, key, unit in (
             ("elastic_modulus", "youngs_modulus", "Pa"), ("density", "density", "kg/m^3"), ("poisson_ratio", "", "")
         ):  # fmt: skip
-            value = model.quantity(material, name, unit) if unit else model.number(material, name)
-            if value is not None:
+            size = model.si(material, name, unit) if unit else model.number(material, name)
+            if size is not None and size > 0:
+                value = model.quantity(material, name, unit) if unit else size
                 draft.put(f"{place}.material.{key or name}", value, origin)
 
 
@@ -131,11 +143,17 @@ def shaft_diameters(model: RexsModel, shaft: Component, at: float | None = None)
         begin = model.si(section, "u_coordinate_on_shaft", "m") or 0.0
         length = model.si(section, "length", "m") or 0.0
         if at is None or begin - 1e-9 <= at <= begin + length + 1e-9:
-            inner = model.si(section, "inner_diameter_begin", "m")
-            outer = model.si(section, "outer_diameter_begin", "m")
-            if inner is not None and outer is not None:
+            share = 0.0 if at is None or not length else (at - begin) / length
+            inner, outer = (_along(model, section, f"{side}_diameter", share) for side in ("inner", "outer"))
+            if inner is not None and outer is not None and outer > inner:
                 return inner, outer, f"REXS shaft_section {section.id}"
     return None
+
+
+def _along(model: RexsModel, section: Component, name: str, share: float) -> float | None:
+    """A diameter (m) of a section, which may be a cone, at a share of its length."""
+    begin, end = (model.si(section, f"{name}_{place}", "m") for place in ("begin", "end"))
+    return begin if begin is None or end is None else begin + share * (end - begin)
 
 
 def put_bore(model: RexsModel, draft: Draft, place: str, gear: RexsGear, root_diameter: float) -> None:

@@ -1,23 +1,18 @@
 """A REXS file as it stands: components with attributes, relations between them, load cases.
 
-Form after the public specification (spec.rexs.info, versions 1.0 to 1.7, XML): `model` holds `relations`, `components`
-and `load_spectrum`; an attribute has an id, a unit and a scalar or an array. Attributes say themselves whether they
-have been read, so that the rest can be listed.
+Attributes say themselves whether they have been read, so that the rest can be listed. Files: gearfmu.rexs.reading.
 """
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree import ElementTree
 
-from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.errors import Problem, UnitError
 from gearfmu.units import to_si
 
 _SPELLINGS = {"mum": "um", "1 / min": "rpm", "N m": "N*m"}
-_LARGEST = 256 * 2**20  # bytes; gear units are below one hundredth of that
 
 
 @dataclass
@@ -131,73 +126,10 @@ class RexsModel:
         return text
 
     def _refuse(self, component: Component, attribute: Attribute, why: str) -> None:
-        shown = f"{attribute.text} {attribute.unit}".strip()
-        problem = Problem(str(self.path), f"{component}: {attribute.id}", shown, why)
+        self.refuse(component, attribute.id, f"{attribute.text} {attribute.unit}".strip(), why)
+
+    def refuse(self, component: Component, name: str, shown: str, remedy: str) -> None:
+        """Adds a problem of a component's attribute, once."""
+        problem = Problem(str(self.path), f"{component}: {name}", shown, remedy)
         if problem not in self.problems:
             self.problems.append(problem)
-
-
-def read_rexs(path: Path) -> RexsModel:
-    """The model in a .rexs or .xml file, or in the only .rexs file of a .rexsz or .zip archive; SpecError when it is
-    none."""
-    try:
-        root = ElementTree.fromstring(_bytes(path))
-    except ElementTree.ParseError as error:
-        raise _refused(path, f"not well-formed XML ({error}); REXS files in JSON are not read") from error
-    version = root.get("version", "")
-    if root.tag != "model" or not version:
-        raise _refused(path, "the root element of a REXS file is <model version=…>")
-    if version.split(".")[0] != "1":
-        raise _refused(path, f"REXS version {version}: versions 1.0 to 1.7 are read")
-    listed = [_component(element) for element in root.iterfind("components/component")]
-    components = {component.id: component for component in listed}
-    if len(components) < len(listed):
-        raise _refused(path, "two components have the same id")
-    for element in root.iterfind("load_spectrum/load_case/components/component"):
-        _add_case(components, element)
-    for element in root.iterfind("load_spectrum/load_case/component"):
-        _add_case(components, element)
-    relations = tuple(_relation(element) for element in root.iterfind("relations/relation"))
-    return RexsModel(path, version, components, relations)
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if not zipfile.is_zipfile(path):
-            return path.read_bytes()
-        with zipfile.ZipFile(path) as archive:
-            inside = [info for info in archive.infolist() if info.filename.lower().endswith((".rexs", ".xml"))]
-            if len(inside) != 1 or inside[0].file_size > _LARGEST:
-                raise _refused(path, f"the archive must hold one .rexs file, not {len(inside)}")
-            return archive.read(inside[0])
-    except OSError as error:
-        raise _refused(path, f"the file cannot be read ({error.strerror}): check the path") from error
-
-
-def _refused(path: Path, remedy: str) -> SpecError:
-    return SpecError([Problem(str(path), "", "", remedy)])
-
-
-def _component(element: ElementTree.Element) -> Component:
-    return Component(element.get("id", ""), element.get("type", ""), element.get("name", ""), _attributes(element))
-
-
-def _add_case(components: dict[str, Component], element: ElementTree.Element) -> None:
-    component = components.get(element.get("id", ""))
-    if component is not None:
-        component.cases.append(_attributes(element))
-
-
-def _attributes(element: ElementTree.Element) -> dict[str, Attribute]:
-    found = {}
-    for entry in element.iterfind("attribute"):
-        name, text = entry.get("id", ""), (entry.text or "").strip()
-        if len(entry):  # an array, a matrix or coded values
-            text = " ".join(part.strip() for part in entry.itertext() if part.strip())
-        found[name] = Attribute(name, text, entry.get("unit", ""))
-    return found
-
-
-def _relation(element: ElementTree.Element) -> Relation:
-    roles = tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref"))
-    return Relation(element.get("type", ""), roles)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
 
-from gearfmu.errors import Problem
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
@@ -28,6 +27,7 @@ from gearfmu.spec.proposals.draft import (
     Draft,
     degrees,
     millimetres,
+    put_shafts,
     usual_torque,
 )
 from gearfmu.spec.reading.base import validate
@@ -41,11 +41,10 @@ def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Compon
     """The draft of a pair; what cannot be read is in its problems."""
     read = [gear_of(model, component) for component in pair]
     distance = model.si(stage, "center_distance", "m")
-    if distance is None:
-        remedy = "this attribute is missing: add it"
-        model.problems.append(Problem(str(model.path), f"{stage}: center_distance", "", remedy))
+    if not distance:
+        model.refuse(stage, "center_distance", "", "this attribute is missing: add it")
     gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
-    if len(gears) < 2 or distance is None:
+    if len(gears) < 2 or not distance:
         return Draft({}, problems=model.problems)
     draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
     _put_pair(model, draft, stage, gears)
@@ -70,7 +69,7 @@ def _put_pair(model: RexsModel, draft: Draft, stage: Component, gears: list[Rexs
     if abs(gears[0].helix_angle + gears[1].helix_angle) > 1e-9:
         shown = ", ".join(f"{math.degrees(gear.helix_angle):g} deg" for gear in gears)
         remedy = "the helix angles of an external pair are equal and opposite"
-        model.problems.append(Problem(str(model.path), f"{stage}: helix_angle_reference_diameter", shown, remedy))
+        model.refuse(stage, "helix_angle_reference_diameter", shown, remedy)
     draft.drop("pair.misalignment")
 
 
@@ -98,7 +97,7 @@ def put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
                 draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
 
 
-def place_shifts(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -> None:
+def place_shifts(draft: Draft, gears: list[RexsGear], place: Callable[[str], str], distance: float) -> None:
     """Profile shifts as given; missing ones from the centre distance of a pair without backlash."""
     first = gears[0]
     total = sum_of_shifts(
@@ -114,13 +113,14 @@ def place_shifts(draft: Draft, gears: list[RexsGear], place: Any, distance: floa
             draft.assume(place(name), gear.x, "no backlash at the centre distance, equal shares")
 
 
-def put_tips(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -> None:
+def put_tips(draft: Draft, gears: list[RexsGear], place: Callable[[str], str], distance: float) -> None:
     """Tip diameters as given; missing ones d + 2 m_n (h*_aP + x + k), k of ISO 21771 keeping the tip clearance."""
     module, total = gears[0].module, sum(gear.x or 0.0 for gear in gears)
     reference = sum(gear.reference_radius for gear in gears)
     topping = min(0.0, (distance - reference) / module - total)
     for name, gear in zip(NAMES, gears, strict=True):
         field = f"{place(name)}.tip_diameter"
+        gear.drop_placeholder(draft)
         if gear.tip_diameter is not None:
             draft.put(field, millimetres(gear.tip_diameter), gear.origin)
             continue
@@ -132,10 +132,7 @@ def put_tips(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -
 
 def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
     """d_f (m) with the rack that the draft has for the gear."""
-    table: Any = draft.tables
-    for step in place.split("."):
-        table = table[step]
-    dedendum = table.get("rack", {}).get("dedendum", 1.25)
+    dedendum = draft.at(place).get("rack", {}).get("dedendum", 1.25)
     return 2 * (gear.reference_radius - gear.module * (dedendum - (gear.x or 0.0)))
 
 
@@ -150,10 +147,12 @@ def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     torques = [shaft_torque(model, gear.component) for gear in gears]
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
     if found:
-        draft.put("torque_max", f"{rounded_up(found, 3):g} N*m", "REXS external_load, the largest of all load cases")
+        torque = rounded_up(found, 3)
+        draft.put("torque_max", f"{torque:g} N*m", "REXS external_load, the largest of all load cases")
     else:
-        assumed = f"{rounded_up(assumed_torque(gears), 2):g} N*m"
-        draft.assume("torque_max", assumed, "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears")
+        torque = rounded_up(assumed_torque(gears), 2)
+        draft.assume("torque_max", f"{torque:g} N*m", "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears")
+    put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     speeds = [shaft_speed(model, gear.component) for gear in gears]
     speed = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
     if speed:

@@ -61,6 +61,7 @@ def draft_set(model: RexsModel, stage: Component) -> Draft:
     _put_carrier(model, draft, stage, gears, abs(distance))
     _put_loads(model, draft, stage, gears, planets)
     draft.assume("set.backlash", millimetres(BACKLASH_PER_MODULE * gears[0].module), "2 % of the module")
+    draft.assume("carrier.gap", millimetres(rounded_up(0.8 * gears[0].module, 2)), "0.8 m_n")
     draft.drop("set.pin_errors")
     return draft
 
@@ -88,7 +89,7 @@ def _distance(model: RexsModel, meshes: list[Component]) -> float | None:
     if found and max(found) - min(found) > 1e-9:
         shown = f"{1e3 * min(found):g} to {1e3 * max(found):g} mm"
         remedy = "sun and ring have the same distance to all planets here"
-        model.problems.append(Problem(str(model.path), f"{meshes[0]}: center_distance", shown, remedy))
+        model.refuse(meshes[0], "center_distance", shown, remedy)
     return found[0] if found else None
 
 
@@ -155,6 +156,7 @@ def _put_shapes(model: RexsModel, draft: Draft, gears: list[RexsGear], distance:
     sun, planet, ring = gears
     for name, gear in (("sun", sun), ("planet", planet)):
         put_rack(model, draft, f"{name}.rack", gear)
+        gear.drop_placeholder(draft)
         if gear.tip_diameter is not None:
             draft.put(f"{name}.tip_diameter", millimetres(gear.tip_diameter), gear.origin)
         else:
@@ -167,6 +169,7 @@ def _put_shapes(model: RexsModel, draft: Draft, gears: list[RexsGear], distance:
 
 def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, distance: float) -> None:
     put_rack(model, draft, "ring", ring)
+    ring.drop_placeholder(draft)
     if ring.tip_diameter is not None:
         draft.put("ring.tip_diameter", millimetres(ring.tip_diameter), ring.origin)
     else:

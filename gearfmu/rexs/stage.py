@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.rexs.model import Component, RexsModel, read_rexs
+from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import draft_pair
 from gearfmu.rexs.planetary import draft_set
+from gearfmu.rexs.reading import read_rexs
 from gearfmu.spec.proposals.draft import Draft, Unread
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from fzg import ALPHA, MODULE, PINION, WHEEL, gear
 
+from gearfmu.geometry import GearGeometry, involute
+
 
 def polygon_moments(points: np.ndarray) -> tuple[float, float]:
     """Area and polar moment about the origin of a polygon (closed through the origin)."""
@@ -90,7 +92,51 @@ def test_undercut_limit_is_the_textbook_one() -> None:
     straight = 1.25 - 0.38 * (1 - math.sin(ALPHA))
     limit = straight - 16 * math.sin(ALPHA) ** 2 / 2
     assert gear(16, limit, 82e-3, 30e-3).s_form == pytest.approx(0, abs=1e-15)
-    assert gear(16, limit - 0.01, 82e-3, 30e-3).s_form < 0 < gear(16, limit + 0.01, 82e-3, 30e-3).s_form
+    for shift, cut in ((limit - 0.01, True), (limit + 0.01, False)):
+        shape = gear(16, shift, 82e-3, 30e-3)
+        assert bool(shape.rounding.form_roll < 0) is cut and shape.s_form > 0
+    assert gear(16, 0.5, 82e-3, 30e-3).least_shift(straight) == pytest.approx(limit, abs=1e-15)
+
+
+def left_by_the_rack(shape: GearGeometry, radius: np.ndarray) -> np.ndarray:
+    """Half angle (rad) of the tooth that a rack leaves at these radii (m), from nothing but its outline: the tooth of
+    the tool is `half` wide at a depth below its datum, and is rolled through in steps of the angle `turn`."""
+    m, r, turn = shape.m, shape.r, np.linspace(-0.9, 0.9, 40_001)
+    depth = r + shape.x * m - radius[:, None] * np.cos(turn)
+    straight, rho = shape.h_fp - shape.rho_fp * (1 - math.sin(ALPHA)), shape.rho_fp
+    half = m * math.pi / 4 - depth * math.tan(ALPHA)
+    below = depth - (shape.h_fp - rho)
+    round_end = m * math.pi / 4 - straight * math.tan(ALPHA) - rho * math.cos(ALPHA)
+    half = np.where(depth > straight, round_end + np.sqrt(np.maximum(rho**2 - below**2, 0)), half)
+    cut = np.where(depth < shape.h_fp, (radius[:, None] * np.sin(turn) + half) / r - turn, -np.inf)
+    return shape.half_pitch - cut.max(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("z", "x", "fillet"), [(17, 0.0, 0.25), (17, 0.0, 0.38), (14, 0.0, 0.38), (10, 0.39, 0.25), (24, 0.17, 0.38)]
+)
+def test_a_tooth_is_what_the_rack_leaves_of_it(z: int, x: float, fillet: float) -> None:
+    """Undercut or not: involute down to the form circle, trochoid below. The tooth of an undercut gear had its flank
+    on the involute's other branch."""
+    shape = GearGeometry(
+        z=z, m=MODULE, alpha=ALPHA, x=x, r_a=MODULE * (z / 2 + 1 + x), r_bore=0.01, tip_edge=2e-4,
+        h_fp=1.25 * MODULE, rho_fp=fillet * MODULE,
+    )  # fmt: skip
+    form = math.hypot(shape.r_b, shape.s_form)
+    above = np.linspace(form + 1e-6, shape.r_a, 12)
+    involutes = involute.flank_angle(involute.roll_at_radius(above, shape.r_b), shape.r_b, shape.psi_b)
+    assert left_by_the_rack(shape, above) == pytest.approx(involutes, abs=1e-8)
+    radius, angle = shape.rounding.polar(np.linspace(shape.form_angle + 1e-3, math.pi / 2 - 0.2, 12))
+    assert left_by_the_rack(shape, radius) == pytest.approx(angle, abs=1e-8)
+
+
+def test_the_form_circle_goes_through_the_limit_of_undercut_without_a_jump() -> None:
+    """On either side of it the roll is that of the common tangent and that of the crossing; both end at the base
+    circle."""
+    limit = gear(16, 0.0, 82e-3, 30e-3).least_shift(1.25 - 0.38 * (1 - math.sin(ALPHA)))
+    rolls = [gear(16, limit + step, 82e-3, 30e-3).s_form for step in (-2e-3, -1e-3, -1e-6, -1e-12, 1e-6, 1e-3)]
+    assert all(0 <= roll < 4e-3 * MODULE for roll in rolls)
+    assert rolls[0] > rolls[1] > rolls[2] and rolls[5] > rolls[4]
 
 
 def test_lengths_scale_with_the_module() -> None:

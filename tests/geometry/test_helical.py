@@ -98,9 +98,10 @@ def test_the_hand_changes_nothing_in_the_section(z: int, beta: float, x: float) 
 
 @given(z=teeth, x=st.floats(0, 0.8))
 def test_a_vanishing_helix_angle_is_the_spur_gear(z: int, x: float) -> None:
-    """β² and β⁴ terms only: 1e-6° moves the outline by less than rounding."""
+    """β² and β⁴ terms only: 1e-6° moves the outline by less than rounding, and the crossing of trochoid and flank of an
+    undercut tooth, which touch nearly, by less than a nanometre."""
     spur, nearly = gear(z, x, 0.0), gear(z, x, math.radians(1e-6))
-    assert np.abs(nearly.profile() - spur.profile()).max() < 1e-13
+    assert np.abs(nearly.profile() - spur.profile()).max() < (1e-13 if spur.rounding.form_roll > 0 else 1e-9)
     assert (spur.beta_b, spur.twist, spur.alpha_t, spur.m_t) == (0.0, 0.0, spur.alpha, spur.m)
 
 

@@ -14,7 +14,7 @@ from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
-from gearfmu.rexs.model import read_rexs
+from gearfmu.rexs.reading import read_rexs
 from gearfmu.spec.proposals.new import write_drafted
 from gearfmu.spec.stage import load_pair, load_stage
 
@@ -33,6 +33,11 @@ def changed(tmp_path: Path, source: Path, *edits: tuple[str, str]) -> Path:
     return path
 
 
+def attribute_of(component: str, name: str, value: str) -> tuple[str, str]:
+    """An edit of one attribute of the component with this identifier."""
+    return rf'(<component id="{component}" (?:(?!</component>).|\n)*?id="{name}" unit="[^"]*">)[^<]*', rf"\g<1>{value}"
+
+
 def without(name: str) -> tuple[str, str]:
     """An edit that takes an attribute away everywhere."""
     return rf' *<attribute id="{name}".*</attribute>\n', ""
@@ -49,7 +54,7 @@ def test_a_pair_is_the_one_whose_data_the_file_holds(tmp_path: Path) -> None:
     kept = {"backlash": made.pair.backlash}
     assert made.pair == shipped.pair.model_copy(update=kept) and made.pair.backlash == pytest.approx(9e-5)
     for own, other in zip(made.gears, shipped.gears, strict=True):
-        kept = {"bearing": own.bearing, "body": own.body}
+        kept = {"bearing": own.bearing, "body": own.body, "bore_coupling": "rigid", "tip_edge_radius": 2.25e-4}
         assert own == other.model_copy(update=kept)
         assert (own.bearing.stiffness, own.bearing.tilt) == (4e8, pytest.approx(2 * 2e8 * 0.04**2))
     assert made.torque_max == 535, "the larger one of two load cases, whatever its sign"
@@ -61,7 +66,8 @@ def test_a_set_is_the_one_whose_data_the_file_holds(tmp_path: Path) -> None:
     assert made.set == shipped.set.model_copy(update={"backlash": made.set.backlash})
     for name in ("sun", "planet", "ring"):
         own, other = getattr(made, name), getattr(shipped, name)
-        assert own == other.model_copy(update={"body": own.body, "tip_relief": None}), name
+        kept = {"body": own.body, "tip_relief": None, "tip_edge_radius": 1.25e-4}
+        assert own == other.model_copy(update=kept), name
     assert made.carrier == shipped.carrier
     assert made.torque_max == 600 and made.speed_max == pytest.approx(78.54)
 
@@ -184,7 +190,7 @@ def test_one_of_several_stages_is_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_file_that_makes_no_stage_is_written_and_judged(tmp_path: Path, monkeypatch, capsys) -> None:
-    path = changed(tmp_path, PAIR, (r'(id="tip_diameter" unit="mm">)82.46', r"\g<1>1"))
+    path = changed(tmp_path, PAIR, (r'(id="tip_diameter" unit="mm">)82.46', r"\g<1>60"))
     monkeypatch.chdir(tmp_path)
     assert outcome(["new", "mine", "--rexs", str(path)]) == 1
     assert "no involute is left" in capsys.readouterr().err and (tmp_path / "mine" / "stage.toml").exists()
@@ -199,7 +205,9 @@ def test_archives_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "why"),
-    [('{"model": {}}', "JSON"), ('<model version="2.0"/>', "versions 1.0 to 1.7"), ("<a/>", "root element"),
+    [('{"model": {}}', "REXS in JSON"), ('{"model": ', "no valid JSON"), ("[1, 2]", "REXS in JSON"),
+     ('{"model": {"version": "2.0"}}', "versions 1.0 to 1.7"), ("teeth = 17", "neither JSON nor"),
+     ('<model version="2.0"/>', "versions 1.0 to 1.7"), ("<a/>", "root element"),
      ('<model version="1.4"/>', "no such stage|which stage|none")],
 )  # fmt: skip
 def test_what_is_no_rexs_file_is_refused(tmp_path: Path, text: str, why: str) -> None:

@@ -131,6 +131,17 @@ def test_a_topography_by_tooth_and_flank(tmp_path: Path) -> None:
     assert found.patches[4, 0].roll == pytest.approx([10e-3, 20e-3], abs=1e-12)
 
 
+def test_a_topography_reads_the_same_however_an_office_writes_it(tmp_path: Path) -> None:
+    plain = written(tmp_path, "roll_mm,z_mm,deviation_um", "10,-2.5,1.5", "10,2.5,-0.5")
+    wanted, _ = read_topography(plain, 16, PINION)
+    office = tmp_path / "office.csv"
+    office.write_bytes("roll_mm;z_mm;deviation_um;\r\n10;-2,5;1,5;\r\n10;2,5;-0,5;\r\n".encode("utf-8-sig"))
+    found, problems = read_topography(office, 16, PINION)
+    assert not problems and found is not None and wanted is not None
+    for key, patch in wanted.patches.items():
+        assert all(np.array_equal(getattr(patch, name), getattr(found.patches[key], name)) for name in vars(patch))
+
+
 @pytest.mark.parametrize(
     ("lines", "words"),
     [

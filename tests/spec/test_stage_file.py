@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -165,6 +166,39 @@ def test_a_wrong_field_is_named_with_its_remedy(write: Write, changes, field: st
     found = problems(path)
     assert remedy in found[field].remedy
     assert found[field].file == str(path)
+
+
+def zero_shift_pair(teeth: int, shift: float = 0.0) -> dict[str, Any]:
+    """Changes that make a pinion of so many teeth by a rack whose fillet is 0.25 modules; the wheel's shift evens the
+    pinion's."""
+    return {
+        "gears.pinion.teeth": teeth,
+        "gears.pinion.profile_shift": shift,
+        "gears.wheel.profile_shift": -shift,
+        "gears.pinion.tip_diameter": f"{4.5 * (teeth + 2 + 2 * shift):.9g} mm",
+        "gears.wheel.tip_diameter": f"{4.5 * (26 - 2 * shift):.9g} mm",
+        "gears.pinion.bore_diameter": "20 mm",
+        "torque_max": "200 N*m",
+        "gears.pinion.rack.fillet_radius": 0.25,
+        "gears.wheel.rack.fillet_radius": 0.25,
+        "pair.center_distance": f"{2.25 * (teeth + 24):.9g} mm",
+    }
+
+
+def test_seventeen_teeth_need_no_profile_shift(write: Write) -> None:
+    """Undercut is judged at the rack's addendum, whatever its fillet: it was judged where the rack's straight flank
+    ends, and 17 teeth without profile shift were refused for a fillet of 0.25."""
+    shape = PairGeometry.of(load_stage(write(zero_shift_pair(17)))).gears[0]
+    assert shape.rounding.form_roll < 0 and math.hypot(shape.r_b, shape.s_form) - shape.r_b < 0.002 * shape.m
+
+
+@pytest.mark.parametrize("teeth", [10, 12, 16])
+def test_undercut_in_earnest_names_the_shift_that_cures_it(write: Write, teeth: int) -> None:
+    least = 1 - teeth * math.sin(math.radians(20)) ** 2 / 2
+    found = problems(write(zero_shift_pair(teeth)))["gears.pinion.profile_shift"]
+    stated = float(re.search(r"at least ([\d.]+),", found.remedy).group(1))
+    assert least <= stated < 1.002 * least
+    load_stage(write(zero_shift_pair(teeth, stated)))
 
 
 GEOMETRY_PROBLEMS = [

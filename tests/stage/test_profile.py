@@ -128,12 +128,37 @@ def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) ->
         ("time_[s],speed_[rpm],speed_[rad/s]\n0,1,1\n1,1,1\n", "speed is there twice"),
         ("time_[s],speed_[rpm]\n0,1\n", "at least two points"),
         ("time_[s],speed_[rpm]\n1,1\n2,1\n", "begins at the time 0"),
-        ("time_[s],speed_[rpm]\n0,1\n2,1\n2,5\n", "times must grow"),
+        ("time_[s],speed_[rpm]\n0,1\n2,1\n1,5\n", "sort the points"),
+        ("time_[s],speed_[rpm]\n0,1\n2,1\n2,5\n", "two points at one time: for a step"),
+        ("time_[s],torqe_[N*m]\n0,1\n2,1\n", "did you mean torque"),
+        ("time_[s],speed_[rpm],angle_[rad]\n0,1,2\n2,1,2\n", "angle.*remove it"),
+        ("time_[s],speed_[rpm]\n0,0,1\n0,5,2\n", "with decimal commas, separate the columns by semicolons"),
+        ("time_[s];speed_[rpm]\n0;1\n0,5;1.234,5\n", "expected a finite number"),
     ],
 )
 def test_files_that_are_no_profile(text: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=words):
         read_profile(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("time_[s],torque_[N*m],speed_[rpm]\n0,1.5,100\n0.25,-2,1e3\n", "utf-8-sig"),
+        ("time_[s],torque_[N*m],speed_[rpm]\r\n0,1.5,100\r\n0.25,-2,1e3\r\n", "utf-8"),
+        ("time_[s];torque_[N*m];speed_[rpm]\r\n0;1,5;100\r\n0,25;-2,0;1000,0\r\n", "utf-8-sig"),
+        ("time_[s];torque_[N*m];speed_[rpm];;\n0;1.5;100;;\n;;;;\n0.25;-2;1000;;\n", "utf-8"),
+        ("time_[s]\ttorque_[N*m]\tspeed_[rpm]\n0\t1,5\t100\n0,25\t-2\t1e3\n", "utf-8"),
+        ('"time_[s]","torque_[N*m]","speed_[rpm]"\n"0","1,5","100"\n"0,25","-2","1e3"\n', "utf-8"),
+    ],
+    ids=["mark", "line ends", "semicolons and commas", "empty columns", "tabs", "quotes"],
+)
+def test_a_profile_reads_the_same_however_an_office_writes_it(text: str, encoding: str, tmp_path: Path) -> None:
+    """Semicolons with decimal commas and empty columns at the end were refused as incomplete rows."""
+    (tmp_path / "x.csv").write_bytes(text.encode(encoding))
+    found = read_profile(tmp_path / "x.csv")
+    assert found.time.tolist() == [0.0, 0.25] and found.torque.tolist() == [1.5, -2.0]
+    assert found.speed == pytest.approx(np.array([100.0, 1000.0]) * RPM, rel=1e-15)
 
 
 def test_files_that_are_not_there_or_no_text(tmp_path: Path) -> None:

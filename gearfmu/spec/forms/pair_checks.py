@@ -84,8 +84,7 @@ def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float
                 f"does not fit the rack's tip: at most {rounded_down(largest):g} for this dedendum",
             )
         )
-    elif shape.s_form <= 0:
-        least = (shape.h_fp - shape.rho_fp * (1 - sin)) / shape.m - shape.r * math.sin(shape.alpha_t) ** 2 / shape.m
+    elif gear.profile_shift < (least := _least_shift(gear, shape)) - 0.5 * shape.shift_per_tooth:
         found.append(
             (
                 "profile_shift",
@@ -94,6 +93,17 @@ def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float
             )
         )
     return found
+
+
+def _least_shift(gear: GearSpec, shape: GearGeometry) -> float:
+    """Profile shift without undercut by the rack's addendum.
+
+    The tool's flank may end deeper; it cuts there only into flank that no mating rack reaches, and the tooth is
+    modelled as it is cut. The limiting number of teeth is a whole one, as in tables (17 for 20 degrees): the shift of
+    half a tooth is no undercut.
+    """
+    straight = (shape.h_fp - shape.rho_fp * (1 - math.sin(shape.alpha))) / shape.m
+    return shape.least_shift(min(gear.rack.addendum, straight))
 
 
 def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:

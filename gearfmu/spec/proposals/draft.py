@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearfmu.errors import Problem
+from gearfmu.spec.forms.pair_checks import rounded_up
 from gearfmu.spec.reading.layers import read_layers
 from gearfmu.spec.reading.library import find_stage
 
@@ -15,6 +16,11 @@ LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-harden
 PITCH_SPEED = 20.0  # m/s at the pitch circle
 BACKLASH_PER_MODULE = 0.02
 STRIP_PER_MODULE = 0.12
+TIP_EDGE_PER_MODULE = 0.05
+SHAFT_RULE = "a shaft in the bore keeps it round"
+_ELEMENT_WIDTH = 1.25  # of the module, at most, across the face
+_TWIST = 0.03  # rad of a shaft at torque_max, as of fzg_c
+_DAMPING = 5e-6  # s, c/k of a shaft, as of fzg_c
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,8 @@ class Unread:
 @dataclass
 class Draft:
     """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; problems: what could not be read;
-    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from."""
+    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from; word:
+    what a value is that nobody gave, "assumed" or "proposed"."""
 
     tables: dict[str, Any]
     marks: dict[str, str] = field(default_factory=dict)
@@ -38,11 +45,12 @@ class Draft:
     unread: tuple[Unread, ...] = ()
     notes: list[str] = field(default_factory=list)
     like: str = ""
+    word: str = "assumed"
 
     @classmethod
     def after(cls, stage: str, word: str = "assumed") -> Draft:
         """A draft that assumes (or does what `word` says) of everything what the shipped `stage` says."""
-        draft = cls(copy.deepcopy(read_layers(find_stage(stage)).tables), like=stage)
+        draft = cls(copy.deepcopy(read_layers(find_stage(stage)).tables), like=stage, word=word)
         draft._mark((), draft.tables, f"{word}, as in {stage}")
         return draft
 
@@ -56,8 +64,8 @@ class Draft:
         self._mark(tuple(place.split(".")), value, origin)
 
     def assume(self, place: str, value: Any, why: str) -> None:
-        """`put` for a value that the file does not give."""
-        self.put(place, value, f"assumed: {why}")
+        """`put` for a value that nobody gave, with the rule behind it."""
+        self.put(place, value, f"{self.word}: {why}")
 
     def at(self, place: str) -> Any:
         """The value or table at a place."""
@@ -76,13 +84,29 @@ class Draft:
 
     def assumptions(self) -> dict[str, str]:
         """Places of assumed values that a reader should look at, with the reason."""
-        return {place: mark for place, mark in self.marks.items() if mark.startswith("assumed: ")}
+        return {place: mark for place, mark in self.marks.items() if mark.startswith(f"{self.word}: ")}
 
     def _mark(self, place: tuple[str, ...], value: Any, origin: str) -> None:
         self.marks[".".join(place)] = origin
         if isinstance(value, dict):
             for key, inner in value.items():
                 self._mark((*place, key), inner, origin)
+
+
+def put_proportions(draft: Draft, gear: str, module: float, width: float) -> None:
+    """Tip edge and element count across the face of a gear of this module and face width (m)."""
+    draft.assume(f"{gear}.tip_edge_radius", millimetres(TIP_EDGE_PER_MODULE * module), "0.05 m_n")
+    across = max(draft.at(f"{gear}.body.mesh")["width"], round(width / (_ELEMENT_WIDTH * module)))
+    draft.assume(f"{gear}.body.mesh.width", across, "elements of at most 1.25 m_n")
+
+
+def put_shafts(draft: Draft, torques: dict[str, float]) -> None:
+    """Shafts and bores of a pair whose gears carry these torques (N·m) at most."""
+    for name, torque in torques.items():
+        stiffness = rounded_up(torque / _TWIST, 2)
+        draft.assume(f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")
+        draft.assume(f"ports.{name}.c", f"{rounded_up(_DAMPING * stiffness, 2):g} N*m*s/rad", "5 us times k")
+        draft.assume(f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
 
 
 def millimetres(value: float) -> str:

@@ -38,7 +38,7 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
     target = _target(name, folder)
     source = find_stage(like)
     if load_stage(source).kind == "general":
-        text = _renamed(source.read_text(encoding="utf-8"), name, str(like))
+        text = _renamed(source.read_text(encoding="utf-8-sig"), name, str(like))
     else:
         own = {"name": name, "description": _DESCRIPTION.format(like=like)}
         text = stage_text(read_layers(source).tables | own, _HEAD.format(name=name, origin=f'made like "{like}"'))

@@ -20,7 +20,14 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, flank_length
 from gearfmu.ranges import range_of, range_problems
 from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, rounded_down, rounded_up
-from gearfmu.spec.proposals.draft import BACKLASH_PER_MODULE, STRIP_PER_MODULE, Draft, degrees, millimetres
+from gearfmu.spec.proposals.draft import (
+    BACKLASH_PER_MODULE,
+    STRIP_PER_MODULE,
+    Draft,
+    degrees,
+    millimetres,
+    put_proportions,
+)
 from gearfmu.spec.proposals.new import free_target, write_drafted
 from gearfmu.spec.stage import load_stage
 
@@ -28,7 +35,6 @@ GIVEN = "given"
 _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the shipped stages
 _LEAST_FILLET = 0.05  # of the module
 _PATCH_PER_HERTZ = 2.0  # slices of tilted or helical teeth carry more than the mean
-_ELEMENT_WIDTH = 1.25  # of the module, at most, across the face
 
 
 @dataclass(frozen=True)
@@ -141,31 +147,24 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
     usual = math.isclose(rack.alpha, math.radians(20))
     draft.put(f"{table}.pressure_angle", degrees(rack.alpha), "proposed: the usual one" if usual else GIVEN)
     draft.put(f"{table}.helix_angle", degrees(rack.beta), GIVEN if rack.beta else "proposed: spur gears")
-    propose(draft, f"{table}.backlash", millimetres(BACKLASH_PER_MODULE * rack.m), "2 % of the module")
+    draft.assume(f"{table}.backlash", millimetres(BACKLASH_PER_MODULE * rack.m), "2 % of the module")
     for gear in gears:
         draft.put(f"{gear}.face_width", millimetres(wish.width or 0.0), GIVEN)
-        propose(draft, f"{gear}.tip_edge_radius", millimetres(0.05 * rack.m), "0.05 m_n")
-        across = max(draft.at(f"{gear}.body.mesh")["width"], round((wish.width or 0.0) / (_ELEMENT_WIDTH * rack.m)))
-        propose(draft, f"{gear}.body.mesh.width", across, "elements of at most 1.25 m_n")
+        put_proportions(draft, gear, rack.m, wish.width or 0.0)
         for part in ("tip_relief", "lead"):
             draft.drop(f"{gear}.{part}")
     return draft
 
 
-def propose(draft: Draft, place: str, value: object, why: str) -> None:
-    """Write a value that was not given, with the rule behind it."""
-    draft.put(place, value, f"proposed: {why}")
-
-
 def put_gear(draft: Draft, place: str, gear: GearGeometry, shift: str) -> None:
     """Teeth, profile shift (`shift`: the rule behind it), tip circle, rack and bore of an external gear."""
     draft.put(f"{place}.teeth", gear.z, GIVEN)
-    propose(draft, f"{place}.profile_shift", round(gear.x, 6) + 0.0, shift)
+    draft.assume(f"{place}.profile_shift", round(gear.x, 6) + 0.0, shift)
     why = f"tip clearance 0.25 m_n kept; root diameter {millimetres(round(2 * gear.r_f, 6))}"
-    propose(draft, f"{place}.tip_diameter", millimetres(2 * gear.r_a), why)
+    draft.assume(f"{place}.tip_diameter", millimetres(2 * gear.r_a), why)
     rack = {"addendum": ADDENDUM, "dedendum": DEDENDUM, "fillet_radius": round(gear.rho_fp / gear.m, 6)}
     draft.put(f"{place}.rack", rack, "proposed: ISO 53, profile A")
-    propose(draft, f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
+    draft.assume(f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
 
 
 def put_load(draft: Draft, wish: Wish, torque: float, speed: float) -> tuple[float, float]:
@@ -193,11 +192,11 @@ def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometr
     wide = min(_PATCH_PER_HERTZ / STRIP_PER_HERTZ * least, most)
     why = "0.12 m_n" if usual >= wide else "2 Hertz half-widths at torque_max"
     value = usual if usual >= wide else max(least, rounded_down(wide, 3))
-    propose(draft, f"{place}.body.strip_half_width", millimetres(value), why)
+    draft.assume(f"{place}.body.strip_half_width", millimetres(value), why)
 
 
 def put_slices(draft: Draft, rack: Rack, width: float) -> None:
     """Slices across the face: five to a whole overlap ratio of helical gears."""
     if rack.beta:
         overlap = width * math.sin(abs(rack.beta)) / (math.pi * rack.m)
-        propose(draft, "contact.slices", min(max(5, round(5 * overlap)), 10), "five to a whole overlap ratio")
+        draft.assume("contact.slices", min(max(5, round(5 * overlap)), 10), "five to a whole overlap ratio")

@@ -9,14 +9,11 @@ from gearfmu.geometry.hertz import largest_relative_radius
 from gearfmu.geometry.pair import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.spec.forms.pair_checks import rounded_down, rounded_up
-from gearfmu.spec.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
-from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, propose, put_gear, put_load, put_patch, put_slices
+from gearfmu.spec.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
+from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, put_gear, put_load, put_patch, put_slices
 
 NAMES = ("pinion", "wheel")
 SHIFT_RULE = "equal specific sliding at both ends of the path of contact"
-SHAFT_RULE = "a shaft in the bore keeps it round"
-_TWIST = 0.03  # rad of a shaft at torque_max, as of fzg_c
-_DAMPING = 5e-6  # s, c/k of a shaft, as of fzg_c
 
 
 def draft_pair(wish: Wish) -> Draft:
@@ -30,13 +27,12 @@ def draft_pair(wish: Wish) -> Draft:
     geometry = pair.at(shift)
     draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in NAMES))
     if wish.center is None:
-        propose(draft, "pair.center_distance", millimetres(distance), "no sum of profile shifts")
+        draft.assume("pair.center_distance", millimetres(distance), "no sum of profile shifts")
     else:
         draft.put("pair.center_distance", millimetres(distance), GIVEN)
     rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
     for name, gear, rule in zip(NAMES, geometry.gears, rules, strict=True):
         put_gear(draft, f"gears.{name}", gear, rule)
-        propose(draft, f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
     _put_loads(draft, wish, geometry, width)
     put_slices(draft, rack, width)
     return draft
@@ -51,10 +47,7 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     radius = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
     for name, gear in zip(NAMES, geometry.gears, strict=True):
         put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
-    for name, own in zip(NAMES, (torque, torque * ratio), strict=True):
-        stiffness = rounded_up(own / _TWIST, 2)
-        propose(draft, f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")
-        propose(draft, f"ports.{name}.c", f"{rounded_up(_DAMPING * stiffness, 2):g} N*m*s/rad", "5 us times k")
+    put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
 
 
 def reference_distance(rack: Rack, teeth: int) -> float:

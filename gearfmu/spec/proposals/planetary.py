@@ -20,7 +20,7 @@ from gearfmu.geometry.shifts import (
 from gearfmu.ranges import range_of
 from gearfmu.spec.forms.pair_checks import rounded_up
 from gearfmu.spec.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
-from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, propose, put_gear, put_load, put_patch, put_slices
+from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, put_gear, put_load, put_patch, put_slices
 from gearfmu.spec.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
 
 NAMES = ("sun", "planet", "ring")
@@ -48,7 +48,7 @@ def draft_set(wish: Wish) -> Draft:
     draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
     if wish.center is None:
         same = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
-        propose(draft, "set.center_distance", millimetres(distance), same)
+        draft.assume("set.center_distance", millimetres(distance), same)
     else:
         draft.put("set.center_distance", millimetres(distance), GIVEN)
     _put_planets(draft, wish)
@@ -121,8 +121,8 @@ def _put_planets(draft: Draft, wish: Wish) -> None:
     draft.put("set.planets", count, GIVEN)
     draft.drop("set.positions")
     if wish.unequal and (wish.teeth[0] + wish.teeth[2]) % count:
-        propose(draft, "set.positions", _places(wish), "the places nearest to even ones at which teeth fit")
-    propose(draft, "set.load_sharing", _SHARING[count], "IEC 61400-4 for this number of planets")
+        draft.assume("set.positions", _places(wish), "the places nearest to even ones at which teeth fit")
+    draft.assume("set.load_sharing", _SHARING[count], "IEC 61400-4 for this number of planets")
     draft.drop("set.pin_errors")
     held = {"bore": "rigid", **{f"bolt{k}": "rigid" for k in range(count)}}
     draft.put("carrier.coupling", held, "proposed: bolts and bore on stiff shafts")
@@ -131,37 +131,36 @@ def _put_planets(draft: Draft, wish: Wish) -> None:
 def _put_ring(draft: Draft, mesh: RingMesh) -> None:
     ring, m = mesh.ring, mesh.ring.m
     draft.put("ring.teeth", ring.z, GIVEN)
-    propose(draft, "ring.profile_shift", ring.x, "no backlash at the centre distance; positive outwards")
+    draft.assume("ring.profile_shift", ring.x, "no backlash at the centre distance; positive outwards")
     why = f"clear of the planets' roots; root diameter {millimetres(round(2 * ring.r_f, 6))}"
-    propose(draft, "ring.tip_diameter", millimetres(2 * ring.r_a), why)
-    propose(draft, "ring.rim_diameter", millimetres(rounded_up(2 * ring.r_f + 7 * m, 3)), "a rim of 3.5 m_n")
-    propose(draft, "ring.dedendum", DEDENDUM, "ISO 53")
-    propose(draft, "ring.fillet_radius", RING_FILLET, "of a shaping cutter")
+    draft.assume("ring.tip_diameter", millimetres(2 * ring.r_a), why)
+    draft.assume("ring.rim_diameter", millimetres(rounded_up(2 * ring.r_f + 7 * m, 3)), "a rim of 3.5 m_n")
+    draft.assume("ring.dedendum", DEDENDUM, "ISO 53")
+    draft.assume("ring.fillet_radius", RING_FILLET, "of a shaping cutter")
     points = [n for n in range(3, 61) if ring.z % n == 0]
     if points:
         nearest = min(points, key=lambda n: abs(n - 6))
-        propose(draft, "ring.mounts.points", nearest, "a divisor of the number of teeth")
+        draft.assume("ring.mounts.points", nearest, "a divisor of the number of teeth")
     else:
         draft.drop("ring.mounts")
 
 
 def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
     bolt = math.floor(0.75e4 * mesh.planet.r_f) / 1e4
-    propose(draft, "carrier.bolt_diameter", millimetres(bolt), "three quarters of the planets' bore")
-    propose(draft, "carrier.bore_diameter", millimetres(rounded_up(mesh.a, 2)), "the centre distance")
+    draft.assume("carrier.bolt_diameter", millimetres(bolt), "three quarters of the planets' bore")
+    draft.assume("carrier.bore_diameter", millimetres(rounded_up(mesh.a, 2)), "the centre distance")
     outer = rounded_up(2 * mesh.a + 2 * bolt, 3)
-    propose(draft, "carrier.outer_diameter", millimetres(outer), "the bolt circle and two bolt diameters")
+    draft.assume("carrier.outer_diameter", millimetres(outer), "the bolt circle and two bolt diameters")
     thickness = rounded_up(0.6 * (wish.width or 0.0), 2)
-    propose(draft, "carrier.thickness", millimetres(thickness), "0.6 of the face width")
-    propose(draft, "carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
-    propose(
-        draft,
+    draft.assume("carrier.thickness", millimetres(thickness), "0.6 of the face width")
+    draft.assume("carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
+    draft.assume(
         "carrier.mesh.scale",
         _CARRIER_SCALE,
         "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh",
     )
     inputs = 6 * ((wish.planets or 1) + 1)
-    propose(draft, "carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
+    draft.assume("carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
 
 
 def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: RingMesh) -> None:

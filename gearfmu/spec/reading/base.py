@@ -136,7 +136,7 @@ def refuse(remedy: str) -> PydanticCustomError:
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file. SpecError when it is missing, not UTF-8 or not TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         remedy = f"the file cannot be read ({error.strerror}): check the path"
     except UnicodeDecodeError:

@@ -1,12 +1,12 @@
 """Torque and speed over time: CSV files with a head like `time_[s],torque_[N*m],speed_[rpm]`, as traces are exported.
 
 A row is a point; between points the values follow straight lines, outside they stay. Columns in any order, each with
-its unit; `torque` or `speed` may be missing. What follows a # is remark.
+its unit; `torque` or `speed` may be missing. Separators and decimal signs: gearfmu.spec.tables.rows.
 """
 
 from __future__ import annotations
 
-import csv
+import difflib
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.ranges import range_of
+from gearfmu.spec.tables.rows import number, read_rows, uneven
 from gearfmu.units import to_si
 
 UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
@@ -42,11 +43,11 @@ def read_profile(path: Path) -> Profile:
     """The profile in a CSV file. SpecError with everything that is wrong with it."""
     reader = _Reader(str(path))
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        rows = read_rows(path)
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "it is not UTF-8 text"
         raise SpecError([Problem(str(path), "", "", f"the profile cannot be read ({why}): name a CSV file")]) from None
-    found = reader.read(text)
+    found = reader.read(rows)
     if reader.problems:
         raise SpecError(reader.shown)
     assert found is not None, "no profile and no problem"
@@ -70,9 +71,7 @@ class _Reader:
         rest = [Problem(self.file, "", "", f"and {left} more problems: correct these first")] if left > 0 else []
         return self.problems[:MOST_SHOWN] + rest
 
-    def read(self, text: str) -> Profile | None:
-        lines = [(i + 1, line.split("#")[0].strip()) for i, line in enumerate(text.splitlines())]
-        rows = [(f"line {i}", next(csv.reader([line]))) for i, line in lines if line]
+    def read(self, rows: list[tuple[str, list[str]]]) -> Profile | None:
         if not rows:
             self.refuse("", "", f"the file holds no rows: give a head {EXAMPLE} and points")
             return None
@@ -88,9 +87,9 @@ class _Reader:
 
     def head(self, where: str, cells: list[str]) -> list[tuple[str, float]]:
         """Of every column its name ("" where it is none of ours) and the SI size of its unit."""
-        found = [self.column(where, cell.strip()) for cell in cells]
+        found = [self.column(where, cell) for cell in cells]
         names = [name for name, _ in found if name]
-        known = [name for name in UNITS if any(cell.strip().startswith(name) for cell in cells)]
+        known = [name for name in UNITS if any(cell.startswith(name) for cell in cells)]
         if "time" not in known:
             self.refuse(where, ",".join(cells), f"there is no time: write a head like {EXAMPLE}")
         elif len(known) == 1:
@@ -104,9 +103,9 @@ class _Reader:
         match = _HEADING.fullmatch(text)
         name = match[1] if match else text
         if name not in UNITS:
-            self.refuse(
-                where, text, f"unknown column: there are {', '.join(UNITS)}, each with its unit, as in {EXAMPLE}"
-            )
+            near = difflib.get_close_matches(name.lower(), UNITS, 1)
+            remedy = f"did you mean {near[0]}?" if near else "remove it"
+            self.refuse(where, text, f"unknown column: {remedy} A profile has {', '.join(UNITS)}, as in {EXAMPLE}")
         elif match is None:
             self.refuse(where, text, f"the unit is missing: write {name}_[{UNITS[name]}] or another unit of its kind")
         else:
@@ -118,16 +117,16 @@ class _Reader:
 
     def row(self, where: str, cells: list[str], scales: list[tuple[str, float]]) -> dict[str, float]:
         if len(cells) != len(scales):
-            self.refuse(where, ",".join(cells), f"{len(cells)} values, the head has {len(scales)}: complete the row")
+            self.refuse(where, ",".join(cells), uneven(len(cells), len(scales)))
             return {}
         found = {}
         for (name, scale), cell in zip(scales, cells, strict=True):
             try:
-                value = float(cell)
+                value = number(cell)
             except ValueError:
                 value = np.nan
             if name and not np.isfinite(value):
-                self.refuse(f"{where}, {name}", cell.strip(), "expected a finite number")
+                self.refuse(f"{where}, {name}", cell, "expected a finite number")
             elif name and (refusal := range_of(name).refusal(scale * value)):
                 self.refuse(f"{where}, {name}", range_of(name).shown(scale * value), refusal)
             found[name] = scale * value
@@ -137,4 +136,8 @@ class _Reader:
         if time[0] != 0.0:
             self.refuse(places[0], f"{time[0]:g} s", "a profile begins at the time 0")
         for k in np.flatnonzero(np.diff(time) <= 0) + 1:
-            self.refuse(places[k], f"{time[k]:g} s", f"not after the point before, {time[k - 1]:g} s: times must grow")
+            if time[k] == time[k - 1]:
+                why = "two points at one time: for a step, let the second one follow a little later, such as 1 us"
+            else:
+                why = f"before the point above it, {time[k - 1]:g} s: sort the points, times must grow"
+            self.refuse(places[k], f"{time[k]:g} s", why)

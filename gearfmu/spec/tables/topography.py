@@ -3,12 +3,12 @@
 A row is one point of one flank. Columns, in any order: `roll` or `diameter`, `z` (place across the face width, from its
 middle, towards +z), `deviation` (normal to the involute in the transverse section, positive: more material), each with
 its unit after an underscore (roll_mm, z_mm, deviation_um); and, where flanks differ, `flank` (left, right) and `tooth`.
-Seen from the +z end with the tooth upwards, the left flank is the one at its larger angle. What follows a # is remark.
+Seen from the +z end with the tooth upwards, the left flank is the one at its larger angle. How rows are written:
+gearfmu.spec.tables.rows.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from gearfmu.errors import Problem, UnitError
+from gearfmu.spec.tables.rows import number, read_rows, uneven
 from gearfmu.units import to_si
 
 FLANKS = ("left", "right")  # index 0: sg = +1, index 1: sg = −1
@@ -81,13 +82,13 @@ def read_topography(path: Path, teeth: int, shape: Any) -> tuple[Topography | No
     """The topography of a gear of `teeth` teeth, or None and everything that is wrong with its file. shape : r_b,
     s_form and s_tip (m) of the gear; where the file gives diameters, rolls follow from r_b."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        rows = read_rows(path)
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "it is not UTF-8 text"
         remedy = f"{path} cannot be read ({why}): write the path relative to the stage file"
         return None, [Problem(str(path), "", "", remedy)]
     reader = _Reader(str(path), teeth, shape)
-    reader.read(lines)
+    reader.read(rows)
     if reader.problems:
         return None, reader.shown()
     patches = {key: patch for key, points in reader.points.items() if (patch := reader.patch(key, points)) is not None}
@@ -113,19 +114,17 @@ class _Reader:
         rest = Problem(self.file, "", "", f"and {len(self.problems) - _MOST_SHOWN} more problems: correct these first")
         return [*self.problems[:_MOST_SHOWN], rest]
 
-    def read(self, lines: list[str]) -> None:
-        rows = [(i + 1, line.split("#")[0].strip()) for i, line in enumerate(lines)]
-        rows = [(number, text) for number, text in rows if text]
+    def read(self, rows: list[tuple[str, list[str]]]) -> None:
         if not rows:
             return self.refuse("", "", "the file holds no rows: give a head roll_mm,z_mm,deviation_um and points")
-        names = [name.strip() for name in next(csv.reader([rows[0][1]]))]
-        self.read_head(f"line {rows[0][0]}", names)
+        where, names = rows[0]
+        self.read_head(where, names)
         if self.problems:
             return None
         if len(rows) == 1:
             return self.refuse("", "", "the file holds a head and no points: give at least one row")
-        for number, text in rows[1:]:
-            self.read_row(f"line {number}", [cell.strip() for cell in next(csv.reader([text]))], len(names))
+        for where, cells in rows[1:]:
+            self.read_row(where, cells, len(names))
         return None
 
     def read_head(self, where: str, names: list[str]) -> None:
@@ -150,12 +149,12 @@ class _Reader:
 
     def read_row(self, where: str, cells: list[str], width: int) -> None:
         if len(cells) != width:
-            return self.refuse(where, ",".join(cells), f"{len(cells)} values, the head has {width}: complete the row")
+            return self.refuse(where, ",".join(cells), uneven(len(cells), width))
         numbers = {}
         for name in (name for name in self.columns if name not in ("tooth", "flank")):
             i, size = self.columns[name]
             try:
-                numbers[name] = size * float(cells[i])
+                numbers[name] = size * number(cells[i])
             except ValueError:
                 self.refuse(f"{where}, {name}", cells[i], "expected a number")
                 return None

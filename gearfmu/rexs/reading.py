@@ -1,0 +1,139 @@
+"""Files of the exchange format REXS, versions 1.0 to 1.7, in XML or JSON, plain or in an archive.
+
+Form after the public specification (spec.rexs.info) and its schemas: `model` holds `relations` between components,
+`components` and `load_spectrum`; an attribute has an id, a unit and a scalar or an array. JSON says the type of a value
+by its key: `floating_point`, `integer`, `string`, `floating_point_array` …
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.rexs.model import Attribute, Component, Relation, RexsModel
+
+_ENDINGS = (".rexs", ".xml", ".rexsj", ".json")
+_LARGEST = 256 * 2**20  # bytes; gear units are below one hundredth of that
+_NO_VALUES = ("id", "unit")  # keys of an attribute in JSON
+Cases = list[tuple[str, dict[str, Attribute]]]  # component and what a load case says about it
+
+
+def read_rexs(path: Path) -> RexsModel:
+    """The model in a REXS file in XML (.rexs, .xml) or JSON (.rexsj, .json), or in the only one of an archive (.rexsz,
+    .zip). SpecError when it is none."""
+    content = _bytes(path)
+    is_json = content.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
+    version, components, relations, cases = (_from_json if is_json else _from_xml)(path, content)
+    known = {component.id: component for component in components}
+    if len(known) < len(components):
+        raise _refused(path, "two components have the same id")
+    for identifier, attributes in cases:
+        if identifier in known:
+            known[identifier].cases.append(attributes)
+    return RexsModel(path, version, known, relations)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        if not zipfile.is_zipfile(path):
+            return path.read_bytes()
+        with zipfile.ZipFile(path) as archive:
+            inside = [info for info in archive.infolist() if info.filename.lower().endswith(_ENDINGS)]
+            if len(inside) != 1 or inside[0].file_size > _LARGEST:
+                raise _refused(path, f"the archive must hold one .rexs or .rexsj file, not {len(inside)}")
+            return archive.read(inside[0])
+    except OSError as error:
+        raise _refused(path, f"the file cannot be read ({error.strerror}): check the path") from error
+
+
+def _refused(path: Path, remedy: str) -> SpecError:
+    return SpecError([Problem(str(path), "", "", remedy)])
+
+
+def _known_version(path: Path, version: str) -> str:
+    if version.split(".")[0] != "1":
+        raise _refused(path, f"REXS version {version}: versions 1.0 to 1.7 are read")
+    return version
+
+
+def _from_xml(path: Path, content: bytes) -> tuple[str, list[Component], tuple[Relation, ...], Cases]:
+    try:
+        root = ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        raise _refused(path, f"neither JSON nor well-formed XML ({error})") from error
+    if root.tag != "model" or not root.get("version"):
+        raise _refused(path, "the root element of a REXS file is <model version=…>")
+    version = _known_version(path, root.get("version", ""))
+    components = [
+        Component(element.get("id", ""), element.get("type", ""), element.get("name", ""), _xml_attributes(element))
+        for element in root.iterfind("components/component")
+    ]
+    relations = tuple(
+        Relation(
+            element.get("type", ""),
+            tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref")),
+        )
+        for element in root.iterfind("relations/relation")
+    )
+    places = ("load_spectrum/load_case/components/component", "load_spectrum/load_case/component")
+    cases = [(element.get("id", ""), _xml_attributes(element)) for place in places for element in root.iterfind(place)]
+    return version, components, relations, cases
+
+
+def _xml_attributes(element: ElementTree.Element) -> dict[str, Attribute]:
+    found = {}
+    for entry in element.iterfind("attribute"):
+        name, text = entry.get("id", ""), (entry.text or "").strip()
+        if len(entry):  # an array, a matrix or coded values
+            text = " ".join(part.strip() for part in entry.itertext() if part.strip())
+        found[name] = Attribute(name, text, entry.get("unit", ""))
+    return found
+
+
+def _from_json(path: Path, content: bytes) -> tuple[str, list[Component], tuple[Relation, ...], Cases]:
+    try:
+        model = json.loads(content.decode("utf-8-sig"), parse_float=str)["model"]
+        version = _known_version(path, model["version"])
+        components = [
+            Component(str(entry["id"]), entry["type"], entry.get("name", ""), _json_attributes(entry))
+            for entry in model["components"]
+        ]
+        relations = tuple(
+            Relation(entry["type"], tuple((ref["role"], str(ref["id"])) for ref in entry["refs"]))
+            for entry in model["relations"]
+        )
+        cases = [
+            (str(entry["id"]), _json_attributes(entry))
+            for case in (model.get("load_spectrum") or {}).get("load_cases", [])
+            for entry in case["components"]
+        ]
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise _refused(path, f"no valid JSON ({error})") from error
+    except (KeyError, TypeError, AttributeError) as error:
+        remedy = 'not of the form {"model": {"version": …, "relations": […], "components": […]}} of REXS in JSON'
+        raise _refused(path, f"{remedy} ({type(error).__name__}: {error})") from error
+    return version, components, relations, cases
+
+
+def _json_attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+    found = {}
+    for attribute in entry.get("attributes") or []:
+        values = [value for key, value in attribute.items() if key not in _NO_VALUES]
+        found[attribute["id"]] = Attribute(attribute["id"], " ".join(_words(values)), attribute.get("unit") or "")
+    return found
+
+
+def _words(value: object) -> Iterator[str]:
+    """Scalars of a value, an array or a matrix as they are written in XML."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _words(item)
+    elif isinstance(value, bool):
+        yield str(value).lower()
+    elif value is not None:
+        yield str(value).strip()

@@ -1,0 +1,109 @@
+"""Values of a REXS file are those of the component they belong to: gears of different widths, shafts of several
+sections, and fields that nobody filled in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from test_rexs import PAIR, SET, attribute_of, changed, stage_of, without
+
+from gearfmu.errors import SpecError
+from gearfmu.rexs import draft_from_rexs
+
+SECTIONS = ((40, 26, 26, 0, 0), (40, 28, 34, 6, 10), (40, 38, 38, 12, 12))  # length, outer and inner begin and end, mm
+
+
+def sections(shaft: int, rows: tuple[tuple[float, ...], ...]) -> list[tuple[str, str]]:
+    """Edits that give a shaft of the pair these sections one after the other instead of its only one."""
+    old, parts, links, place = shaft + 1, "", "", 0.0
+    names = ("length", "outer_diameter_begin", "outer_diameter_end", "inner_diameter_begin", "inner_diameter_end")
+    for k, row in enumerate(rows):
+        own = 100 * shaft + k
+        values = zip(("u_coordinate_on_shaft", *names), (place, *row), strict=True)
+        lines = "".join(f'<attribute id="{name}" unit="mm">{value}</attribute>' for name, value in values)
+        parts += f'<component id="{own}" type="shaft_section" name="">{lines}</component>'
+        links += f'<relation id="{own}" type="assembly"><ref role="assembly" id="{shaft}"/><ref id="{own}"/></relation>'
+        place += row[0]
+    return [
+        (rf'<component id="{old}" (?:(?!</component>).|\n)*</component>', parts),
+        (r"<relations>", f"<relations>{links}"),
+    ]
+
+
+def test_every_gear_has_its_own_width(tmp_path: Path) -> None:
+    """Reading one body's width for both passed while both were 14 mm. The torque that is assumed counts the common
+    width."""
+    edits = (attribute_of("20", "face_width", "15"), attribute_of("21", "face_width", "12"))
+    made = stage_of(changed(tmp_path, PAIR, *edits, without("torque_around_u_axis")), tmp_path)
+    assert [gear.face_width for gear in made.gears] == [0.015, 0.012]
+    common = stage_of(changed(tmp_path, PAIR, without("torque_around_u_axis")), tmp_path / "b")
+    assert made.torque_max == pytest.approx(12 / 14 * common.torque_max, rel=0.1)
+
+
+def test_every_gear_of_a_set_has_its_own_width(tmp_path: Path) -> None:
+    draft = draft_from_rexs(SET)
+    ids = {name: draft.marks[f"{name}.teeth"].split()[-1] for name in ("sun", "planet", "ring")}
+    widths = {"sun": "31", "planet": "29", "ring": "33"}
+    edits = [attribute_of(ids[name], "face_width", widths[name]) for name in ("sun", "ring")]
+    edits += [attribute_of(planet, "face_width", "29") for planet in ("100", "110", "120", "130")]
+    tables = draft_from_rexs(changed(tmp_path, SET, *edits)).tables
+    assert {name: tables[name]["face_width"] for name in widths} == {name: f"{w} mm" for name, w in widths.items()}
+
+
+@pytest.mark.parametrize(
+    ("at", "bore"), [("20", 26), ("50", 29.5), ("60", 31), ("80", 34), ("81", 38)], ids=lambda value: str(value)
+)
+def test_the_bore_is_that_of_the_section_under_the_gear(tmp_path: Path, at: str, bore: float) -> None:
+    """Of a shaft of three sections, the middle one a cone; the first section served wherever the gear was, and the
+    other gear's shaft is another."""
+    edits = [*sections(10, SECTIONS), attribute_of("20", "u_coordinate_on_shaft", at)]
+    made = stage_of(changed(tmp_path, PAIR, *edits), tmp_path)
+    assert [gear.bore_diameter for gear in made.gears] == [pytest.approx(1e-3 * bore), 0.040]
+
+
+def test_a_gear_of_one_piece_with_its_shaft_has_the_shafts_bore(tmp_path: Path) -> None:
+    edits = sections(10, ((60, 30, 30, 0, 0), (60, 60, 60, 10, 18)))
+    made = stage_of(changed(tmp_path, PAIR, *edits, attribute_of("20", "u_coordinate_on_shaft", "90")), tmp_path)
+    assert made.gears[0].bore_diameter == pytest.approx(14e-3)
+
+
+def test_shafts_keep_bores_round_and_edges_follow_the_module(tmp_path: Path) -> None:
+    """As `gearfmu new` proposes them. Averaging bores made imported pairs 27 % too soft, and every tip edge was that of
+    a module of 4.5 mm."""
+    made = stage_of(PAIR, tmp_path)
+    assert [gear.bore_coupling for gear in made.gears] == ["rigid", "rigid"]
+    half = changed(tmp_path, SET, *((rf'(id="{name}" unit=)"mm"', r'\1"cm"') for name in LENGTHS))
+    for name in ("sun", "planet", "ring"):
+        small, large = draft_from_rexs(SET).tables[name], draft_from_rexs(half).tables[name]
+        assert (small["tip_edge_radius"], large["tip_edge_radius"]) == ("0.125 mm", "1.25 mm")
+    ports = draft_from_rexs(PAIR).tables["ports"]
+    assert ports["pinion"]["k"] == "18000 N*m/rad", "535 N·m over 0.03 rad, rounded up"
+
+
+LENGTHS = ("normal_module", "face_width", "center_distance", "tip_diameter")
+
+
+@pytest.mark.parametrize("shown", ["1", "0", "0.001"])
+def test_a_placeholder_for_a_tip_circle_is_computed(tmp_path: Path, shown: str) -> None:
+    """Programs write 1 mm or 0 where nothing was filled in. The diameter is then that of a file without it, and a note
+    says so."""
+    for source, path in ((PAIR, "gears.pinion"), (SET, "ring")):
+        component = draft_from_rexs(source).marks[f"{path}.tip_diameter"].split()[-1]
+        filled = draft_from_rexs(changed(tmp_path, source, attribute_of(component, "tip_diameter", shown)))
+        left_out = draft_from_rexs(changed(tmp_path, source, without("tip_diameter")))
+        assert filled.at(f"{path}.tip_diameter") == left_out.at(f"{path}.tip_diameter")
+        assert [note for note in filled.notes if f" {component} " in note and "placeholder" in note]
+
+
+def test_other_placeholders_are_refused_or_left_aside(tmp_path: Path) -> None:
+    zero = [attribute_of("20", name, "0") for name in ("face_width", "normal_module")]
+    with pytest.raises(SpecError) as error:
+        draft_from_rexs(changed(tmp_path, PAIR, *zero, attribute_of("21", "number_of_teeth", "0")))
+    found = {problem.field: problem.remedy for problem in error.value.problems}
+    assert len(found) == 3 and all("placeholder" in remedy for remedy in found.values())
+    nothing = [attribute_of("41", name, "0") for name in ("elastic_modulus", "poisson_ratio", "density")]
+    nothing += [attribute_of("11", f"outer_diameter_{end}", "0") for end in ("begin", "end")]
+    pinion = stage_of(changed(tmp_path, PAIR, *nothing), tmp_path).gears[0]
+    assert (pinion.material.youngs_modulus, pinion.material.density) == (206e9, 7850)
+    assert pinion.bore_diameter == pytest.approx(31e-3, rel=0.05), "half the root diameter"
