@@ -87,7 +87,7 @@ def test_harmonics_of_a_sum_of_cosines() -> None:
     position = np.arange(8) / 8
     te = 5 + 3 * np.cos(2 * np.pi * position) + 2 * np.sin(6 * np.pi * position)
     result = gf.TeResult(
-        np.ones(1), position, te[None], np.ones((1, 8)), np.ones((1, 8)), np.ones((1, 8, 4)), np.ones((1, 5))
+        np.ones(1), position, te[None], np.ones((1, 8)), np.ones((1, 8)), np.ones((1, 8, 4)), np.ones((1, 5)), ("",)
     )
     assert result.harmonics(4)[0, :3] == pytest.approx([3 / 2**0.5, 0, 2 / 2**0.5], abs=1e-12)
     assert np.isnan(result.harmonics(6)[0, 3:]).all()

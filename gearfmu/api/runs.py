@@ -44,7 +44,7 @@ def te(
 
     Of a pair or a train a TeResult: te (T, P) m, mesh_stiffness and stage_stiffness (T, P) N/m, without and with shafts
     and bearings, shares of the tooth pairs; of a planetary set a SetTeResult with stage_stiffness
-    and load sharing. Raises SimulationError where there is no equilibrium.
+    and load sharing. `failed` names torques without equilibrium; SimulationError where none has one.
     """
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)

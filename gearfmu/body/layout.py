@@ -165,7 +165,9 @@ def _rim_entries() -> tuple[Entry, ...]:
             bits=TABLE_BITS,
         ),
         Entry("rim/c_pp", "rim.static_pp", ("z", 3, 3), "m/N", "patch of sector 0 per unit force on that of sector m"),
-        Entry("rim/mounts", "rim.mounts", (), "", "number of mounts, at the sectors k z/mounts; 0: none", "i8"),
+        Entry(
+            "rim/mounts", "rim.mounts", (), "", "number of mounts, at the sectors nearest to k z/mounts; 0: none", "i8"
+        ),
         Entry("rim/mount_stiffness", "rim.mount_stiffness", (), "N/m", "stiffness of a mount, in every direction"),
     )
 

@@ -21,6 +21,7 @@ import scipy.linalg as sl
 from gearfmu.body.reduced import ReducedBody, Rim
 from gearfmu.errors import BodyError
 from gearfmu.fem.coupling import rigid_fields
+from gearfmu.geometry.planetary import mount_spaces
 
 
 def _rim(body: ReducedBody) -> Rim:
@@ -133,7 +134,7 @@ def mounted(body: ReducedBody) -> MountedRing:
 
 def mount_sectors(body: ReducedBody) -> list[int]:
     """Sectors whose patches of the rim are held."""
-    return [k * body.teeth // _rim(body).mounts for k in range(_rim(body).mounts)]
+    return mount_spaces(body.teeth, _rim(body).mounts)
 
 
 def turned_rows(body: ReducedBody, rows: np.ndarray, sector: int) -> np.ndarray:

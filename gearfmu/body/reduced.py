@@ -23,8 +23,8 @@ class Rim:
     patch_point (3,) m, of sector 0; patch_rows (3, n), kg^-½: its mean displacement x, y, z in the modes; flank_rigid
     (2, R, A, 6): flank rows of space 0 of the rigid motions about the origin; static_fp (2, z, R, A, 3), m/N: flank
     row of space 0 per unit force on the patch of sector m; static_pp (z, 3, 3), m/N: patch of sector 0 per unit force
-    on that of sector m. mounts: number of them, at the sectors k·z/mounts; mount_stiffness: N/m of each, the same in
-    all directions. No mounts: 0 and 0.
+    on that of sector m. mounts: number of them, at the sectors nearest to k·z/mounts; mount_stiffness: N/m of each, the
+    same in all directions. No mounts: 0 and 0.
     """
 
     patch_point: np.ndarray

@@ -10,6 +10,7 @@ import click
 
 from gearfmu.commands.models import model_of
 from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.errors import SimulationError
 
 
 @click.command()
@@ -58,7 +59,8 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
     Of a planetary set te_um = 1e6·r_b,s (φ_s − (1 + z_r/z_s) φ_c) over one mesh period, and how its planets share the
     load at sun and ring: normal force over the mean of all planets, and the mesh load factor K_γ (ISO 6336-1).
 
-    The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
+    The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
+    equilibrium is named and NaN in the table, and the exit code is 1."""
     model = model_of(stage, bores=bore)
     if model.stage.carriers:
         return _of_set(model, list(torques), out, **where)
@@ -66,7 +68,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
 
-    meshes = [mesh.name for mesh in model.stage.engagements]
+    meshes, failed = [mesh.name for mesh in model.stage.engagements], False
     for mesh in meshes:
         result = loaded_te(model, list(torques), mesh=mesh, **where)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
@@ -77,15 +79,26 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
             click.echo(mesh)
         _tell(result)
         click.echo(f"{path}, {picture}")
+        failed |= any(result.failed)
     _draw_flanks(model, out)
-    warn_of_limits(model, torques)
+    _end(model, torques, failed)
 
 
 def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
-    """The transmission error without load, for the picture; None where it is among those asked for."""
+    """The transmission error without load, for the picture; None where it is among those asked for, or not found."""
     from gearfmu.stage import loaded_te
 
-    return None if 0.0 in torques else loaded_te(model, [0.0], **where)
+    try:
+        return None if 0.0 in torques else loaded_te(model, [0.0], **where)
+    except SimulationError:
+        return None
+
+
+def _end(model: Any, torques: Sequence[float], failed: bool) -> None:
+    """Warnings; exit code 1 where a torque has no equilibrium."""
+    warn_of_limits(model, torques)
+    if failed:
+        click.get_current_context().exit(1)
 
 
 def _draw_flanks(model: Any, out: Path) -> None:
@@ -121,11 +134,11 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     _tell(result)
-    for text in above_sharing(result, model.spec.set.load_sharing):
+    for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")
     _draw_flanks(model, out)
-    warn_of_limits(model, torques)
+    _end(model, torques, any(result.failed))
 
 
 def above_sharing(result: Any, load_sharing: float) -> list[str]:

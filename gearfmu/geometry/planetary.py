@@ -17,6 +17,12 @@ from gearfmu.geometry.pair import PairGeometry
 
 SAME_ANGLE = 1e-9  # rad
 HANDS = {"sun": 1, "planet": -1, "ring": -1}  # sign of the helix angle over that of the set
+MOUNTS = 6  # of a ring, where nothing says how many
+
+
+def mount_spaces(teeth: int, points: int) -> list[int]:
+    """Tooth spaces of a ring that are nearest to its mounts, which are spaced evenly from space 0 on."""
+    return [(2 * k * teeth + points) // (2 * points) for k in range(points)]
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.spec.forms.members import Form, member_of
@@ -59,13 +60,13 @@ def gear_full_order(spec: Form, name: str, scale: float = GEAR_SCALE) -> FullOrd
 def ring_mounts(sector: FeMesh, body: Elements, mounts: Any) -> list[Coupling]:
     """The mounts mount0 … of a whole ring: averaging nodes, each of the rim of one sector; none when `mounts` is None.
 
-    Mount k holds the sector of tooth space k·z/points; its point is the middle of that patch.
+    Mount k holds the sector of its tooth space (`mount_spaces`); its point is the middle of that patch.
     """
     if mounts is None:
         return []
     couplings = []
-    for k in range(mounts.points):
-        patch = sector.sector_nodes(k * sector.teeth // mounts.points)[sector.sets["rim"]]
+    for k, space in enumerate(mount_spaces(sector.teeth, mounts.points)):
+        patch = sector.sector_nodes(space)[sector.sets["rim"]]
         couplings.append(Coupling(f"mount{k}", "averaging", patch, body.nodes[patch].mean(axis=0)))
     return couplings
 

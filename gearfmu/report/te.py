@@ -23,6 +23,7 @@ LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
 def write_plot(result: Any, path: Path, unloaded: Any = None) -> None:
     """Write a TeResult as PNG or what the suffix says. unloaded: a TeResult at 0 N·m, drawn in grey where `result` has
     no such torque. Without mesh_stiffness that of the stage is drawn, without over_width the peak to peak."""
+    result = result.found
     drawn = _drawn(result, unloaded)
     with styled():
         figure, ((upper, bars), (lower, width)) = _panes()
@@ -41,6 +42,7 @@ def write_plot(result: Any, path: Path, unloaded: Any = None) -> None:
 def write_set_plot(result: Any, path: Path) -> None:
     """Write a SetTeResult as PNG or what the suffix says. Sharing is that at the largest torque, at the sun in full
     lines, at the ring in broken ones."""
+    result = result.found
     most, drawn = int(abs(result.torque).argmax()), _drawn(result)
     with styled():
         figure, ((upper, bars), (lower, factors)) = _panes()

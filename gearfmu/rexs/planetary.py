@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
-from gearfmu.geometry.planetary import set_ratio
+from gearfmu.geometry.planetary import MOUNTS, set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -182,12 +182,7 @@ def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, 
         draft.put("ring.rim_diameter", millimetres(found[1]), f"{found[2]}, outer diameter")
     else:
         draft.assume("ring.rim_diameter", millimetres(rounded_up(root + 7 * ring.module, 3)), "a rim of 3.5 m_n")
-    points = [n for n in range(3, 61) if ring.teeth % n == 0]
-    if points:
-        nearest = min(points, key=lambda n: abs(n - 6))
-        draft.assume("ring.mounts.points", nearest, "a divisor of the number of teeth")
-    else:
-        draft.drop("ring.mounts")
+    draft.assume("ring.mounts.points", MOUNTS, "evenly round the rim")
 
 
 def _tip_that_clears(draft: Draft, distance: float) -> float:

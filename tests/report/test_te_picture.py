@@ -19,7 +19,16 @@ TORQUE = np.array([50.0, 200.0])
 
 def made(torque: np.ndarray, te: np.ndarray) -> TeResult:
     alike = np.ones((torque.size, POSITION.size))
-    return TeResult(torque, POSITION, te, alike, alike, np.ones((torque.size, 16, 4)), np.ones((torque.size, 5)))
+    return TeResult(
+        torque,
+        POSITION,
+        te,
+        alike,
+        alike,
+        np.ones((torque.size, 16, 4)),
+        np.ones((torque.size, 5)),
+        ("",) * torque.size,
+    )
 
 
 def test_every_torque_is_named_with_its_peak_to_peak_and_the_unloaded_one_beside(tmp_path: Path) -> None:
@@ -36,7 +45,7 @@ def test_every_torque_is_named_with_its_peak_to_peak_and_the_unloaded_one_beside
 def test_a_set_has_its_load_factor_over_the_torque(tmp_path: Path) -> None:
     te, sharing = np.zeros((2, 16)), np.ones((2, 16, 2, 3))
     sharing[1, 4, 0] = (1.2, 0.9, 0.9)
-    write_set_plot(SetTeResult(TORQUE, POSITION, te, te, sharing, np.ones((2, 16, 2))), tmp_path / "te.svg")
+    write_set_plot(SetTeResult(TORQUE, POSITION, te, te, sharing, np.ones((2, 16, 2)), ("", "")), tmp_path / "te.svg")
     seen = (tmp_path / "te.svg").read_text(encoding="utf-8")
     assert "mesh load factor K_γ" in seen and "planet 3" in seen
 

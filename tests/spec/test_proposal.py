@@ -38,7 +38,7 @@ def test_a_set_is_valid_as_it_is_written(tmp_path: Path) -> None:
     assert (spec.sun.teeth, spec.planet.teeth, spec.ring.teeth, spec.set.planets) == (30, 20, 70, 5)
     geometry = PlanetaryGeometry.of(spec)
     assert geometry.assembles() and geometry.neighbour_clearance > 0
-    assert spec.ring.mounts.points == 5 and len(spec.carrier.coupling) == 6
+    assert spec.ring.mounts.points == 6 and len(spec.carrier.coupling) == 6
     for mesh in (geometry.sun_mesh, geometry.ring_mesh):
         assert mesh.nominal_backlash == pytest.approx(0.0, abs=1e-8)
 

@@ -15,6 +15,7 @@ from gearfmu.fem import solids
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
+from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
@@ -74,7 +75,7 @@ def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int, mounts: int) -> Im
         nodes=nodes,
         elements={kind: np.concatenate([n[block] for n in numbers]) for kind, block in cut.elements.items()},
         sets={BORE: np.unique(np.concatenate([n[bore] for n in numbers]))}
-        | {f"mount{k}": numbers[k * teeth // mounts][bore] for k in range(mounts)},
+        | {f"mount{k}": numbers[space][bore] for k, space in enumerate(mount_spaces(teeth, mounts))},
         labels=np.full(len(nodes), -1),
     )
 

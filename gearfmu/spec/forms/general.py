@@ -243,6 +243,11 @@ class Stage(Spec):
         return ()
 
     @property
+    def load_sharing(self) -> float:
+        """1: every engagement has its own limit."""
+        return 1.0
+
+    @property
     def gears(self) -> tuple[ToothedBody, ...]:
         """Toothed bodies in the order of the file: the kernel's gear numbers."""
         return tuple(body for body in self.bodies.values() if isinstance(body, ToothedBody))

@@ -34,6 +34,11 @@ class StageSpec(Spec):
         """Torque and speed of the pinion that the model is made for."""
         return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
 
+    @property
+    def load_sharing(self) -> float:
+        """1: a single mesh shares no load."""
+        return 1.0
+
     @field_validator("gears", mode="before")
     @classmethod
     def _named(cls, value: Any) -> Any:

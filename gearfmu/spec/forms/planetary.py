@@ -104,7 +104,7 @@ class MountsSpec(Spec):
     """Elastic mounting of the ring: springs between equal patches of its rim and the ground."""
 
     points: Annotated[Count, Whole("mounts")] = Field(
-        description="number of mounts, equally spaced from tooth space 0; a divisor of the number of teeth"
+        description="number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
     )
     stiffness: Annotated[float, Quantity("mount_stiffness")] = Field(
         description="stiffness of one mount, the same in all three directions"
@@ -219,6 +219,11 @@ class PlanetarySpec(Spec):
     def limits(self) -> Limits:
         """Torque and speed of the carrier that the model is made for."""
         return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
+
+    @property
+    def load_sharing(self) -> float:
+        """Torque that every mesh is made for, over its mean at torque_max."""
+        return self.set.load_sharing
 
     @property
     def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:

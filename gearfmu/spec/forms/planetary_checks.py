@@ -237,10 +237,8 @@ def _are_places(positions: Sequence[int], planets: int, teeth: int) -> bool:
 
 def _mounts(spec: PlanetarySpec) -> Found:
     mounts = spec.ring.mounts
-    if mounts is not None and spec.ring.teeth % mounts.points:
-        fitting = [n for n in range(3, 61) if spec.ring.teeth % n == 0]
-        remedy = f"must divide the {spec.ring.teeth} teeth: {', '.join(map(str, fitting))}"
-        yield "ring.mounts.points", str(mounts.points), remedy
+    if mounts is not None and mounts.points > spec.ring.teeth:
+        yield "ring.mounts.points", str(mounts.points), f"at most one a tooth space: up to {spec.ring.teeth}"
 
 
 def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import largest_relative_radius
-from gearfmu.geometry.planetary import RingMesh, least_apart, set_ratio
+from gearfmu.geometry.planetary import MOUNTS, RingMesh, least_apart, set_ratio
 from gearfmu.geometry.shifts import (
     DEDENDUM,
     RING_FILLET,
@@ -137,12 +137,7 @@ def _put_ring(draft: Draft, mesh: RingMesh) -> None:
     draft.assume("ring.rim_diameter", millimetres(rounded_up(2 * ring.r_f + 7 * m, 3)), "a rim of 3.5 m_n")
     draft.assume("ring.dedendum", DEDENDUM, "ISO 53")
     draft.assume("ring.fillet_radius", RING_FILLET, "of a shaping cutter")
-    points = [n for n in range(3, 61) if ring.z % n == 0]
-    if points:
-        nearest = min(points, key=lambda n: abs(n - 6))
-        draft.assume("ring.mounts.points", nearest, "a divisor of the number of teeth")
-    else:
-        draft.drop("ring.mounts")
+    draft.assume("ring.mounts.points", MOUNTS, "evenly round the rim")
 
 
 def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:

@@ -3,7 +3,7 @@ speed_max, and what to say where a run or a position goes beyond."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -23,8 +23,9 @@ def places_of(model: StageModel) -> list[MeshPlace]:
 
 
 def largest_torque(model: StageModel) -> float:
-    """Torque on the input (N·m) that brings no engagement beyond its torque_max."""
-    return min(place.most for place in places_of(model))
+    """Torque on the input (N·m) that brings no engagement beyond its torque_max: of a set the torque_max of its file,
+    as its meshes are made for load_sharing times their share."""
+    return min(place.most for place in places_of(model)) / model.spec.load_sharing
 
 
 def engagements_per_turn(model: StageModel) -> list[float]:
@@ -70,3 +71,19 @@ def limit_named(model: StageModel, torque: float) -> Iterator[None]:
         raise SimulationError(
             f"{model.name}: no static equilibrium under {torque:g} N·m ({beyond})", error.outcome, error.time
         ) from None
+
+
+def each_load(model: StageModel, torques: Sequence[float], solve: Callable[[int, float], None]) -> tuple[str, ...]:
+    """Calls `solve` with the number and the value of every torque (N·m on the input). Returns why a torque has no
+    equilibrium, "" where it has one; SimulationError(no_equilibrium) where none has one."""
+    failed = []
+    for i, torque in enumerate(torques):
+        try:
+            with limit_named(model, torque):
+                solve(i, torque)
+            failed.append("")
+        except SimulationError as error:
+            if error.outcome != "no_equilibrium" or (i + 1 == len(torques) and all(failed)):
+                raise
+            failed.append(str(error))
+    return tuple(failed)

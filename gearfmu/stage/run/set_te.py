@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,30 +20,29 @@ from gearfmu.kernel import Kernel, TeState
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape, toothed
 from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.build.shown import Card, Shown
-from gearfmu.stage.run.limits import limit_named
+from gearfmu.stage.run.limits import each_load
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import (
     LEAST,
     TANGENT,
+    LoadedResult,
     TeResult,
     common_columns,
     error_text,
     loaded_te,
-    mesh_harmonics,
     plot_te,
     statics_of,
-    te_card,
 )
 
 GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
 
 @dataclass(frozen=True, repr=False)
-class SetTeResult(Shown):
+class SetTeResult(LoadedResult):
     """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stage_stiffness (T, P) N/m, tangent
     d(T_s/r_bs)/dte of all meshes with carrier and bearings · sharing (T, P, 2, N): normal force of each planet over the
-    mean of all, at the sun and at the ring · force (T, P, 2) N, that mean."""
+    mean of all, at the sun and at the ring · force (T, P, 2) N, that mean · failed (T,): why a torque has no
+    equilibrium, "" where it has one; its rows are NaN then."""
 
     torque: np.ndarray
     position: np.ndarray
@@ -52,19 +50,18 @@ class SetTeResult(Shown):
     stage_stiffness: np.ndarray
     sharing: np.ndarray
     force: np.ndarray
-
-    @property
-    def card(self) -> Card:
-        """How a session shows it."""
-        return te_card(self)
+    failed: tuple[str, ...]
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """For every torque the error, then K_γ at sun and ring with the mean share of each planet."""
         rows = []
-        for torque, row, stiffness, factor, sharing in zip(
-            self.torque, self.te, self.stage_stiffness, self.load_factor, self.sharing, strict=True
+        for torque, row, stiffness, factor, sharing, why in zip(
+            self.torque, self.te, self.stage_stiffness, self.load_factor, self.sharing, self.failed, strict=True
         ):
+            if why:
+                rows.append((f"{torque:.1f} N·m", why))
+                continue
             mean = f"stage stiffness at the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
             rows.append((f"{torque:.1f} N·m", f"{error_text(row)}, {mean}"))
             for gear, most, shares in zip(GEARS, factor, sharing.mean(axis=0), strict=True):
@@ -75,21 +72,18 @@ class SetTeResult(Shown):
     def plot(self, figure: Any = None) -> np.ndarray:
         """Draw transmission error about its mean and shares of the planets at the largest torque over the mesh period
         with matplotlib; returns the axes. figure : of matplotlib, a new one when None."""
-        most = int(np.argmax(np.abs(self.torque)))
+        found = self.found
+        most = found.sharing[np.argmax(np.abs(found.torque))]
         shares = {
-            f"{gear}: force over the mean": {f"planet {k + 1}": row for k, row in enumerate(self.sharing[most, :, g].T)}
+            f"{gear}: force over the mean": {f"planet {k + 1}": row for k, row in enumerate(most[:, g].T)}
             for g, gear in enumerate(GEARS)
         }
-        return plot_te(self, shares, figure)
+        return plot_te(found, shares, figure)
 
     @property
     def load_factor(self) -> np.ndarray:
         """(T, 2): mesh load factor K_γ (ISO 6336-1) at sun and ring, the largest share at any position."""
         return self.sharing.max(axis=(1, 3))
-
-    def harmonics(self, count: int = 5) -> np.ndarray:
-        """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
-        return mesh_harmonics(self.te, count, int(self.position[-1]) + 1)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table of the result, torques one below the other: torque_Nm, position, te_um, stage_stiffness_N_per_um,
@@ -135,8 +129,9 @@ def set_te(
     of action.
 
     torques: N·m on the input, the first port; 0 is the limit of a vanishing positive torque. progress: called with the
-    part done and the torque. parameters: of the kernel, e.g. slices=10. ModelError where the stage is no planetary set;
-    SimulationError(no_equilibrium) where there is none.
+    part done and the torque. parameters: of the kernel, e.g. slices=10. ModelError where the stage is no planetary set.
+    A torque without equilibrium is named in `failed` with its limit; SimulationError(no_equilibrium) where none has
+    one.
     """
     if not model.stage.carriers:
         raise ModelError(f"{model.name} is no planetary set: its meshes have transmission errors of their own")
@@ -145,20 +140,25 @@ def set_te(
     planets = len(model.stage.engagements) // len(GEARS)
     te, stiffness = np.empty((2, len(torques), position.size))
     force = np.empty((len(torques), position.size, len(GEARS), planets))
-    for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
+
+    def solve(i: int, torque: float) -> None:
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
-        at = -part * place.pitch
-        if progress:
-            progress((i + j / position.size) / len(torques), f"{torque:g} N·m")
-        with limit_named(model, torque):
+        for j, part in enumerate(position):
+            at = -part * place.pitch
+            if progress:
+                progress((i + j / position.size) / len(torques), f"{torque:g} N·m")
             error = _error(model, kernel, at, carried)
             force[i, j] = _forces(kernel, at, carried, planets)
             ends = [_error(model, kernel, at, carried * (1 + sign * TANGENT), keep=True) for sign in (-1, 1)]
-        tangent = 2 * TANGENT * carried / (ends[1] - ends[0])
-        te[i, j] = error + (torque - carried) / tangent
-        stiffness[i, j] = abs(tangent / place.lever) * planets
+            tangent = 2 * TANGENT * carried / (ends[1] - ends[0])
+            te[i, j] = error + (torque - carried) / tangent
+            stiffness[i, j] = abs(tangent / place.lever) * planets
+
+    failed = each_load(model, torques, solve)
+    for values in (te, stiffness, force):
+        values[[bool(why) for why in failed]] = np.nan
     mean = force.mean(axis=3)
-    return SetTeResult(np.asarray(torques, float), position, te, stiffness, force / mean[..., None], mean)
+    return SetTeResult(np.asarray(torques, float), position, te, stiffness, force / mean[..., None], mean, failed)
 
 
 def _error(model: StageModel, kernel: Kernel, at: float, torque: float, keep: bool = False) -> float:

@@ -23,6 +23,7 @@ static const double SEE = 3e-3;        /* m: look this far for flanks */
 static const double AT_REST = 1e-15, EXACT = 1e-11; /* m; of the deepest deflection: a move that is none */
 static const double ENOUGH = 1e-11,
                     ROUNDING = 2e-7; /* the same where single precision of the rows leaves it undecided */
+static const double WANDERS = 8.0;   /* of both: a long search moves to and fro between two roundings of the rows */
 static const double NOTHING = 1e-18; /* J: a move that gains less; ENOUGH on a contact gains 1e-14 */
 enum { REST_ITERATIONS = 100, ORDINARY = 20, BACK = 60, STATIC_SWEEPS = 400 };
 
@@ -142,30 +143,32 @@ static double deepest_of(const gk_equilibrium *r)
     return deepest;
 }
 
-static int close_to_rest(const gk_equilibrium *r, double length)
+static int close_to_rest(const gk_equilibrium *r, double length, int iterations)
 {
-    return length <= ENOUGH + ROUNDING * deepest_of(r) || r->gain < NOTHING;
+    const double enough = ENOUGH + ROUNDING * deepest_of(r);
+    return length <= (iterations < ORDINARY ? enough : WANDERS * enough) || r->gain < NOTHING;
 }
 
 static int search(gk_equilibrium *r)
 {
     const int shared = r->setup.islands < r->model->engagements; /* rotors */
     double length = INFINITY;
+    int i = 0;
     r->trust = TRUST, r->loose = LOOSE;
     gk_motions_balance(r, 0);
     if (!press(r)) return 0;
-    for (int i = 0; i < REST_ITERATIONS; i++) {
+    for (; i < REST_ITERATIONS; i++) {
         gk_motions_balance(r, 1);
         const double last = length;
         length = relax(r);
         if (!gk_finite(length)) return 0;
         if (length <= AT_REST + EXACT * deepest_of(r)) break;
         if (i >= ORDINARY && length > SLOW * last) r->loose = gk_min(10.0 * r->loose, MOST_LOOSE);
-        if (shared && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
+        if (shared && close_to_rest(r, length, i) && length > 0.5 * last) break; /* rounding of the rows is left */
     }
     for (int e = 0; e < r->model->engagements; e++)
         if (gk_equilibrium_has(r, e)) gk_memory_keep(&r->setup, &r->work->engaged[e], r->data, e);
-    return close_to_rest(r, length);
+    return close_to_rest(r, length, i);
 }
 
 /* κ = −1/ω² puts the dynamic modes of the gear groups into C′ too */

@@ -46,7 +46,7 @@ static double te_of(const gk_model *model, const gk_setup *setup, int e, const d
  * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of the ports,
  * angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for every
  * tooth pair of e {flank, tooth of gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers.
- * `keep` continues from the last call. */
+ * `keep` continues from the last call; where that leads nowhere, the search begins anew. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                  double torque, int e, int keep, double *out, int *places)
 {
@@ -55,7 +55,9 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     double angle[MAX_ROTORS];
     if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
     for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
-    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, keep ? STATIC_BARE | STATIC_KEEP : STATIC_BARE);
+    gk_outcome outcome = GK_NO_EQUILIBRIUM;
+    if (keep) outcome = gk_static_solve(model, setup, work, data, b, STATIC_BARE | STATIC_KEEP);
+    if (outcome == GK_NO_EQUILIBRIUM) outcome = gk_static_solve(model, setup, work, data, b, STATIC_BARE);
     if (outcome) return outcome;
     for (int r = 0; r < model->rotors; r++) angle[r] = GK_OF(data, x)[r];
     angle[model->port[0].rotor] = driven_angle(model, work, 0);
