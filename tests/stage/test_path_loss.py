@@ -20,7 +20,9 @@ MU, STEP, SETTLES, PITCHES, POSITIONS = 0.01, 2e-5, 5e-3, 2, 64
 
 
 def by_the_path(model: StageModel, engagement: str, torque: float, speed: float) -> float:
-    """µ Σ λ |v| over all slices of all tooth pairs, mean over a pitch, W: v by the speeds of gears that roll evenly."""
+    """µ Σ λ |v| over all slices of all tooth pairs, mean over a pitch, W: v by the speeds of gears that roll evenly.
+    The gears have their backlash by thinner teeth, each by half of what is beyond the backlash of its own numbers:
+    where coast flanks touch, the length of roll is shorter by that much."""
     stage = model.stage
     number, mesh = next((i, m) for i, m in enumerate(stage.engagements) if m.name == engagement)
     shape, meshing, kernel = mesh_shape(stage, mesh), meshings(stage)[engagement], statics_of(model)
@@ -30,12 +32,13 @@ def by_the_path(model: StageModel, engagement: str, torque: float, speed: float)
     place += wound_up(model, mesh.gears[0], meshing.carrier, torque)
     slices, width = int(kernel.get("slices")), min(stage.bodies[name].face_width for name in mesh.gears)
     lean = math.tan(a.beta_b) * width * ((np.arange(slices) + 0.5) / slices - 0.5)
+    thinned = 0.5 * (mesh.backlash - shape.nominal_backlash) * math.cos(shape.alpha_wt)
     pitch, total = 2 * math.pi / a.z, 0.0
     for turned in pitch * np.arange(POSITIONS) / POSITIONS:
         state = kernel.transmission(turned / rolls, torque, number)
         for (flank, tooth), loads in state.forces.items():
             sense = -1 if flank else 1
-            roll = a.r_b * (sense * (turned + place + tooth * pitch) + a.psi_b + shape.alpha_wt) + sense * lean
+            roll = a.r_b * (sense * (turned + place + tooth * pitch) + a.psi_b + shape.alpha_wt) + sense * lean - (flank and thinned)
             total += np.array(loads) @ np.abs(roll - shape.path["C"])
     ratio = a.r_b / b.r_b * (-1 if isinstance(shape, RingMesh) else 1)
     return MU * total / POSITIONS * (1 + ratio) * abs(rate) * speed
@@ -78,11 +81,10 @@ def in_motion(model: StageModel, engagements: tuple[str, ...], torque: float, sp
 def test_elastic_gears_lose_the_integral_over_the_path(
     name: str, torque: float, speed: float, engagements: tuple[str, ...]
 ) -> None:
-    """Within 0.5 %, the second mesh of the train within 1 % (0.9 at every level, speed and coefficient). A coefficient
-    so small that what friction takes hardly changes the load of the next mesh, and that the planets hardly swing when
+    """Within 0.5 %. The second mesh of the train carries on coast flanks. A coefficient so small that what friction takes hardly changes the load of the next mesh, and that the planets hardly swing when
     it changes sides."""
     model = gf.assemble(name)
     for mesh, power in zip(engagements, in_motion(model, engagements, torque, speed), strict=True):
         path = by_the_path(model, mesh, torque, speed)
         print(f"{name} {mesh}: {power:.4f} W, by the path {path:.4f} W ({power / path - 1:+.2%})")
-        assert power == pytest.approx(path, rel=0.01 if mesh == "stage2" else 0.005)
+        assert power == pytest.approx(path, rel=0.005)
