@@ -38,7 +38,8 @@ def by_the_path(model: StageModel, engagement: str, torque: float, speed: float)
         state = kernel.transmission(turned / rolls, torque, number)
         for (flank, tooth), loads in state.forces.items():
             sense = -1 if flank else 1
-            roll = a.r_b * (sense * (turned + place + tooth * pitch) + a.psi_b + shape.alpha_wt) + sense * lean - (flank and thinned)
+            roll = a.r_b * (sense * (turned + place + tooth * pitch) + a.psi_b + shape.alpha_wt) + sense * lean
+            roll -= thinned if flank else 0.0
             total += np.array(loads) @ np.abs(roll - shape.path["C"])
     ratio = a.r_b / b.r_b * (-1 if isinstance(shape, RingMesh) else 1)
     return MU * total / POSITIONS * (1 + ratio) * abs(rate) * speed
@@ -81,8 +82,8 @@ def in_motion(model: StageModel, engagements: tuple[str, ...], torque: float, sp
 def test_elastic_gears_lose_the_integral_over_the_path(
     name: str, torque: float, speed: float, engagements: tuple[str, ...]
 ) -> None:
-    """Within 0.5 %. The second mesh of the train carries on coast flanks. A coefficient so small that what friction takes hardly changes the load of the next mesh, and that the planets hardly swing when
-    it changes sides."""
+    """Within 0.5 %; the second mesh of the train carries on coast flanks. The coefficient is so small that friction
+    hardly changes the load of the next mesh, and that planets hardly swing where it changes sides."""
     model = gf.assemble(name)
     for mesh, power in zip(engagements, in_motion(model, engagements, torque, speed), strict=True):
         path = by_the_path(model, mesh, torque, speed)
