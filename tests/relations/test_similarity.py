@@ -13,6 +13,7 @@ default step is one of a ladder in microseconds.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -146,7 +147,12 @@ def misfits(kind: Kind, parameters: Parameters) -> dict[str, float]:
 
 
 def _with_family(name: str) -> str:
-    return name.replace("energy.", "energy_") + ".joule" if name.startswith("energy") else name
+    """The three directions of forces, moments and displacements are one family, all energies are another."""
+    place, _, last = name.rpartition(".")
+    axis = re.fullmatch(r"([fmr]?)[xyz](_mean)?", last)
+    if place == "energy":
+        return f"{last}.joule"
+    return f"{place}_{last}.{axis[1] or 'd'}{axis[2] or ''}" if axis else name
 
 
 def holds(kind: Kind, parameters: Parameters, within: float) -> None:
