@@ -6,6 +6,7 @@ numbers. Assembled models and reduced bodies are made once a process.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -23,7 +24,8 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.simulate import Inputs, simulate
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).parents[2]
@@ -133,6 +135,16 @@ def _drawn(file: str, seed: int) -> Stage:
     )
 
 
+@cache
+def loaded(kind: Kind) -> Inputs:
+    """Inputs as of `Steady`, wound up for one position not for the mean over a pitch: a load at a sixteenth of the
+    cost."""
+    steady = Steady(kind.model().driven_by_springs(), kind.speed, kind.torque)
+    winding = statics_of(steady.model).transmission(0.0, kind.torque).phi
+    steady.__dict__["winding"] = float(winding)
+    return steady
+
+
 def assembled(stage: Stage, bodies: Mapping[str, Any]) -> StageModel:
     """The model of a stage whose bodies are found by name, in whatever order the stage has them."""
     return assemble(stage, [bodies[name] for name in body_names(stage)])
@@ -150,17 +162,22 @@ def channels(trace: Trace) -> dict[str, np.ndarray]:
 
 
 def differences(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Largest difference of every channel over the largest value of its family (what follows the last dot) in either:
+    """Largest difference of every channel over the largest value of its family (`family`) in either:
     a bearing without load is judged by the bearings that carry."""
     assert one.keys() == other.keys(), one.keys() ^ other.keys()
     size: dict[str, float] = {}
     for name, values in (*one.items(), *other.items()):
-        family = name.rpartition(".")[2]
-        size[family] = max(size.get(family, 0.0), float(np.abs(values).max()))
+        size[family(name)] = max(size.get(family(name), 0.0), float(np.abs(values).max()))
     return {
-        name: float(np.abs(values - other[name]).max()) / (size[name.rpartition(".")[2]] or 1.0)
-        for name, values in one.items()
+        name: float(np.abs(values - other[name]).max()) / (size[family(name)] or 1.0) for name, values in one.items()
     }
+
+
+def family(name: str) -> str:
+    """What a channel is, whosever it is: forces of supports in all directions are one family, and so are moments,
+    displacements, tilts and slices."""
+    last = name.rpartition(".")[2]
+    return re.sub(r"(?<=^[fmr])[xyz]|^[xyz]$|_\d+$", "", last)
 
 
 @cache

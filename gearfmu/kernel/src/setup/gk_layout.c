@@ -2,43 +2,13 @@
 #include "problem/gk_work.h"
 #include "setup/gk_tables.h"
 
-static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_engagement *b)
-{
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++)
-            if (model->gear[a->gear[i]].rotor == model->gear[b->gear[j]].rotor) return 1;
-    return gk_frame_of(model, a) >= 0 && gk_frame_of(model, a) == gk_frame_of(model, b);
-}
-
-/* Engagements that share a rotor belong to one island */
-static void find_islands(const gk_model *model, gk_setup *setup)
-{
-    for (int e = 0; e < model->engagements; e++) setup->mesh[e].island = -1;
-    setup->islands = 0;
-    for (int root = 0; root < model->engagements; root++) {
-        if (setup->mesh[root].island >= 0) continue;
-        setup->mesh[root].island = setup->islands;
-        for (int changed = 1; changed;) {
-            changed = 0;
-            for (int a = 0; a < model->engagements; a++)
-                for (int b = 0; b < model->engagements; b++) {
-                    if (setup->mesh[a].island != setup->islands || setup->mesh[b].island >= 0) continue;
-                    if (!share_rotor(model, &model->engagement[a], &model->engagement[b])) continue;
-                    setup->mesh[b].island = setup->islands;
-                    changed = 1;
-                }
-        }
-        setup->islands++;
-    }
-}
-
 /* ---- the plan ---------------------------------------------------------------------------------------------------- */
 /* what sizes depend on once level and effects are chosen: islands, engagements of a gear, candidates of a side */
 void gk_layout_plan(const gk_model *model, gk_setup *setup)
 {
     GK_ASSERT(model->engagements >= 0 && model->engagements <= MAX_ENGAGEMENTS);
     GK_ASSERT(setup->strips >= 1 && setup->strips <= MAX_SLICES);
-    find_islands(model, setup);
+    gk_islands_find(model, setup);
     for (int g = 0; g < model->gears; g++) setup->engagements_of[g] = 0;
     for (int e = 0; e < model->engagements; e++) {
         setup->mesh[e].index = e;
