@@ -81,7 +81,8 @@ def check_turned(kind: Kind, angles: tuple[float, ...]) -> None:
     for angle in (whole(stage, angle) for angle in angles):
         other = turned(stage, angle)
         start, behind = start_of(other, {name: place + angle for name, place in places.items()})
-        found = run(kind, kind.model(lambda _, moved=renamed(other, behind): moved), steady, start)
+        other = renamed(other, behind)
+        found = run(kind, kind.model(lambda _, moved=other: moved), steady, start)
         found = each_vector(found, lambda _, x, y, angle=angle: turned_vector((x, y), -angle))
         apart = differences(expected, found)
         worst = max(apart, key=apart.__getitem__)
