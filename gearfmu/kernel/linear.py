@@ -24,10 +24,11 @@ ARRAYS = {  # in the order of gk_linear: type, shape by the names of the counts
     "support_compliance": (np.float64, "supports"),
     "support_rows": (np.float64, "supports coordinates"),
     "support_forces": (np.float64, "supports room"),
-    "damper": (np.float64, "dampers"),
-    "damper_rows": (np.float64, "dampers coordinates"),
+    "support_damping": (np.float64, "supports coordinates"),
+    "damper": (np.float64, "supports"),
+    "damper_rows": (np.float64, "supports coordinates"),
 }
-COUNTS = ("coordinates", "room", "supports", "dampers", "engagements", "found")
+COUNTS = ("coordinates", "room", "supports", "engagements", "found")
 SPIN, GROUND, FIRST_GEAR = -1, 0, 1  # values of `group`
 
 
@@ -46,8 +47,9 @@ class LinearModel:
     Of m rows at work, closed contacts and springs of ports: label (m, 4) engagement, flank, tooth of gear A, strip, or
     −1, port, joint, 0; force (m,) N or N·m at rest; dashpot (m,) N·s/m; te (m,) derivative of the gap by the
     transmission error; rows W (m, n); residual Q and own S (m, m) m/N, S parallel to the dashpots.
-    Of s supports: force = support_rows (s, n) q + support_forces (s, m) λ, support_compliance (s,) m/N of their own
-    springs; of d dampers on them: damper (d,) N·s/m, damper_rows (d, n) of elongation. engagements: of the stage.
+    Of s supports: force = support_rows (s, n) q + support_forces (s, m) λ + support_damping (s, n) q̇;
+    support_compliance (s,) m/N of their own springs, damper (s,) N·s/m across them, damper_rows (s, n) of their
+    elongation. engagements: of the stage.
     """
 
     group: np.ndarray
@@ -65,6 +67,7 @@ class LinearModel:
     support_compliance: np.ndarray
     support_rows: np.ndarray
     support_forces: np.ndarray
+    support_damping: np.ndarray
     damper: np.ndarray
     damper_rows: np.ndarray
     engagements: int

@@ -63,7 +63,7 @@ def flat_blob(name: str, bodies: Sequence[FlatBody], contact: FlatContact) -> by
     x_right − x_left − outward displacements, in every slice. What spins elsewhere moves along x here."""
     functions = len(contact.degrees)
     sections: dict = {
-        "counts": np.array([MODEL_VERSION, contact.slices, 2, 2, 1, 2, 0, 0, functions, GRID, 1], np.int32),
+        "counts": np.array([MODEL_VERSION, contact.slices, 2, 2, 1, 2, 0, functions, GRID, 1], np.int32),
         "name": name,
         "rotor_names": "left|right",
         "engagement_names": "mesh",

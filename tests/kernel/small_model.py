@@ -58,7 +58,7 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     groups = _groups([free_gear(body, every, np.arange(2), np.eye(ROLLS), cuts) for body in bodies])
     layout, last = groups[0].layout, (2e4, 5.0, 0.05, 2e-3, 8e3, 0.5)
     sections = {
-        "counts": np.array([MODEL_VERSION, 3, 2, 2, 1, 2, 4, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
+        "counts": np.array([MODEL_VERSION, 3, 2, 2, 1, 2, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
         "name": "small_pair",
         "rotor_names": "|".join(NAMES),
         "engagement_names": "mesh",

@@ -48,7 +48,7 @@ CASES: dict[str, list[Change]] = {
     "GEARS": [at("counts", 3)],
     "ENGAGEMENTS": [at("counts", 4)],
     "PORTS": [at("counts", 5)],
-    "SUPPORTS": [at("counts", 6), at("counts", 7)],
+    "SUPPORTS": [at("counts", 6)],
     "TEETH": [at("size0", 1)],
     "NODES": [at("nodes0", 0), at("nodes1", 1)],
     "BASE_RADIUS": [at("gear0", 0)],

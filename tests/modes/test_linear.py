@@ -73,7 +73,7 @@ def by_hand(**values: Any) -> Linearised:
     empty = np.zeros((0, 1))
     one = {"group": [0], "number": [0], "mass": [1.0], "omega": [0.0], "zeta": [0.0], "label": [[0, 0, 0, 0]],
            "force": [1.0], "dashpot": [0.0], "te": [-1.0], "rows": [[1.0]], "residual": [[0.0]], "own": [[1.0]],
-           "support_rows": empty, "support_forces": empty, "damper_rows": empty}  # fmt: skip
+           "support_rows": empty, "support_forces": empty, "support_damping": empty, "damper_rows": empty}  # fmt: skip
     arrays = {name: np.asarray(value) for name, value in (none | one | values).items()}
     return Linearised(LinearModel(**arrays | {"engagements": 1}))
 

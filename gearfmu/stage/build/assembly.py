@@ -39,7 +39,7 @@ from gearfmu.stage.build.tables import ROLLS, stored_points
 from gearfmu.stage.build.teeth import gear_section, mismatches
 from gearfmu.stage.build.whirls import whirl_rows
 
-MODEL_VERSION = 4
+MODEL_VERSION = 5
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
@@ -84,7 +84,7 @@ def general_sections(
     sections |= {
         "counts": np.array(
             [MODEL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
-             len(stage.ports), len(layout.support_names()), groups[0].damper.size, degrees.size, rolls, len(groups)],
+             len(stage.ports), len(layout.support_names()), degrees.size, rolls, len(groups)],
             np.int32,
         ),
         "support_names": "|".join(layout.support_names()),

@@ -21,7 +21,6 @@ COUNTS = (
     "engagements",
     "ports",
     "supports",
-    "dampers",
     "functions",
     "rolls",
     "sets",

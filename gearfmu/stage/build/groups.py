@@ -143,7 +143,7 @@ class Layout:
 class Group:
     """The oscillators of a layout. omega, zeta (n,); shapes (raw, n) of the unknowns of all bodies; rigid_share (n,) of
     the kinetic energy in rigid motion; kappa (s, s) N/m …; support_rows (s, n); support_compliance (s, s) m/N …, K_s⁻¹;
-    damper_rows (d, n), damper (d,); at (bodies): slice of a body's unknowns, first the rigid ones; owner (n,): family
+    damper_rows (s, n), damper (s,); at (bodies): slice of a body's unknowns, first the rigid ones; owner (n,): family
     of bodies, those that supports and spins connect, of an oscillator."""
 
     layout: Layout
@@ -217,8 +217,6 @@ def mount(layout: Layout) -> Group:
     omega = np.sqrt(squared)
     loss = (omega_zeta[0] * omega_zeta[1]) @ shapes**2
     support_rows = _times(rows, shapes)
-    damping = np.concatenate([s.damping for s in layout.supports])
-    damped = damping > 0
     return Group(
         layout=layout,
         omega=omega,
@@ -228,8 +226,8 @@ def mount(layout: Layout) -> Group:
         kappa=kappa,
         support_rows=support_rows,
         support_compliance=own,
-        damper_rows=_times(own @ kappa, support_rows)[damped],
-        damper=damping[damped],
+        damper_rows=_times(own @ kappa, support_rows),
+        damper=np.concatenate([s.damping for s in layout.supports]),
         at=at,
         owner=owner,
     )

@@ -16,7 +16,7 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
 {
     const int n = setup->base.n;
     double taken = 0.0;
-    for (int d = 0; d < model->dampers; d++) {
+    for (int d = 0; d < model->supports; d++) {
         const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
         const gk_span span = setup->base.damper_span[d];
         const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_span(span, e, v) : 0.0;

@@ -207,9 +207,10 @@ static void ground_round(const gk_model *model, const gk_setup *setup, gk_work *
         of->up_damped += of_mode * u[j] * u[j];
         of->down += u[j] * u[j];
     }
-    for (int d = 0; d < model->dampers && n; d++) {
-        const double *e = base->damper_rows + d * n, speed = gk_dot_quads(e, u, n / 4);
+    for (int d = 0; d < model->supports && n; d++) {
         const double c = model->ground[base->set].damper[d];
+        if (c == 0.0) continue;
+        const double *e = base->damper_rows + d * n, speed = gk_dot_quads(e, u, n / 4);
         of->up_damped += c * speed * speed;
         for (int j = 0; j < n; j++) a[j] += h * c * speed * e[j];
     }

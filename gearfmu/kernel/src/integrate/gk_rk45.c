@@ -115,9 +115,9 @@ static void ground_rates(const gk_model *model, const gk_setup *setup, gk_work *
         v[j] = speed[j];
         a[j] = work->ground_force[j] - damping * speed[j] - base->omega2[j] * x[j];
     }
-    for (int d = 0; d < model->dampers; d++) {
-        const double *e = base->damper_rows + d * n;
-        const double force = model->ground[base->set].damper[d] * (n ? gk_dot_quads(e, speed, n / 4) : 0.0);
+    for (int d = 0; d < model->supports; d++) {
+        const double *e = base->damper_rows + d * n, c = model->ground[base->set].damper[d];
+        const double force = n && c > 0.0 ? c * gk_dot_quads(e, speed, n / 4) : 0.0;
         for (int j = 0; j < n; j++) a[j] -= force * e[j];
     }
     gk_frame_rates(model, setup, work->speed, speed, a);

@@ -13,7 +13,7 @@ enum {
 /* what a word in the dimensions of a field means; 0 until it is known */
 /* clang-format off */
 #define GK_SYMBOLS(S)                                                                                                  \
-    S(rotors) S(gears) S(engagements) S(ports) S(supports) S(dampers) S(functions) S(rolls) S(z) S(modes) S(reads)     \
+    S(rotors) S(gears) S(engagements) S(ports) S(supports) S(functions) S(rolls) S(z) S(modes) S(reads)     \
     S(ground) S(carried) S(whirls) S(own) S(starts) S(flank_teeth) S(flank_places) S(flank_rolls)                      \
     S(points) /* of a flank where rows are stored */                                                                   \
     S(low)    /* modes of nodal diameter 0 and 1 */                                                                    \

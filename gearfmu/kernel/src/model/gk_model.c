@@ -6,7 +6,7 @@
 #include "model/gk_read.h"
 #include "model/gk_vars.h"
 
-enum { MODEL_VERSION = 4, MOST_NAME = 64 };
+enum { MODEL_VERSION = 5, MOST_NAME = 64 };
 
 static void read_counts(gk_reader *r, gk_model *m)
 {
@@ -19,17 +19,16 @@ static void read_counts(gk_reader *r, gk_model *m)
     WITHIN(r, c[4], ENGAGEMENTS, "number of engagements");
     WITHIN(r, c[5], PORTS, "number of ports");
     WITHIN(r, c[6], SUPPORTS, "number of supported directions");
-    WITHIN(r, c[7], SUPPORTS, "number of dampers");
     gk_read_demand(r,
-                   gk_read_counted(c + 8, 1, MAX_FUNCTIONS) && gk_read_counted(c + 9, 4, 1000) &&
-                       gk_read_counted(c + 10, 1, SETS),
+                   gk_read_counted(c + 7, 1, MAX_FUNCTIONS) && gk_read_counted(c + 8, 4, 1000) &&
+                       gk_read_counted(c + 9, 1, SETS),
                    "counts");
     if (r->outcome) return;
     m->slices = c[1], m->rotors = c[2], m->gears = c[3], m->engagements = c[4], m->ports = c[5], m->supports = c[6];
-    m->dampers = c[7], m->functions = c[8], m->rolls = c[9], m->sets = c[10];
-    static const gk_symbol counts[] = {SYMBOL_rotors,   SYMBOL_gears,   SYMBOL_engagements, SYMBOL_ports,
-                                       SYMBOL_supports, SYMBOL_dampers, SYMBOL_functions,   SYMBOL_rolls};
-    for (int i = 0; i < 8; i++) r->shape.size[counts[i]] = (uint64_t)c[2 + i];
+    m->functions = c[7], m->rolls = c[8], m->sets = c[9];
+    static const gk_symbol counts[] = {SYMBOL_rotors,   SYMBOL_gears,     SYMBOL_engagements, SYMBOL_ports,
+                                       SYMBOL_supports, SYMBOL_functions, SYMBOL_rolls};
+    for (int i = 0; i < 7; i++) r->shape.size[counts[i]] = (uint64_t)c[2 + i];
 }
 
 /* the names in a text, separated by bars, into rows of NAME_LENGTH */
@@ -197,7 +196,7 @@ static void read_ground(gk_reader *r, gk_model *m, int set)
         WITHIN(r, g->zeta[k], DAMPING_RATIO, "damping ratio of a ground oscillator");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) gk_read_refuse(r, "ground oscillators", "are not sorted");
     }
-    for (int k = 0; k < m->dampers && !r->outcome; k++)
+    for (int k = 0; k < m->supports && !r->outcome; k++)
         gk_read_demand(r, gk_read_between(g->damper[k], 0, 1e12), "dashpots of the supports");
 }
 

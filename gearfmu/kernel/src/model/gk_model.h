@@ -124,7 +124,7 @@ struct gk_model {
     int starts; /* parameters whose start is not the table's */
     const int32_t *start_reference;
     const double *start_value;
-    int slices, rotors, gears, engagements, ports, supports, dampers, functions, rolls, sets, chains;
+    int slices, rotors, gears, engagements, ports, supports, functions, rolls, sets, chains;
     int amplitudes; /* of observed gears, together */
     char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],
         displacement_name[MAX_SUPPORTS][NAME_LENGTH];

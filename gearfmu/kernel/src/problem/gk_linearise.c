@@ -200,8 +200,11 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
     int at[MAX_SPINS];
     const int spins = number_spins(model, setup, at), n = out->coordinates;
     for (int s = 0; s < model->supports; s++) {
-        out->support_compliance[s] = ground->support_compliance[s];
-        place_ground(setup, base->support_rows + s * base->n, spins, n, out->support_rows + (size_t)s * (size_t)n);
+        const size_t row = (size_t)s * (size_t)n;
+        out->support_compliance[s] = ground->support_compliance[s], out->damper[s] = ground->damper[s];
+        place_ground(setup, base->support_rows + s * base->n, spins, n, out->support_rows + row);
+        place_ground(setup, base->support_damping + s * base->n, spins, n, out->support_damping + row);
+        place_ground(setup, base->damper_rows + s * base->n, spins, n, out->damper_rows + row);
         for (int r = 0; r < out->rows; r++) {
             const gk_engaged *engaged = &work->engaged[rows[r].engagement];
             const gk_system *system = &engaged->system;
@@ -214,10 +217,6 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
             out->support_forces[(size_t)s * (size_t)out->room + (size_t)r] = force;
         }
     }
-    for (int d = 0; d < model->dampers; d++) {
-        out->damper[d] = ground->damper[d];
-        place_ground(setup, base->damper_rows + d * base->n, spins, n, out->damper_rows + (size_t)d * (size_t)n);
-    }
 }
 
 /* ---- all of it --------------------------------------------------------------------------------------------------- */
@@ -229,7 +228,6 @@ gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_li
     out->coordinates = number_spins(model, setup, at) + oscillators(model, setup);
     out->room = model->engagements * MAX_PAIRS * setup->strips + JOINTS * model->ports;
     out->supports = model->supports;
-    out->dampers = model->dampers;
     out->engagements = model->engagements;
     out->rows = 0;
     return GK_OK;

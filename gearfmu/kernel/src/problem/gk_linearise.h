@@ -9,9 +9,9 @@
 #define GK_LINEARISE_H
 #include "gk.h"
 
-typedef struct gk_linear {                                     /* arrays are the caller's, row by row */
-    int32_t coordinates, room, supports, dampers, engagements; /* gk_linearise_room; room: for rows */
-    int32_t rows;                                              /* found, ≤ room */
+typedef struct gk_linear {                            /* arrays are the caller's, row by row */
+    int32_t coordinates, room, supports, engagements; /* gk_linearise_room; room: for rows */
+    int32_t rows;                                     /* found, ≤ room */
     /* coordinates */
     int32_t *group,
         *number; /* −1: spin of rotor, or of a chain's inertia; 0: ground oscillator; 1 + g: mode of gear g */
@@ -22,13 +22,15 @@ typedef struct gk_linear {                                     /* arrays are the
     double *force, *dashpot, *te; /* λ; damper's constant; derivative of a gap by the transmission error of its pair */
     double *W;                    /* (room, coordinates) */
     double *Q, *S;                /* (room, room) */
-    /* supports: force = support_rows q + support_forces λ, elongation of the own spring = compliance · force */
+    /* supports: force = support_rows q + support_forces λ + support_damping q̇; of the springs alone, without the last:
+     * elongation = compliance · force */
     double *support_compliance, *support_rows,
         *support_forces;          /* (supports), (supports, coordinates), (supports, room) */
-    double *damper, *damper_rows; /* (dampers), (dampers, coordinates) of elongation */
+    double *support_damping;      /* (supports, coordinates) N·s/m */
+    double *damper, *damper_rows; /* (supports), 0: none; (supports, coordinates) of elongation */
 } gk_linear;
 
-/* how much there is at most, into the first four numbers; after gk_prepare */
+/* how much there is at most, into the numbers before `rows`; after gk_prepare */
 GK_API gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_linear *out);
 /* Fills all the rest at the equilibrium that gk_te or gk_initialize left in `data`. GK_BAD_CALL when data has moved on
  * since then. */

@@ -76,11 +76,15 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
     }
 }
 
-static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
+static void support_outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
+    double force[MAX_SUPPORTS], of_spring[MAX_SUPPORTS];
+    gk_supports_forces(model, setup, work, data, force, of_spring);
+    gk_supports_turn(model, data, 1.0, force);
+    gk_supports_turn(model, data, 1.0, of_spring);
     for (int s = 0; s < model->supports; s++) {
         GK_OF(data, support)[s][V_FORCE] = force[s];
-        GK_OF(data, support)[s][V_MOVED] = force[s] * model->ground[setup->base.set].support_compliance[s];
+        GK_OF(data, support)[s][V_MOVED] = of_spring[s] * model->ground[setup->base.set].support_compliance[s];
     }
 }
 
@@ -129,7 +133,7 @@ static double transmission_error(const gk_model *model, const gk_data *data, int
 
 static void outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
 {
-    double *v = data->stage, force[MAX_SUPPORTS];
+    double *v = data->stage;
     int dynamic = setup->base.count;
     for (int r = 0; r < model->rotors; r++)
         GK_OF(data, rotor)[r][V_GEAR_W] = GK_OF(data, v)[r], GK_OF(data, rotor)[r][V_GEAR_PHI] = GK_OF(data, x)[r];
@@ -139,9 +143,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
         joint_outputs(model, setup, work, data, &work->engaged[e].system);
     }
     for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
-    gk_supports_forces(model, setup, work, data, force);
-    gk_supports_turn(model, data, 1.0, force);
-    support_outputs(model, setup, data, force);
+    support_outputs(model, setup, work, data);
     for (int e = 0; e < model->engagements; e++) GK_OF(data, mesh)[e][V_TE] = transmission_error(model, data, e);
     gk_amplitudes(model, setup, work, data);
     for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;

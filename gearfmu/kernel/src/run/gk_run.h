@@ -35,7 +35,7 @@ GK_HOT void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, 
 GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work,
                                    const gk_data *data, double *out);
 GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                               double *out);
+                               double *out, double *of_spring);
 GK_HOT void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
 /* gk_tally.c */
 GK_HOT void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,

@@ -3,7 +3,7 @@
 #include "run/gk_run.h"
 #include "problem/gk_rows.h"
 
-/* what moves the springs of the supports, and what their dashpots see, of the dynamic oscillators */
+/* displacement that loads the springs of the supports, and speed that their dashpots see, of the dynamic oscillators */
 void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed)
 {
     GK_ASSERT(moved && speed && moved != speed);
@@ -20,13 +20,11 @@ void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_dat
 void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
                            double *out)
 {
-    GK_ASSERT(out && model->dampers <= model->supports);
+    GK_ASSERT(out && moved != speed);
     const gk_base *base = &setup->base;
     for (int s = 0; s < model->supports; s++) {
-        out[s] = gk_dot_span(base->support_span[s], base->support_rows + s * base->n, moved);
-        if (s < model->dampers)
-            out[s] += model->ground[base->set].damper[s] *
-                      gk_dot_span(base->damper_span[s], base->damper_rows + s * base->n, speed);
+        out[s] = gk_dot_span(base->support_span[s], base->support_rows + s * base->n, moved) +
+                 gk_dot_span(base->support_damping_span[s], base->support_damping + s * base->n, speed);
     }
 }
 
@@ -87,15 +85,19 @@ void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const 
             out[i] += GK_OF(data, v)[r] * GK_OF(data, v)[r] * setup->base.outward_support[r * model->supports + i];
 }
 
-/* forces on the supports at the end of the step */
+/* forces on the supports at the end of the step; of_spring: without those of their own dashpots */
 void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                        double *out)
+                        double *out, double *of_spring)
 {
-    GK_ASSERT(out);
-    double *const moved = work->tally + 4 * setup->base.n, *const speed = moved + setup->base.n;
+    GK_ASSERT(out && of_spring && out != of_spring);
+    const gk_base *base = &setup->base;
+    double *const moved = work->tally + 4 * base->n, *const speed = moved + base->n;
     gk_supports_motion(setup, work, data, moved, speed);
     gk_supports_by_motion(model, setup, moved, speed, out);
     gk_supports_add_direct(model, setup, work, data, out);
+    for (int s = 0; s < model->supports; s++)
+        of_spring[s] = out[s] - model->ground[base->set].damper[s] *
+                                    gk_dot_span(base->damper_span[s], base->damper_rows + s * base->n, speed);
 }
 
 /* forces on the ground that are kept in the axes of a carrier, turned into those of the ground (sense 1), or back

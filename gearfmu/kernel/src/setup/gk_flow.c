@@ -172,7 +172,7 @@ static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coeffi
 {
     const gk_base *base = &setup->base;
     gk_ground_flow *f = &k->ground;
-    for (int d = 0; d < model->dampers; d++) {
+    for (int d = 0; d < model->supports; d++) {
         const double *e = base->damper_rows + d * base->n;
         double mass = 0.0;
         for (int i = 0; i < base->n; i++)

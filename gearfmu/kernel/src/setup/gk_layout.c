@@ -117,8 +117,9 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->omega = doubles(b, n);
     base->zeta = doubles(b, n);
     base->omega2 = doubles(b, n);
-    base->damper_rows = doubles(b, n * (size_t)model->dampers);
+    base->damper_rows = doubles(b, n * (size_t)model->supports);
     base->support_rows = doubles(b, n * (size_t)model->supports);
+    base->support_damping = doubles(b, n * (size_t)model->supports);
     base->port_rows = doubles(b, n * (size_t)model->ports);
     base->carried_rows = doubles(b, 2 * n * (size_t)model->carried);
     const size_t pairs = (size_t)(model->carried + model->whirls);
@@ -217,7 +218,7 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     gk_ground_flow *f = &k->ground;
     double **array[] = FLOW_ARRAYS(f);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
-    f->pulls = doubles(b, (size_t)model->dampers * (size_t)setup->base.n);
+    f->pulls = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
     f->turns = doubles(b, turning);
     f->turned = doubles(b, turning);

@@ -129,6 +129,29 @@ static void fill_carried(const gk_model *model, gk_base *base)
         }
 }
 
+/* Forces on the supports: κ times the displacement, and κ K_s⁻¹ times the force of a dashpot, which what yields in
+ * series with its spring passes on to all of them. */
+static void fill_supports(const gk_model *model, gk_base *base)
+{
+    const gk_ground *ground = &model->ground[base->set];
+    const int supports = model->supports, n = base->n;
+    select_rows(base, ground->damper_rows, supports, ground->n, base->damper_rows);
+    for (int s = 0; s < supports; s++) {
+        double *const moved = base->support_rows + s * n, *const damped = base->support_damping + s * n;
+        for (int k = 0; k < n; k++) {
+            moved[k] = damped[k] = 0.0;
+            for (int t = 0; t < supports && base->which[k] >= 0; t++) {
+                const double kappa = ground->kappa[s * supports + t];
+                moved[k] += kappa * ground->support_rows[t * ground->n + base->which[k]];
+                damped[k] += kappa * ground->support_compliance[t] * ground->damper[t] * base->damper_rows[t * n + k];
+            }
+        }
+        base->support_span[s] = span_of(moved, n);
+        base->support_damping_span[s] = span_of(damped, n);
+        base->damper_span[s] = span_of(base->damper_rows + s * n, n);
+    }
+}
+
 static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
 {
     gk_base *base = &setup->base;
@@ -141,20 +164,10 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     select_rows(base, ground->omega, 1, ground->n, base->omega);
     select_rows(base, ground->zeta, 1, ground->n, base->zeta);
     for (int i = 0; i < base->n; i++) base->omega2[i] = base->omega[i] * base->omega[i];
-    select_rows(base, ground->damper_rows, model->dampers, ground->n, base->damper_rows);
     select_rows(base, ground->port_rows, model->ports, ground->n, base->port_rows);
     fill_carried(model, base);
     fill_turns(model, setup, base);
-    for (int s = 0; s < model->supports; s++) /* the force there: κ times the displacement */
-        for (int k = 0; k < base->n; k++) {
-            double sum = 0.0;
-            for (int t = 0; t < model->supports && which[k] >= 0; t++)
-                sum += ground->kappa[s * model->supports + t] * ground->support_rows[t * ground->n + which[k]];
-            base->support_rows[s * base->n + k] = sum;
-        }
-    for (int d = 0; d < model->dampers; d++) base->damper_span[d] = span_of(base->damper_rows + d * base->n, base->n);
-    for (int s = 0; s < model->supports; s++)
-        base->support_span[s] = span_of(base->support_rows + s * base->n, base->n);
+    fill_supports(model, base);
     for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
     for (int g = 0; g < model->gears; g++) fill_centre(model, base, gk_directions(setup), g);
 }

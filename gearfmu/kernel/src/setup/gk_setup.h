@@ -45,8 +45,9 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int32_t *which; /* (n) their numbers in the model, −1: padding */
     int32_t *slot;  /* (all ground oscillators of the set) place among the dynamic ones, −1: not dynamic */
     double *omega, *zeta, *omega2; /* (n), 0 in padding */
-    double *damper_rows;           /* (dampers, n) */
+    double *damper_rows;           /* (supports, n) elongation of a support's own spring */
     double *support_rows;          /* (supports, n): force on the support, kappa included */
+    double *support_damping;       /* (supports, n): force on it by the dashpots of all supports per speed */
     double *port_rows;             /* (ports, n) */
     double *carried_rows;          /* (2 carried, n) √m x, √m y of carried bodies */
     int turns;                     /* pairs of rows x, y that turn into each other: carried bodies, gyroscopic forces */
@@ -58,7 +59,8 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
     const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
-    gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
+    gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], support_damping_span[MAX_SUPPORTS],
+        port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
 
@@ -169,7 +171,7 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
 
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
-    double *pulls;          /* (dampers, n) s²e/n of a dashpot */
+    double *pulls;          /* (supports, n) s²e/n of a dashpot */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
     double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
