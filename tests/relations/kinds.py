@@ -31,7 +31,7 @@ from gearfmu.stage.run.trace import Trace
 ROOT = Path(__file__).parents[2]
 COARSE = BodySpec(
     strip_half_width=4.5e-4,
-    modes=24,
+    modes=100,
     roll_points=8,
     width_functions=3,
     mesh=MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2),
