@@ -43,9 +43,9 @@ def spinning_blob(known: bool = True) -> bytes:
 class Flight:
     """A run in which no tooth touches: kicked, then free."""
 
-    def __init__(self, known: bool = True, **parameters: float) -> None:
+    def __init__(self, known: bool = True, speed: float = SPEED, apart: float = APART, **parameters: float) -> None:
         self.sections = read_blob(spinning_blob(known))
-        start = {"pinion.w_start": SPEED - APART, "wheel.w_start": -SPEED * 16 / 24}
+        start = {"pinion.w_start": speed - apart, "wheel.w_start": -speed * 16 / 24}
         self.kernel = Kernel(spinning_blob(known), FREE | start | parameters)
         self.kernel.prepare()
         self.kernel.initialize()
@@ -144,6 +144,23 @@ def test_gyroscopic_forces_do_no_work() -> None:
     flight.go(48)
     print(before, flight.kernel.get("energy.residual") - before)
     assert abs(flight.kernel.get("energy.residual") - before) < 1e-7 * before
+
+
+@pytest.mark.parametrize("speed", [0.2, 20.0])
+def test_turns_below_the_last_place_of_a_speed_give_no_energy(speed: float) -> None:
+    """100 000 steps of free flight: the trend of the energy over that of the kick. Rounded after every turn, speeds in
+    single precision gained 7e-5 at 0.2 rad/s."""
+    flight = Flight(speed=speed, apart=0.05, h=5e-6, backlash=2e-3)
+    ground, gear = flight.split(flight.start)
+    vibrating = 0.5 * float(np.sum(ground[1] ** 2) + np.sum(gear[1].astype(float) ** 2))
+    stored, begin, sample = np.empty(100), flight.steps * STEP, 5e-3
+    for i in range(len(stored)):
+        flight.kernel.step(begin + i * sample, sample)
+        stored[i] = flight.kernel.get("energy.stored")
+        assert flight.kernel.get("mesh.contact") == 0
+    trend = len(stored) * np.polyfit(np.arange(len(stored)), stored, 1)[0]
+    print(f"{speed} rad/s: {trend / vibrating:.1e}")
+    assert abs(trend) < 5e-6 * vibrating
 
 
 @pytest.mark.parametrize("integrator", [3.0, 4.0])
