@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearfmu.errors import ModelError, SimulationError
-from gearfmu.kernel.binding import CAUSALITIES, OUTCOMES, TYPES, RecordingInfo, VariableInfo, aligned, blank_message, load
+from gearfmu.kernel.binding import (
+    CAUSALITIES,
+    OUTCOMES,
+    TYPES,
+    RecordingInfo,
+    VariableInfo,
+    aligned,
+    blank_message,
+    load,
+)
 
 if TYPE_CHECKING:
     from gearfmu.kernel.linear import LinearModel

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearfmu.stage import StageModel, Steady, Trace, simulate
+from gearfmu.stage.run.simulate import Wound
 
 STEP = 60e-6  # s, communication step
 SETTLE = 0.05  # s
@@ -26,25 +27,27 @@ class LightRattle:
     frequency: float = 127.0
     phase: float = 0.0
 
-    def inputs(self, model: StageModel) -> Steady:
+    def inputs(self, model: StageModel) -> Wound:
         """Steady drive plus the swing, with speed and acceleration."""
-        return _Swinging(model, self.speed, self.torque, self)
+        return _Swinging(Steady(model, self.speed, self.torque), self)
 
 
-class _Swinging(Steady):
+@dataclass(frozen=True)
+class _Swinging(Wound):
+    steady: Steady
     swing: LightRattle
 
-    def __init__(self, model: StageModel, speed: float, torque: float, swing: LightRattle):
-        super().__init__(model, speed, torque)
-        object.__setattr__(self, "swing", swing)
+    def under(self, parameters: Mapping[str, float]) -> _Swinging:
+        return replace(self, steady=self.steady.under(parameters))
 
-    def __call__(self, time: float) -> Mapping[str, float]:
-        values, s = dict(super().__call__(time)), self.swing
-        pinion, omega = self.model.spec.gears[0].name, 2 * math.pi * s.frequency
-        angle = omega * time + s.phase
-        values[f"{pinion}.phi"] += s.swing * math.sin(angle)
-        values[f"{pinion}.w"] += s.swing * omega * math.cos(angle)
-        values[f"{pinion}.a"] = -s.swing * omega**2 * math.sin(angle)
+    def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        values, s = self.steady.over(times), self.swing
+        pinion, omega = self.steady.model.spec.gears[0].name, 2 * math.pi * s.frequency
+        angle = (omega * times + s.phase).tolist()
+        sine, cosine = (np.array(list(map(f, angle))) for f in (math.sin, math.cos))
+        values[f"{pinion}.phi"] = values[f"{pinion}.phi"] + s.swing * sine
+        values[f"{pinion}.w"] = values[f"{pinion}.w"] + s.swing * omega * cosine
+        values[f"{pinion}.a"] = -s.swing * omega**2 * sine
         return values
 
 

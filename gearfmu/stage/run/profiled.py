@@ -45,8 +45,8 @@ class Profiled(Wound):
     """Inputs of a stage whose input follows a speed over time (Line, rad/s) while shafts and meshes are wound up by a
     torque over time (Line, N·m, on the input), as `Steady` does for constant ones. For spring ports without a chain.
 
-    parameters: as of `Steady`. What the stage takes up under a torque, its mean over a pitch, is computed at the torques of the points and between
-    them at eighths of their range, and follows straight lines over the torque.
+    parameters: as of `Steady`. What the stage takes up under a torque, its mean over a pitch, is computed at the
+    torques of the points and between them at eighths of their range, and follows straight lines over the torque.
     """
 
     model: StageModel
@@ -59,7 +59,17 @@ class Profiled(Wound):
         """Angle of the input (rad) over the torque on it (N·m, in place of the time)."""
         torques = winding_torques(self.torque.values)
         still = Steady(self.model, 0.0, 0.0, parameters=self.parameters)
-        return Line(torques, np.array([replace(still, torque=float(torque)).winding for torque in torques]))
+        carried = torques - 0.5 * self._rubbed * np.abs(torques)
+        return Line(torques, np.array([replace(still, torque=float(torque)).winding for torque in carried]))
+
+    @cached_property
+    def _rubbed(self) -> float:
+        """Part of the torque that friction takes, negative where the speed is: at the largest torque and speed. None is
+        counted where the speed changes its sign, for friction would jump there."""
+        torque, speed = (float(max(line.values, key=abs)) for line in (self.torque, self.speed))
+        if np.ptp(np.sign(self.speed.values[self.speed.values != 0.0])) if speed else True:
+            return 0.0
+        return Steady(self.model, speed, torque, parameters=self.parameters).rubbed * float(np.sign(speed))
 
     def under(self, parameters: Mapping[str, float]) -> Profiled:
         return replace(self, parameters=parameters)
@@ -69,11 +79,12 @@ class Profiled(Wound):
         torque, growing, _ = self.torque.at(times)
         speed, rate, angle = self.speed.at(times)
         taken, yielding, _ = self.winding.at(torque)
+        lost = self._rubbed * np.sign(torque)
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
             stiffness = self.model.stage.ports[port].k
             assert stiffness is not None, "the port is a spring"
             driven = port == shafts.input
-            wound = (1.0 if driven else -1.0) / turn / stiffness
+            wound = (1.0 if driven else -(1.0 - lost)) / turn / stiffness
             values[f"{port}.phi"] = wound * torque + (taken if driven else 0.0) + turn * angle
             values[f"{port}.w"] = wound * growing + (yielding * growing if driven else 0.0) + turn * speed
             values[f"{port}.a"] = turn * rate

@@ -6,7 +6,7 @@ import time as clock
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,9 @@ from gearfmu.kernel.recording import Recording
 from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stage.run.winding import mean_winding, rubbed_away
 
-WINDING_POSITIONS = 16
+WINDING_POSITIONS, LOSS_STEPS = 16, 100  # over a pitch
 CHUNKS, LEAST_CHUNK = 200, 16  # a run is made in at most so many calls of the kernel, of at least so many steps
 
 Inputs = Callable[[float], Mapping[str, float]]
@@ -47,7 +48,7 @@ class Wound(ABC):
 class Steady(Wound):
     """Inputs of a stage under a constant load: the outer ends of its input and output turn at constant speed, or gather
     it at a constant rate, wound up so that shafts and meshes carry the torque on average: τ/k on either port and the
-    mean loaded transmission between them.
+    mean loaded transmission between them. With friction the output carries less, by its loss at the speed of the start.
 
     speed: of the input at the start, rad/s; torque: on the input, N·m; rate: of the speed, rad/s²; parameters: of the
     kernel in the run, which `simulate` fills in. For spring ports without a chain.
@@ -61,20 +62,39 @@ class Steady(Wound):
 
     @cached_property
     def winding(self) -> float:
-        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh."""
-        angles = tuple(-self._pitch * i / WINDING_POSITIONS for i in range(WINDING_POSITIONS))
-        known = tuple(sorted(self.parameters.items()))
-        return _winding(self.model.blob, known, self.torque, angles, float(self.model.shafts.ratio))
+        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh. Its
+        meshes carry the mean of what goes in and what comes out."""
+        known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
+        ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
+        taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)
+        return taken - 0.5 * slope * self.lost
 
     @property
-    def _pitch(self) -> float:
-        """Angle of the output (rad) over the longest pitch of the meshes that turn with it."""
+    def lost(self) -> float:
+        """Torque on the input (N·m) that friction of the flanks takes, mean over a pitch."""
+        return self.rubbed * abs(self.torque) * float(np.sign(self.speed))
+
+    @cached_property
+    def rubbed(self) -> float:
+        """Part of the torque that friction of the flanks takes: of a second pitch, wound up without friction."""
+        friction, smooth = "effect.friction", {"effect.friction": 0.0}
+        on = self.parameters[friction] if friction in self.parameters else self.model.kernel().get(friction)
+        if not (on and self.speed and self.torque):
+            return 0.0
+        angles, shafts = np.array(self._positions(LOSS_STEPS)), self.model.shafts
+        times = np.concatenate([-angles, angles[1] * -LOSS_STEPS - angles]) * abs(float(shafts.ratio) / self.speed)
+        inputs = replace(self, rate=0.0, parameters={**self.parameters, **smooth}).over(times)
+        return rubbed_away(self.model.blob, self.parameters, inputs, float(times[1]), shafts.input)
+
+    def _positions(self, count: int) -> tuple[float, ...]:
+        """Angles of the output (rad) over the longest pitch of the meshes that turn with it."""
         stage, shafts = self.model.stage, self.model.shafts
         speeds = turns(stage, shafts.output)
         rotor = stage.rotor_of(stage.ports[shafts.output].body)
         own = [m for m in meshings(stage).values() if m.rotor in speeds]
         near = [m for mesh, m in zip(stage.engagements, own, strict=True) if rotor in map(stage.rotor_of, mesh.gears)]
-        return 2 * np.pi / min(abs(float(m.relative(speeds))) * m.teeth for m in near or own)
+        pitch = 2 * np.pi / min(abs(float(m.relative(speeds))) * m.teeth for m in near or own)
+        return tuple(-pitch * i / count for i in range(count))
 
     def under(self, parameters: Mapping[str, float]) -> Steady:
         return replace(self, parameters=parameters)
@@ -84,34 +104,15 @@ class Steady(Wound):
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
             stiffness = self.model.stage.ports[port].k
             assert stiffness is not None, "the port is a spring"
-            sense = 1.0 if port == shafts.input else -1.0
-            wound = sense * self.torque / turn / stiffness + (self.winding if port == shafts.input else 0.0)
+            if port == shafts.input:
+                wound = self.torque / turn / stiffness + self.winding
+            else:
+                wound = -(self.torque - self.lost) / turn / stiffness
             values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * times) * times
             values[f"{port}.w"] = turn * (self.speed + self.rate * times)
             if self.rate:
                 values[f"{port}.a"] = np.full(times.size, turn * self.rate)
         return values
-
-
-@lru_cache(maxsize=8)
-def _winding(
-    blob: bytes, parameters: tuple[tuple[str, float], ...], torque: float, angles: tuple[float, ...], ratio: float
-) -> float:
-    """`Steady.winding`; angles: of the output, rad."""
-    kernel = statics_of_run(blob, dict(parameters))
-    return float(np.mean([kernel.transmission(at, torque).phi - ratio * at for at in angles]))
-
-
-def statics_of_run(blob: bytes, parameters: Mapping[str, float]) -> Kernel:
-    """A kernel prepared for the statics of runs with these parameters, which do not depend on level, integrator and
-    step: level rigid. But level paper and contact by nodes know less compliance, and their statics are their own."""
-    kernel = Kernel(blob, parameters)
-    chosen = {name: kernel.variables[name].items[int(kernel.get(name))] for name in ("level", "contact")}
-    if chosen["level"] != "paper" and chosen["contact"] != "nodal":
-        for name in ("level", "integrator", "h"):
-            kernel.set(name, 0.0)
-    kernel.prepare()
-    return kernel
 
 
 def simulate(

@@ -22,11 +22,12 @@ def wound_starts(model: StageModel, torque: float, speed: float = 0.0) -> dict[s
         remedy = "a start under torque needs an input that is no fixed port, and ports without a clutch"
         raise SpecError([Problem(source, "ports", ", ".join(ports), remedy)])
     steady, values = Steady(model, speed, torque), dict[str, float]()
-    for name, port, sense, turn in (
-        (shafts.input, ends[0], 1.0, 1.0),
-        (shafts.output, ends[1], -1.0, 1.0 / shafts.ratio),
+    lost = steady.lost if all(port.kind == "spring" for port in ends) else 0.0
+    for name, port, given, turn in (
+        (shafts.input, ends[0], torque, 1.0),
+        (shafts.output, ends[1], lost - torque, 1.0 / shafts.ratio),
     ):
-        exerted = sense * torque / turn
+        exerted = given / turn
         if port.kind == "torque":
             values |= {f"{name}.tau": exerted, f"{name}.w_start": turn * speed}
         elif port.kind == "spring":
