@@ -85,7 +85,7 @@ def of_set(run: Run) -> list[tuple[str, str]]:
 def _phasing(run: Run) -> list[tuple[str, str]]:
     if run.spec is None or run.planets is None:
         return []
-    phases = planet_phases(as_general(run.spec), run.planets.carrier, list(run.planets.meshes))
+    phases = planet_phases(as_general(run.spec), run.planets.planets, list(run.planets.meshes))
     return [
         (f"Planets at the {central}", f"{phasing(own)} ({', '.join(f'{_fraction(p)}' for p in own)} of a pitch)")
         for central, own in phases.items()
@@ -96,10 +96,10 @@ def _fraction(phase: float) -> str:
     return "½" if abs(phase - 0.5) < PHASE else f"{phase:.3g}" if phase > PHASE else "0"
 
 
-def planet_phases(stage: Stage, carrier: str, central: Sequence[str]) -> dict[str, list[float]]:
-    """Phase of the mesh of every planet of a carrier with each central gear, by its name: pitches behind that of the
-    first planet, 0 … 1, from teeth and places."""
-    axes = [rotor.axis for rotor in stage.rotors.values() if rotor.carried_by == carrier]
+def planet_phases(stage: Stage, planets: Sequence[str], central: Sequence[str]) -> dict[str, list[float]]:
+    """Phase of the mesh of every planet with each central gear, by its name: pitches behind that of the first planet,
+    0 … 1, from teeth and places."""
+    axes = [stage.rotors[stage.rotor_of(planet)].axis for planet in planets]
     places = np.array([math.atan2(float(y), float(x)) for x, y in axes])
     found = {}
     for name in central:

@@ -64,9 +64,8 @@ def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) 
     caption = (
         f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the {flank} flanks{touching}. "
         f"Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, under that force "
-        f"applied statically at mid-width to {len(contacts)} of the tooth pairs alike, those whose flanks rigid gears "
-        f"would have in contact there; {engagement.gears[0]} is turned on until the loaded flanks meet again. Local "
-        "flattening is left out."
+        f"applied statically to the tooth pairs that rigid gears would have in contact at mid-width, {len(contacts)}; "
+        f"{engagement.gears[0]} is turned on until the loaded flanks meet again. Local flattening is left out."
     )
     if any(sum(name in e.gears for e in stage.engagements) > 1 for name in engagement.gears):
         caption += " So are the forces at the other meshes of the two."
