@@ -14,7 +14,7 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import SETTLED, Window, drive_side
+from gearfmu.report.signals import SETTLED, Window, drive_side, window_of_interest
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import assemble
@@ -140,16 +140,19 @@ def contact_pattern(trace: Trace, stage: Stage, mesh: str, loads: FlankLoads) ->
         order = np.argsort(diameter)
         heat = Heat(z, diameter[order], load[order], 0.0, top, "N/mm", "steel")
         panels.append(Panel(f"{gear}: diameter on the flank in mm", (), heat, height=230, x_limits=(-half, half)))
-    panels += _over_width(trace, mesh, loads)
+    window = window_of_interest(trace)
+    part = trace.window(window.start, window.end)
+    panels += _over_width(part, mesh, loads)
     flank = "drive" if loads.side == drive_side(trace, mesh) else "coast"
     caption = (
         f"Force per width on the {flank} flanks over a whole engagement, quasi-static under the mean mesh force of the "
         f"run, interpolated between {loads.width.size} slices; largest {top:.4g} N/mm. "
         "Left to right: from −b/2 to +b/2 of the common face width. "
     )
-    factor = face_load_factor(trace, mesh)
+    factor = face_load_factor(part, mesh)
     if factor is not None:
-        caption += f"In the run the most loaded slice carries {factor:.3f} times the mean (K_Hβ of ISO 6336-1)."
+        caption += f"In the run ({window.reason}) the most loaded slice carries {factor:.3f} times the mean "
+        caption += "(K_Hβ of ISO 6336-1)."
     file = "contact" if len(stage.engagements) == 1 else f"contact_{mesh}"
     data = {
         "roll_A_[mm]": np.repeat(1e3 * rolls, z.size),

@@ -67,6 +67,7 @@ def test_summary_of_drawn_stages(seed: int, tmp_path: Path) -> None:
 
 def require_tables(found: Said) -> None:
     """The page: its table of results, or of a set its key numbers and planets; operating point; energy; octaves."""
+    require_tiles(found)
     if "<h2>Results</h2>" in found.html:
         for row, key in zip(found.rows("Results")[1:], found.results, strict=False):
             value = found.result(key)
@@ -87,6 +88,28 @@ def require_tables(found: Said) -> None:
             levels = found.octaves(channel)
             for band, shown in zip(head[1:], row[1:], strict=True):
                 assert float(shown) == pytest.approx(levels[float(band)], abs=0.051), (channel, band)
+
+
+def require_tiles(found: Said) -> None:
+    """The numbers on top: of several meshes the largest."""
+    tiles = re.findall(r"<div><b>([^<]*)<small>([^<]*)</small></b><span>([^<]*)</span></div>", found.html)
+    known = {
+        "mean mesh force": ("mesh_force_mean_N", 1e-3),
+        "dynamic factor": ("dynamic_factor", 1.0),
+        "alternating transmission error": ("te_rms_ac_um", 1.0),
+        "of the samples with teeth apart": ("contact_loss_percent", 1.0),
+    }
+    for value, _, words in tiles:
+        if (start := re.match("|".join(known), words)) is not None:
+            end, scale = known[start[0]]
+            largest = max(abs(found.result(key)) for key in found.results if key.endswith(end))
+            assert alike(value, scale * largest), words
+        elif words.startswith("largest share of a planet"):
+            assert float(value) == pytest.approx(max(map(found.share, found.meshes)), abs=6e-4)
+        else:
+            assert words.startswith("alternating bearing force"), f"nobody recomputes {words}"
+            loudest = max(found.result(key) for key in found.results if key.startswith("bearing_"))
+            assert alike(value, loudest)
 
 
 def force_of(found: Said) -> float:
@@ -181,8 +204,8 @@ def test_captions(name: str, tmp_path: Path) -> None:
     """The deformed pair: force, time and tooth pairs are those recorded at the largest force. Fault: "tooth pairs in
     contact: 1", from rigid gears, where the trace has 2 or 3."""
     found = said(name, tmp_path, with_bodies=True)
-    captions = re.findall(r"At t = ([\d.]+) s: mesh force (\S+) kN on the (\w+) flanks, tooth pairs in contact: (\d+)\.",
-                          found.text)  # fmt: skip
+    words = r"At t = ([\d.]+) s: mesh force (\S+) kN on the (\w+) flanks, tooth pairs in contact: (\d+)\."
+    captions = re.findall(words, found.text)
     assert len(captions) == len(found.meshes)
     for mesh, (time, force, flank, pairs) in zip(found.meshes, captions, strict=True):
         at = int(np.abs(found.trace[f"{mesh}.force"]).argmax())
