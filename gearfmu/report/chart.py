@@ -11,7 +11,7 @@ import numpy as np
 from gearfmu.report.names import shown
 
 TIME = "time in s"
-SPANS = {0: "open", -1: "coast", 2: "both"}  # kind of shading by the channel `contact`
+SPANS = {0: "open", -1: "coast", 2: "both"}  # kind of shading by the channel `contact`, +1: drive flanks
 
 
 @dataclass(frozen=True)

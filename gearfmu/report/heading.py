@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from gearfmu.report import plots_set
+from gearfmu.report.mesh_cycle import face_load_factor, static_face_load_factor
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
-from gearfmu.report.signals import GEAR_SPEED
-from gearfmu.stage.run.trace import Trace
+from gearfmu.report.signals import GEAR_SPEED, input_shaft
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage, ToothedBody
 
+PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
 STEADY = 0.1  # nine tenths of the samples lie as close together, over their median
 
 
@@ -28,7 +32,7 @@ def operating_point(run: Run) -> list[str]:
     they are steady, else the largest torque and the range of the speed."""
     part = run.trace.window(run.window.start, run.window.end)
     found = []
-    name = _input(part)
+    name = input_shaft(part)
     torque = next((n for n in (f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau") if n in part), None)
     if torque is not None and np.any(part[torque]):
         values = np.abs(part[torque])
@@ -52,17 +56,9 @@ def _steady(values: np.ndarray) -> bool:
     return bool(high - low < STEADY * np.median(values))
 
 
-def _input(trace: Trace) -> str:
-    """The first shaft with a torque and a speed, else the first gear with a speed."""
-    torques = [name.removesuffix(".tau").removeprefix("drive.") for name in trace.channels if name.endswith(".tau")]
-    known = [name for name in torques if f"{name}{GEAR_SPEED}" in trace]
-    speeds = [name.removesuffix(GEAR_SPEED) for name in trace.channels if name.endswith(GEAR_SPEED)]
-    return next(iter(known or speeds), "")
-
-
 def of_set(run: Run) -> list[tuple[str, str]]:
-    """Key numbers of a planetary set over the window: torques, speeds, ratio, mesh frequency, K_γ, dynamic factor;
-    those that were not recorded are left out."""
+    """Key numbers of a planetary set over the window: torques, speeds, ratio, mesh frequency, phasing of the planets,
+    K_γ, K_Hβ, dynamic factor; those that were not recorded are left out."""
     own = run.planets
     assert own is not None
     part, found = run.trace.window(run.window.start, run.window.end), []
@@ -83,7 +79,46 @@ def of_set(run: Run) -> list[tuple[str, str]]:
     frequency = plots_set.mesh_speed(part, own) / (2 * math.pi)
     if frequency > 1e-3:
         found.append(("Mesh frequency", f"{frequency:.4g} Hz"))
-    return found + _factors(run)
+    return found + _phasing(run) + _factors(run)
+
+
+def _phasing(run: Run) -> list[tuple[str, str]]:
+    if run.spec is None or run.planets is None:
+        return []
+    phases = planet_phases(as_general(run.spec), run.planets.planets, list(run.planets.meshes))
+    return [
+        (f"Planets at the {central}", f"{phasing(own)} ({', '.join(f'{_fraction(p)}' for p in own)} of a pitch)")
+        for central, own in phases.items()
+    ]
+
+
+def _fraction(phase: float) -> str:
+    return "½" if abs(phase - 0.5) < PHASE else f"{phase:.3g}" if phase > PHASE else "0"
+
+
+def planet_phases(stage: Stage, planets: Sequence[str], central: Sequence[str]) -> dict[str, list[float]]:
+    """Phase of the mesh of every planet with each central gear, by its name: pitches behind that of the first planet,
+    0 … 1, from teeth and places."""
+    axes = [stage.rotors[stage.rotor_of(planet)].axis for planet in planets]
+    places = np.array([math.atan2(float(y), float(x)) for x, y in axes])
+    found = {}
+    for name in central:
+        body = stage.bodies.get(name)
+        if isinstance(body, ToothedBody):
+            pitches = np.mod(body.teeth * (places - places[0]) / (2 * math.pi), 1.0)
+            found[name] = [float(p) if 1.0 - p > PHASE else 0.0 for p in pitches]
+    return found
+
+
+def phasing(phases: Sequence[float]) -> str:
+    """Phasing of planets whose meshes lag by `phases` pitches (Kahraman 1994; Parker 2000): in phase where all are
+    equal, counter-phased where half of them lag by half a pitch, sequentially phased where first harmonics cancel."""
+    lag = np.exp(2j * math.pi * np.asarray(phases))
+    if np.allclose(lag, 1.0, atol=10 * PHASE):
+        return "in phase"
+    if abs(lag.sum()) > 10 * PHASE:
+        return "unequally phased"
+    return "counter-phased" if np.allclose(lag**2, 1.0, atol=10 * PHASE) else "sequentially phased"
 
 
 def _torques(name: str) -> tuple[str, ...]:
@@ -108,11 +143,27 @@ def _factors(run: Run) -> list[tuple[str, str]]:
         if known:
             most = max(known, key=lambda mesh: known[mesh])
             found.append((f"K_γ at the {central}, largest mean share", f"{known[most]:.3f} ({mesh_words(most)})"))
+    found += _over_the_width(run)
     factors = {mesh: value for mesh, value in dynamic_factors(run.trace).items() if math.isfinite(value)}
     if factors:
         most = max(factors, key=lambda mesh: factors[mesh])
         where = mesh_words(most.removesuffix("dynamic_factor").rstrip("_"))
         found.append(("Dynamic factor, largest", f"{factors[most]:.3f}" + (f" ({where})" if where else "")))
+    return found
+
+
+def _over_the_width(run: Run) -> list[tuple[str, str]]:
+    """K_Hβ at every central gear: of the run where forces of slices were recorded, else of the statics."""
+    assert run.planets is not None
+    part, found = run.trace.window(run.window.start, run.window.end), []
+    for central, meshes in run.planets.meshes.items():
+        of_run = {mesh: factor for mesh in meshes.values() if (factor := face_load_factor(part, mesh)) is not None}
+        of_statics = {mesh: static_face_load_factor(run.loads[mesh]) for mesh in meshes.values() if mesh in run.loads}
+        if known := of_run or of_statics:
+            most = max(known, key=lambda mesh: known[mesh])
+            how = "largest" if of_run else "quasi-static"
+            words = f"K_Hβ at the {central}, {how}: most loaded slice over the mean"
+            found.append((words, f"{known[most]:.3f} ({mesh_words(most)})"))
     return found
 
 

@@ -14,7 +14,7 @@ from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plan import plan_sections
-from gearfmu.report.results import dynamic_factors, key_results, strict
+from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
 from gearfmu.report.run import Run
 from gearfmu.report.sound import Sound, heard_channel, player, sound_of
 from gearfmu.stage.run.deformation import Deformation
@@ -42,7 +42,7 @@ def write(
     written.
     """
     folder, run = Path(out_dir), Run(trace, summary, spec, bodies, deformation)
-    results = {**key_results(trace), **dynamic_factors(trace)}
+    results = {**key_results(trace), **dynamic_factors(trace), **energy_balance(trace)}
     made, missing = chosen_plots(run)
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)

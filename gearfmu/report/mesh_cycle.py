@@ -14,7 +14,7 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import SETTLED, Window
+from gearfmu.report.signals import SETTLED, Window, drive_side, window_of_interest
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import assemble
@@ -64,22 +64,37 @@ def folded(position: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     return np.bincount(bins, values, BINS) / count if np.all(count) else None
 
 
+def no_mean_cycle(window: Window, position: np.ndarray | None) -> str:
+    """Why a run has no mean mesh cycle, as a sentence. position (n,): pitches within its window."""
+    if window.reason != SETTLED:
+        early = "settling time" in window.reason
+        return "The run is too short: it ends before it has settled." if early else "The run is not steady."
+    if position is None:
+        return "The angle of gear B was not recorded."
+    if np.ptp(position) < LEAST_PERIODS:
+        return f"The run is too short: {np.ptp(position):.1f} mesh periods after settling, {LEAST_PERIODS} are needed."
+    return "The samples are too few: they leave parts of the mesh cycle empty."
+
+
 def transmission_error(
     trace: Trace, window: Window, stage: Stage, names: Sequence[str], loads: Mapping[str, FlankLoads]
 ) -> Plot | None:
     """Transmission error of engagements over the mesh cycle with its harmonics: quasi-static where `loads` has it, and
     of a steady run its mean over all cycles of the window; None without either."""
-    part, curves = trace.window(window.start, window.end), {}
+    part, curves, missing = trace.window(window.start, window.end), {}, ""
     for mesh in (e for e in stage.engagements if e.name in names):
         if mesh.name in loads:
             own = loads[mesh.name]
             order = np.argsort(np.mod(own.position, 1.0))
             curves[mesh.name, STATIC] = (np.mod(own.position, 1.0)[order], 1e6 * own.te[order])
         position = position_of(part, stage, mesh)
+        mean = None
         if window.reason == SETTLED and position is not None and f"{mesh.name}.te" in part:
             mean = folded(position, 1e6 * part[f"{mesh.name}.te"])
-            if mean is not None:
-                curves[mesh.name, RUN] = ((np.arange(BINS) + 0.5) / BINS, mean)
+        if mean is not None:
+            curves[mesh.name, RUN] = ((np.arange(BINS) + 0.5) / BINS, mean)
+        else:
+            missing = missing or no_mean_cycle(window, position)
     if not curves:
         return None
     words = {key: key[1] if len(names) == 1 else f"{key[0]}, {key[1]}" for key in curves}
@@ -99,7 +114,7 @@ def transmission_error(
     if any(key[1] == RUN for key in curves):
         caption += f"In the run: mean over all mesh cycles, {window.start:.3g} s to {window.end:.3g} s. "
     else:
-        caption += "The run is not steady: it has no mean cycle. "
+        caption += f"No mean cycle of the run. {missing} "
     file = "mesh_cycle" if len(stage.engagements) == 1 or len(names) > 1 else f"mesh_cycle_{names[0]}"
     columns = {f"{words[key]}_harmonic_[um rms]": line for key, line in lines.items()}
     title = "Transmission error over the mesh cycle"
@@ -125,16 +140,19 @@ def contact_pattern(trace: Trace, stage: Stage, mesh: str, loads: FlankLoads) ->
         order = np.argsort(diameter)
         heat = Heat(z, diameter[order], load[order], 0.0, top, "N/mm", "steel")
         panels.append(Panel(f"{gear}: diameter on the flank in mm", (), heat, height=230, x_limits=(-half, half)))
-    panels += _over_width(trace, mesh, loads)
-    flank = "drive" if loads.side > 0 else "coast"
+    window = window_of_interest(trace)
+    part = trace.window(window.start, window.end)
+    panels += _over_width(part, mesh, loads)
+    flank = "drive" if loads.side == drive_side(trace, mesh) else "coast"
     caption = (
         f"Force per width on the {flank} flanks over a whole engagement, quasi-static under the mean mesh force of the "
         f"run, interpolated between {loads.width.size} slices; largest {top:.4g} N/mm. "
         "Left to right: from −b/2 to +b/2 of the common face width. "
     )
-    factor = face_load_factor(trace, mesh)
+    factor = face_load_factor(part, mesh)
     if factor is not None:
-        caption += f"In the run the most loaded slice carries {factor:.3f} times the mean (K_Hβ of ISO 6336-1)."
+        caption += f"In the run ({window.reason}) the most loaded slice carries {factor:.3f} times the mean "
+        caption += "(K_Hβ of ISO 6336-1)."
     file = "contact" if len(stage.engagements) == 1 else f"contact_{mesh}"
     data = {
         "roll_A_[mm]": np.repeat(1e3 * rolls, z.size),
@@ -172,6 +190,12 @@ def face_load_factor(trace: Trace, mesh: str) -> float | None:
         return None
     means = np.abs(found.mean(axis=1))
     return float(means.max() / means.mean()) if means.mean() > 0 else None
+
+
+def static_face_load_factor(loads: FlankLoads) -> float:
+    """Largest load of a slice over the mean of all, mean over the pitch: K_Hβ for quasi-static loads."""
+    total = loads.force.sum(axis=0)
+    return float(total.max() / total.mean())
 
 
 def _over_width(trace: Trace, mesh: str, loads: FlankLoads) -> list[Panel]:

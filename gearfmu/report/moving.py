@@ -84,7 +84,7 @@ class View:
         span = 1e3 * (self.time[-1] - self.time[0])
         text = (
             f"{span:.3g} ms of the run, slowed down; gears turn by their recorded angles. Elastic displacement under "
-            "the recorded mesh forces, applied statically and split evenly over the tooth pairs in contact; "
+            "the recorded mesh forces, applied statically and split evenly over the pairs in contact of rigid gears; "
         )
         if self.recorded:
             text += f"of {', '.join(self.recorded)}: the sum of all recorded modes; "

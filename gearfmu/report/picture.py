@@ -13,6 +13,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.report.chart import Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
+from gearfmu.report.signals import drive_side
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage.build.meshes import mesh_axes, tooth_phases
@@ -24,8 +25,8 @@ SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is dr
 
 def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
     """Two gears in mesh at the largest |force| of their engagement: their elastic displacement, enlarged, under that
-    force applied statically and split evenly over the tooth pairs in contact. Drawn with gear A at the origin and gear
-    B on +x. None without the force or the angle of gear A.
+    force applied statically and split evenly over the tooth pairs that rigid gears would have in contact. Drawn with
+    gear A at the origin and gear B on +x. None without the force or the angle of gear A.
 
     bodies : ReducedBody of every gear of the stage with its `display`.
     """
@@ -58,11 +59,12 @@ def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) 
     drawn = [points + scale * u for points, u in zip(placed, world, strict=True)]
     drawn[0] = drawn[0] @ _rotation(sg * scale * approach / pair.gears[0].r_b).T
     shapes = [_shape(own[g].display, drawn[g], moved[g]) for g in (0, 1)]
+    flank = "drive" if sg == drive_side(trace, mesh) else "coast"
+    touching = f", tooth pairs in contact: {trace[f'{mesh}.pairs'][sample]:g}" if f"{mesh}.pairs" in trace else ""
     caption = (
-        f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the "
-        f"{'drive' if sg > 0 else 'coast'} flanks, tooth pairs in contact: "
-        f"{len(contacts)}. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, "
-        "under that force applied statically and split evenly over the pairs in contact; "
+        f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the {flank} flanks{touching}. "
+        f"Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, under that force "
+        f"applied statically to the tooth pairs that rigid gears would have in contact at mid-width, {len(contacts)}; "
         f"{engagement.gears[0]} is turned on until the loaded flanks meet again. Local flattening is left out."
     )
     if any(sum(name in e.gears for e in stage.engagements) > 1 for name in engagement.gears):

@@ -8,7 +8,7 @@ import numpy as np
 
 from gearfmu.report.chart import SPANS, Curve, Panel, Plot, Span, over_time
 from gearfmu.report.names import mesh_words
-from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, noise_floor, spans
+from gearfmu.report.signals import LOCKED, bearings, drive_side, lock_time, meshes, noise_floor, spans
 from gearfmu.stage.run.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
@@ -66,9 +66,10 @@ def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | 
         panels.append(Panel(label, (curve,), spans=shaded))
     file = mesh if window is None else f"{mesh}_detail"
     title = of_mesh(trace, mesh, "Mesh force and transmission error") + ("" if window is None else ", detail")
+    words = _contact_words(_by_flank(trace, part, mesh)) if f"{mesh}.contact" in part else ""
     extra = [n for n in (f"{mesh}.contact", f"{mesh}.pairs") if n in part]
     chart = over_time(panels, "time" if window is None else file)
-    return Plot(file, title, _contact_words(part, mesh), chart, columns(part, names + extra))
+    return Plot(file, title, words, chart, columns(part, names + extra))
 
 
 def of_mesh(trace: Trace, mesh: str, title: str) -> str:
@@ -157,7 +158,7 @@ def _contact(trace: Trace, mesh: str, window: tuple[float, float] | None) -> lis
     if f"{mesh}.contact" not in trace:
         return []
     part = trace if window is None else trace.window(*window)
-    state = part[f"{mesh}.contact"]
+    state = _by_flank(trace, part, mesh)
     found = [Span(*ends, kind) for code, kind in SPANS.items() for ends in spans(part.time, state == code)]
     return joined(found, float(part.time[-1] - part.time[0]) / MOST_SPANS)
 
@@ -177,10 +178,14 @@ def joined(found: Sequence[Span], gap: float) -> list[Span]:
     return merged
 
 
-def _contact_words(trace: Trace, mesh: str) -> str:
-    if f"{mesh}.contact" not in trace:
-        return ""
-    state = trace[f"{mesh}.contact"]
+def _by_flank(trace: Trace, part: Trace, mesh: str) -> np.ndarray:
+    """The channel `contact` of a part with +1 for drive flanks, −1 for coast flanks, 0 and 2 as they are."""
+    state = part[f"{mesh}.contact"]
+    return np.where(np.abs(state) == 1, state * drive_side(trace, mesh), state)
+
+
+def _contact_words(state: np.ndarray) -> str:
+    """state (n,): of `_by_flank`."""
     shares = [
         (0, "the teeth are apart", "orange"),
         (-1, "coast flanks carry", "blue"),

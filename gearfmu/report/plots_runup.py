@@ -108,7 +108,8 @@ def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
 
 
 def _column(run: RunUp, name: str) -> str:
-    return f"{name}_rms_[{run.signals[name].unit}]"
+    own = run.signals[name]
+    return f"{name}{'_mean' if own.averaged else ''}_rms_[{own.unit}]"
 
 
 def _about_pickup(run: RunUp) -> str:

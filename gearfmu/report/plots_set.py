@@ -13,6 +13,7 @@ from gearfmu.report.chart import Chart, Curve, Mark, Panel, Plot, level_limits, 
 from gearfmu.report.names import mesh_words
 from gearfmu.report.plots import RPM, channels, columns
 from gearfmu.report.plots_nvh import SHOWN_TO, segment, spectrum_curve
+from gearfmu.report.results import port_work
 from gearfmu.report.signals import GEAR_SPEED, Window, noise_floor
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.trace import Trace
@@ -224,9 +225,8 @@ def energy(trace: Trace) -> Plot | None:
         Panel("energy in J", channels(trace, (*works, "energy.stored", "energy.dissipated")), height=190),
         Panel("error of the balance in J", (left_over,), height=120),
     )
-    through = sum(float(np.ptp(trace[name])) for name in works)
-    if works == ["energy.work"]:  # of all ports together: what came in and what went out is told by the run
-        through = float(trace.meta.get("exchanged_work_J") or through)
+    of_shafts = sum(float(np.ptp(trace[name])) for name in works)
+    through = port_work(trace) if works == ["energy.work"] else of_shafts  # energy.work: of all ports, with sign
     left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
     caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
     return Plot("energy", "Energy", caption, over_time(panels), columns(trace, [*works, *ENERGIES]))
@@ -269,7 +269,8 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
         if steady
         else "Mesh orders are not marked: the speed is not steady."
     )
-    data = {"frequency_[Hz]": first.frequency} | {f"{n}_rms_[N]": s.amplitude for n, s in spectra.items()}
+    used = {n: f"{n}_mean" if f"{n}_mean" in part else n for n in spectra}
+    data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in spectra.items()}
     return Plot("spectrum", "Spectra of the forces", caption, chart, data)
 
 

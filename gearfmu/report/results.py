@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from gearfmu.cosim.accuracy import alternating, rms
-from gearfmu.report.signals import SETTLED, bearings, lock_time, meshes, window_of_interest
+from gearfmu.report.signals import GEAR_SPEED, SETTLED, bearings, drive_side, lock_time, meshes, window_of_interest
 from gearfmu.stage.run.trace import Trace
 
 REACHED_THE_END = ("completed", "ok")  # outcomes of a run
@@ -52,7 +53,7 @@ def _mesh_results(trace: Trace, part: Trace, mesh: str, steady: bool) -> dict[st
         found["te_rms_ac_um"] = 1e6 * _rms_ac(part, f"{mesh}.te", steady)
     if f"{mesh}.contact" in trace:
         found["contact_loss_percent"] = 100 * float(np.mean(trace[f"{mesh}.contact"] == 0))
-        found["coast_contact_percent"] = 100 * float(np.mean(trace[f"{mesh}.contact"] == -1))
+        found["coast_contact_percent"] = 100 * float(np.mean(trace[f"{mesh}.contact"] == -drive_side(trace, mesh)))
     if f"{mesh}.impacts" in trace:
         found["impacts"] = float(trace[f"{mesh}.impacts"][-1])
     return found
@@ -86,6 +87,27 @@ def dynamic_factors(trace: Trace) -> dict[str, float]:
             name = f"{mesh}_dynamic_factor" if len(names) > 1 else "dynamic_factor"
             found[name] = float(np.max(peak[loaded] / static[loaded]))
     return found
+
+
+def port_work(trace: Trace) -> float:
+    """J: work through the ports of a stage, ∫|torque · speed| dt, over all of its shafts whose torque and speed were
+    recorded; that of the trace's meta "exchanged_work_J" where there is one."""
+    known = trace.meta.get("exchanged_work_J")
+    if known is not None:
+        return float(known)
+    ports = [name.removesuffix(".tau") for name in trace.channels if name.endswith(".tau")]
+    ports = [name for name in ports if f"{name}{GEAR_SPEED}" in trace]
+    power = sum(np.abs(trace[f"{name}.tau"] * trace[f"{name}{GEAR_SPEED}"]) for name in ports)
+    return float(trapezoid(power, trace.time)) if ports else 0.0
+
+
+def energy_balance(trace: Trace) -> dict[str, float]:
+    """What the energy balance of the stage leaves at the end over the work through its ports; empty where either was
+    not recorded."""
+    work = port_work(trace)
+    if "energy.residual" not in trace or not work:
+        return {}
+    return {"energy_residual_of_port_work": float(trace["energy.residual"][-1]) / work}
 
 
 def strict(value: Any) -> Any:

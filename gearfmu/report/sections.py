@@ -12,7 +12,7 @@ from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels,
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words, plain
 from gearfmu.report.plots import RPM
-from gearfmu.report.results import dynamic_factors, key_results
+from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
 from gearfmu.stage.run.trace import Trace
@@ -203,12 +203,17 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 def accuracy(run: Run) -> list[str]:
     """Errors and cost of the run, and of the fidelity levels of its stage where they were measured."""
     summary, spec, bodies = run.summary, run.spec, run.bodies
+    of = f" of {summary['coupling_error_of']}" if summary.get("coupling_error_of") else ""
+    left = energy_balance(run.trace)
     rows = {
-        "Coupling error (Richardson, relative)": _text(summary, "coupling_error"),
-        "Energy residual (relative)": _text(summary, "energy_residual"),
+        f"Coupling error{of} (Richardson), of the rms of the alternating part": _text(summary, "coupling_error"),
+        "Energy residual of the stage, of the work through its ports": _text(left, "energy_residual_of_port_work"),
         "CPU time per simulated second, stage alone": _text(summary, "stage_realtime_factor"),
         "CPU time per simulated second, whole run": _text(summary, "realtime_factor"),
     }
+    if summary.get("exchanged_work_J"):
+        lost = _text(summary, "energy_residual")
+        rows["Work lost between the stage and its shafts, of the work exchanged"] = lost
     parts = [
         page.pairs_table(
             {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}
@@ -244,8 +249,8 @@ def _frf_words(body: Any) -> str:
     return (
         f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static "
         "residual against the finite elements: "
-        f"largest relative error {frf.max_error:.1e} from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be trusted up "
-        f"to {frf.trusted_to / 1e3:.3g} kHz."
+        f"largest error {frf.max_error:.1e} of the response from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be "
+        f"trusted up to {frf.trusted_to / 1e3:.3g} kHz."
     )
 
 
@@ -263,6 +268,9 @@ def provenance(summary: Mapping[str, Any]) -> dict[str, str]:
         "simulated_s",
         "cpu_s",
         "realtime_factor",
+        "coupling_error",
+        "coupling_error_of",
+        "energy_residual",
     }
     flat: dict[str, str] = {}
     for key, value in summary.items():

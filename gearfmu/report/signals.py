@@ -48,6 +48,24 @@ def noise_floor(trace: Trace) -> float:
     return NOISE * max((float(np.abs(trace[name]).max()) for name in forces), default=0.0)
 
 
+def input_shaft(trace: Trace) -> str:
+    """The first shaft with a torque and a speed, else the first gear with a speed; "" without any."""
+    torques = [name.removesuffix(".tau").removeprefix("drive.") for name in trace.channels if name.endswith(".tau")]
+    known = [name for name in torques if f"{name}{GEAR_SPEED}" in trace]
+    speeds = [name.removesuffix(GEAR_SPEED) for name in trace.channels if name.endswith(GEAR_SPEED)]
+    return next(iter(known or speeds), "")
+
+
+def drive_side(trace: Trace, mesh: str) -> int:
+    """Sign of an engagement's force on its drive flanks, those that carry a positive torque on the input: −1 for some
+    meshes of trains and sets. +1 where force or torque are not known."""
+    torque = f"{input_shaft(trace)}.tau"
+    if f"{mesh}.force" not in trace or torque not in trace:
+        return 1
+    together = -float(np.sum(trace[f"{mesh}.force"] * trace[torque]))  # the channel: torque of the stage on its shaft
+    return -1 if together < 0 else 1
+
+
 def known_meshings(trace: Trace, spec: Any = None) -> dict[str, Meshing]:
     """Meshing of every engagement, from the stage `spec` or the trace's meta "meshes"."""
     if spec is not None:
@@ -84,7 +102,8 @@ def window_of_interest(trace: Trace) -> Window:
     settled = float(trace.meta.get("settle") or 0.0)
     if start < settled < end:
         return Window(settled, end, SETTLED)
-    return Window(start, end, "the whole run")
+    early = f", which ends within the settling time of {settled:g} s" if settled >= end else ""
+    return Window(start, end, f"the whole run{early}")
 
 
 def spans(time: np.ndarray, mask: np.ndarray) -> list[tuple[float, float]]:

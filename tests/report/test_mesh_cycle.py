@@ -15,17 +15,19 @@ from gearfmu.report.mesh_cycle import (
     contact_pattern,
     face_load_factor,
     folded,
+    no_mean_cycle,
     over_width,
+    static_face_load_factor,
     static_loads,
     transmission_error,
 )
 from gearfmu.report.results import dynamic_factors
-from gearfmu.report.signals import Window, window_of_interest
+from gearfmu.report.signals import SETTLED, Window, window_of_interest
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.run.flank_loads import flank_loads
+from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.run.trace import Channel, Trace
 
 TORQUE = 302.0
@@ -125,6 +127,19 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     assert heat is not None and heat.values.max() == heat.high and "drive flanks" in pattern.caption
 
 
+def test_a_short_run_is_called_short() -> None:
+    """Faults: a steady run of three mesh periods, and one that ends before it has settled, were called not steady."""
+    settled = Window(0.1, 0.2, SETTLED)
+    assert "too short: 3.0 mesh periods after settling, 8 are needed" in no_mean_cycle(settled, np.linspace(0, 3, 50))
+    assert "too few" in no_mean_cycle(settled, np.linspace(0, 30, 50))
+    assert "not recorded" in no_mean_cycle(settled, None)
+    time = np.arange(100) * 1e-4
+    force = {"mesh.force": Channel(np.ones(100), "N")}
+    early, unsettled = (window_of_interest(Trace(time, force, meta)) for meta in ({"settle": 0.02}, {}))
+    assert "settling time of 0.02 s" in early.reason and (early.start, early.end) == (0.0, time[-1])
+    assert "too short" in no_mean_cycle(early, None) and "not steady" in no_mean_cycle(unsettled, None)
+
+
 def test_dynamic_factor_is_the_peak_over_the_mean() -> None:
     time = np.arange(20_000) * 1e-5
     trace = steady(1000.0 + 250.0 * np.sin(2 * np.pi * 700 * time), time)
@@ -143,6 +158,9 @@ def test_face_load_factor_is_that_of_the_means() -> None:
     trace = Trace(time, {f"mesh.slice_{k}": Channel(np.full(100, 100.0 * k), "N") for k in (1, 2, 3)}, {})
     assert face_load_factor(trace, "mesh") == pytest.approx(1.5)
     assert face_load_factor(Trace(time, {"mesh.force": Channel(time, "N")}, {}), "mesh") is None
+    sums = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]])
+    statics = FlankLoads(np.zeros(1), np.zeros(1), 1.0, np.zeros(3), 1, sums, sums, np.zeros(2, int))
+    assert static_face_load_factor(statics) == pytest.approx(1.5)
 
 
 def test_no_statics_without_a_load() -> None:

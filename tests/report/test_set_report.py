@@ -12,9 +12,13 @@ import pytest
 from gearfmu import report
 from gearfmu.report import plots_set
 from gearfmu.report.chart import Chart
+from gearfmu.report.heading import of_set, phasing, planet_phases
 from gearfmu.report.metrics import Spectrum, band_rms
 from gearfmu.report.plots_set import LEAST_SPAN, planet_set, planets, shares, sharing
+from gearfmu.report.run import Run
 from gearfmu.report.signals import Window, known_meshings
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace
 
 STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
@@ -154,3 +158,31 @@ def test_energy_that_the_balance_leaves_is_told_of_what_passed_through() -> None
     assert plot is not None and "5.0e-05 of the energy" in plot.caption
     rows = list(csv.reader(",".join(plot.columns).splitlines()))
     assert "drive.carrier.work_[J]" in rows[0]
+
+
+@pytest.mark.parametrize(
+    ("teeth", "places", "words"),
+    [
+        (24, (0, 1, 2, 3), "in phase"),  # 24/4 is whole
+        (18, (0, 1, 2, 3), "counter-phased"),  # 4½: every second planet half a pitch behind
+        (26, (0, 1, 2, 3), "counter-phased"),
+        (25, (0, 1, 2, 3), "sequentially phased"),  # 6¼
+        (26, (0, 4 / 3, 8 / 3), "sequentially phased"),  # 8⅔
+        (25, (0, 0.96, 2, 2.96), "counter-phased"),  # in opposite pairs: 0, 6, 12½, 18½
+        (25, (0, 1, 2), "unequally phased"),  # 0, 6¼, 12½: first harmonics do not cancel
+    ],
+)
+def test_phasing_of_planets_by_hand(teeth: int, places: tuple[float, ...], words: str) -> None:
+    """Teeth of the sun times the place of each planet (here in quarters of a turn), in pitches behind the first."""
+    phases = [(teeth * place / 4) % 1.0 for place in places]
+    assert phasing(phases) == words
+
+
+@pytest.mark.parametrize(("file", "words"), [("planetary54", "counter-phased"), ("helical_set", "sequentially phased")])
+def test_phasing_is_a_key_number_of_a_set(file: str, words: str) -> None:
+    stage = as_general(load_stage(file))
+    planets = [name for name in stage.rotors if name.startswith("planet")]
+    found = planet_phases(stage, planets, ["sun", "ring"])
+    assert {phasing(own) for own in found.values()} == {words}
+    told = dict(of_set(Run(set_run(), {}, load_stage("planetary54"))))
+    assert told["Planets at the sun"] == told["Planets at the ring"] == "counter-phased (0, ½, 0, ½ of a pitch)"
