@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, field_validator, model_validator
 
@@ -11,8 +11,10 @@ from gearfmu.spec.reading.base import Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
 
+Table = TypeVar("Table")
 
-def in_order(gears: dict[str, Any]) -> dict[str, Any]:
+
+def in_order(gears: dict[str, Table]) -> dict[str, Table]:
     """Tables of a pair's gears, the pinion first: by their names, under other names as in the file."""
     return dict(sorted(gears.items())) if set(gears) == {"pinion", "wheel"} else gears
 
