@@ -17,6 +17,7 @@ TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
 BEARINGS = ("concept_bearing",)
 TOOL_FACTORS = (("addendum_coefficient_reference_profile", "dedendum"), ("tip_radius_factor", "fillet_radius"))
 STIFFEST = 1e12  # N/m: beyond, a stiffness in a file means "rigid"
+RIGID = 1e12  # Pa: beyond, the modulus of a material means "rigid", as shafts have it
 _DEEPEST_TIP = 2.5  # modules below r + x m_n: a smaller tip circle is none, such as the 1 mm of unfilled fields
 
 
@@ -116,7 +117,8 @@ def put_rack(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None
 def _put_material(model: RexsModel, draft: Draft, place: str, component: Component) -> None:
     shafts = model.related(component, "shaft", relation="assembly")
     found = [m for c in (component, *shafts) for m in model.related(c, "material")]
-    for material in found[:1]:
+    elastic = [m for m in found if (model.si(m, "elastic_modulus", "Pa") or 0.0) < RIGID]
+    for material in elastic[:1]:
         origin = f"REXS material {material.id}"
         for name, key, unit in (
             ("elastic_modulus", "youngs_modulus", "Pa"), ("density", "density", "kg/m^3"), ("poisson_ratio", "", "")

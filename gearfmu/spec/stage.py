@@ -14,6 +14,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
 from gearfmu.spec.forms.members import members
 from gearfmu.spec.forms.pair import StageSpec as StageSpec
+from gearfmu.spec.forms.pair import in_order
 from gearfmu.spec.forms.pair_checks import geometry_problems
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import set_problems
@@ -166,7 +167,7 @@ def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
     ):
         return []
     pair, _ = validate(PairSpec, raw.get("pair"), file)
-    read = [validate(GearSpec, table | {"name": name}, file)[0] for name, table in tables.items()]
+    read = [validate(GearSpec, table | {"name": name}, file)[0] for name, table in in_order(tables).items()]
     gears = [gear for gear in read if gear is not None]
     if pair is None or len(gears) < len(read):
         return []

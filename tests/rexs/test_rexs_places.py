@@ -102,8 +102,20 @@ def test_other_placeholders_are_refused_or_left_aside(tmp_path: Path) -> None:
         draft_from_rexs(changed(tmp_path, PAIR, *zero, attribute_of("21", "number_of_teeth", "0")))
     found = {problem.field: problem.remedy for problem in error.value.problems}
     assert len(found) == 3 and all("placeholder" in remedy for remedy in found.values())
+    rigid = draft_from_rexs(changed(tmp_path, PAIR, attribute_of("41", "elastic_modulus", "2.1e8")))
+    assert rigid.at("gears.pinion.material.youngs_modulus") == "206 GPa", "a shaft's rigid material is no gear's"
     nothing = [attribute_of("41", name, "0") for name in ("elastic_modulus", "poisson_ratio", "density")]
     nothing += [attribute_of("11", f"outer_diameter_{end}", "0") for end in ("begin", "end")]
     pinion = stage_of(changed(tmp_path, PAIR, *nothing), tmp_path).gears[0]
     assert (pinion.material.youngs_modulus, pinion.material.density) == (206e9, 7850)
     assert pinion.bore_diameter == pytest.approx(31e-3, rel=0.05), "half the root diameter"
+
+
+def test_a_set_with_a_sun_of_seventeen_teeth_and_a_sharp_hob_is_valid(tmp_path: Path) -> None:
+    """As design programs export it: no profile shift, a tool whose tip radius is 0.25 modules."""
+    teeth = {"20": "17", "21": "-55", "100": "19", "110": "19", "120": "19", "130": "19"}
+    edits = [attribute_of(component, "number_of_teeth", z) for component, z in teeth.items()]
+    fillet = (r'(id="tip_radius_factor" unit="none">)[^<]*', r"\g<1>0.25")
+    made = stage_of(changed(tmp_path, SET, *edits, fillet, without("tip_diameter")), tmp_path)
+    assert (made.sun.teeth, made.planet.teeth, made.ring.teeth) == (17, 19, 55)
+    assert made.sun.rack.fillet_radius == 0.25 and made.sun.profile_shift == 0

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.reading.base import Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
+
+Table = TypeVar("Table")
+
+
+def in_order(gears: dict[str, Table]) -> dict[str, Table]:
+    """Tables of a pair's gears, the pinion first: by their names, under other names as in the file."""
+    return dict(sorted(gears.items())) if set(gears) == {"pinion", "wheel"} else gears
 
 
 class StageSpec(Spec):
@@ -24,7 +31,7 @@ class StageSpec(Spec):
     )
     speed_max: Annotated[float, Quantity("speed_max")] = Field(description="largest pinion speed the model is made for")
     pair: PairSpec = Field(description="the pair")
-    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel")
+    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel; under other names the pinion first")
     contact: ContactSpec = Field(description="tooth contact")
     ports: dict[str, PortSpec] = Field(description="one port a shaft")
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
@@ -46,7 +53,7 @@ class StageSpec(Spec):
             return value
         if len(value) != 2 or not all(isinstance(table, dict) for table in value.values()):
             raise refuse("a pair has two gears: write the tables [gears.pinion] and [gears.wheel]")
-        return tuple(table | {"name": name} for name, table in value.items())
+        return tuple(table | {"name": name} for name, table in in_order(value).items())
 
     @model_validator(mode="after")
     def _ports_of_shafts(self) -> StageSpec:
