@@ -220,6 +220,7 @@ MUTANTS: tuple[Mutant, ...] = (
     *of(
         "gears.py",
         "rexs",
+        ("if at is None or begin - 1e-9 <= at <= begin + length + 1e-9:", "if True:"),
         ('    draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)\n', ""),
     ),
 )
