@@ -1,7 +1,7 @@
 """Planted defects: one line of the program is made wrong at a time, and the named tests must fail. Golden runs, which
 any change of a number moves, are not among them: the physics must see it.
 
-    python tests/mutants.py [--only WORD] [--jobs 2]
+    python tests/mutants.py [--only PATTERN] [--judges relations] [--jobs 2]
 
 works on copies of the checkout and writes benchmarks/mutants.csv; exit code 1 where fewer than 95 % are caught. The
 test that caught a defect last time runs first, the others where it passes."""
@@ -11,14 +11,15 @@ from __future__ import annotations
 import argparse
 import csv
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -179,6 +180,49 @@ MUTANTS: tuple[Mutant, ...] = (
         ("np.cumsum(0.5 * (rate[1:] + rate[:-1])", "np.cumsum(rate[1:]"),
     ),
     *of("units.py", "spec/test_units.py", ('("µm", "m"): 1e-6', '("µm", "m"): 1e-3')),
+    # ---- planted from outside: what relations, constants and planning must see ----
+    *of(
+        "gk_flank.c",
+        "relations/test_mirror.py",
+        ("const double ex = sg * t->n[1], ey = -sg * t->n[0];", "const double ex = t->n[1], ey = -t->n[0];"),
+        ("slide[RXA] = -sense * up * ey,", "slide[RXA] = sense * up * ey,"),
+        ("roll = sg * gear->r_b * angle;", "roll = gear->r_b * angle;"),
+    ),
+    *of("gk_flank.c", "stage/test_constants.py", ("    p->curvature *= mesh->cosine;\n", "")),
+    *of("gk_lubrication.c", "stage/test_constants.py", ("gk_log(29660.0 * load", "gk_log(31143.0 * load")),
+    *of(
+        "gk_deviation.c",
+        "relations/test_mirror.py relations/test_place.py",
+        ("motion[SPACE * w + TURNING[i]] += turn[", "motion[SPACE * w + TURNING[i]] += (i < 2) * turn["),
+    ),
+    *of("gk_grid.c", "relations/test_continuity.py", ("w[3] = k[2] + 3.0 * k[3]", "w[3] = k[2] + 2.0 * k[3]")),
+    *of("gk_adopt.c", "relations/test_split.py", ("[d] -= c->k->rigid_kappa *", "[d] -= 0.0 * c->k->rigid_kappa *")),
+    *of(
+        "meshes.py",
+        "relations/test_order.py relations/test_place.py",
+        ("- (first - gamma) * pair.gears[0].r_b / pair", "- (first - gamma) * 1.001 * pair.gears[0].r_b / pair"),
+    ),
+    *of(
+        "tripwires.py",
+        "planning/test_tripwires.py",
+        ("for mesh in self.meshes)", "for mesh in self.meshes[:1])"),
+        ("FALLBACK = 2\n", "FALLBACK = 256\n"),
+        ("ENERGY = 0.05", "ENERGY = 0.5"),
+        ("better = replace(better, h=0.5 * choice.h)", "pass"),
+    ),
+    *of(
+        "run.py",
+        "sweeps/test_resume.py",
+        ("if known is None or known.name != OK or (", "if known is None or ("),
+        ("fingerprint, program()]", "fingerprint]"),
+    ),
+    *of("journal.py", "sweeps/test_resume.py", ("[math.nan if v is None else v for v in values]", "list(values)")),
+    *of(
+        "gears.py",
+        "rexs",
+        ("if at is None or begin - 1e-9 <= at <= begin + length + 1e-9:", "if True:"),
+        ('    draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)\n', ""),
+    ),
 )
 
 
@@ -236,15 +280,17 @@ def known() -> dict[tuple[str, str, str], str]:
     return {(row["file"], row["line"], row["becomes"]): row["by"] for row in rows}
 
 
-def worked(jobs: int, mutants: Sequence[Mutant]) -> list[tuple[Mutant, str, str]]:
-    """All mutants, each worker in its own copy of the checkout."""
+def worked(
+    jobs: int, mutants: Sequence[Mutant], first: Mapping[tuple[str, str, str], str]
+) -> list[tuple[Mutant, str, str]]:
+    """All mutants, each worker in its own copy of the checkout; first: as `known`."""
     folders = [Path(tempfile.mkdtemp(prefix="mutants-")) / "copy" for _ in range(jobs)]
     for folder in folders:
         shutil.copytree(ROOT, folder, ignore=_left_out)
         subprocess.run(
             [sys.executable, "-c", BUILD], cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, check=True
         )
-    free, first = list(folders), known()
+    free = list(folders)
 
     def one(mutant: Mutant) -> tuple[Mutant, str, str]:
         folder, started = free.pop(), time.monotonic()
@@ -265,15 +311,18 @@ def worked(jobs: int, mutants: Sequence[Mutant]) -> list[tuple[Mutant, str, str]
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help="defects whose file or text has this word; writes no table")
+    parser.add_argument("--only", default="", help="defects whose file or text matches this pattern; writes no table")
+    parser.add_argument("--judges", default="", help="files or folders below tests/ in place of those named; no table")
     parser.add_argument("--jobs", type=int, default=2)
     chosen = parser.parse_args()
-    mutants = [m for m in MUTANTS if chosen.only in f"{m.file} {m.old}"]
+    mutants = [m for m in MUTANTS if re.search(chosen.only, f"{m.file} {m.old}")]
+    if chosen.judges:
+        mutants = [replace(m, tests=tuple(chosen.judges.split())) for m in mutants]
     for mutant in mutants:
         place_of(ROOT, mutant)
-    found = worked(chosen.jobs, mutants)
+    found = worked(chosen.jobs, mutants, {} if chosen.judges else known())
     caught = sum(outcome == "caught" for _, outcome, _ in found)
-    if not chosen.only:
+    if not (chosen.only or chosen.judges):
         with open(TABLE, "w", encoding="utf-8", newline="") as out:
             rows = csv.writer(out, lineterminator="\n")
             rows.writerow(("file", "line", "becomes", "outcome", "by"))
