@@ -1,0 +1,196 @@
+"""R8, balance by outputs: what supports and ports do to a stage is what moves it. From output channels alone, with
+masses, places and dashpots from the bodies and the tables.
+
+At rest the forces on the ground and the moments of the ports are in balance. In motion a support's force is that of its
+spring and its dashpot, the forces on the ground are the rate of momentum, and the power of the ports is what is stored
+and lost. Momentum is observable where all bodies are gears: shafts and carriers have no channels of motion.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number, loaded
+
+from gearfmu.spec.forms.general import CarrierBody
+from gearfmu.spec.forms.members import body_names
+from gearfmu.stage import assemble
+from gearfmu.stage.build.free import free_carrier
+from gearfmu.stage.build.groups import Layout
+from gearfmu.stage.build.layout import place_of, stage_layout
+from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.run.simulate import simulate
+
+FORCES, MOMENTS = 1e-5, 2e-3  # at rest, of the largest force and torque; moments: forces act where bodies have moved to
+DASHPOT = 0.25  # root mean square: what is quasi-static moves without it; found up to 0.16, a thin ring
+MOMENTUM = 0.02  # root mean square: trapezoids of forces; modal damping holds bodies a little
+ENERGY = 1e-3  # of what passed through the ports, in fractions of a pitch; found up to 3e-4
+DEAR = [pytest.param(name, marks=pytest.mark.full) if name == "helical_set" else name for name in KINDS]
+START = 30  # steps in which friction, unknown at rest, sets in
+STEP = 2e-6  # s, of communication: short enough to differentiate outputs
+
+
+# ---- at rest --------------------------------------------------------------------------------------------------------
+def at_rest(kind: Kind, time: float) -> dict[str, float]:
+    """Outputs at the static equilibrium with which a run begins."""
+    model = kind.model().driven_by_springs()
+    kernel = model.kernel(level=float(level_number(model, "fast")))
+    for name, value in loaded(kind)(time).items():
+        kernel.set(name, value)
+    kernel.initialize(0.0)
+    return {v.name: kernel.get(v.name) for v in kernel.variables.values() if v.causality == "output"}
+
+
+def on_the_ground(kind: Kind, out: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Force (3,) and moment (3,) about the origin that the stage exerts on the ground and through its ports."""
+    stage, force, moment = kind.stage, np.zeros(3), np.zeros(3)
+    for support in stage.supports:
+        if support.to is not None:
+            continue
+        own = [np.array([out.get(f"bearing.{support.name}.{kind}{axis}", 0.0) for axis in "xyz"]) for kind in "fm"]
+        z = place_of(stage, support)
+        if isinstance(stage.bodies[support.body], CarrierBody):
+            node = support.node or "bore"
+            body = free_carrier(bodies_of(kind.file)[support.body])
+            names = [str(i["name"]) for i in bodies_of(kind.file)[support.body].interfaces]
+            z += float(body.place[names.index(node)])
+        axis = stage.rotors[stage.rotor_of(support.body)].axis
+        force += own[0]
+        moment += own[1] + np.cross([*axis, z], own[0])
+    moment[2] += sum(out[f"{port}.tau"] for port in stage.ports)
+    return force, moment
+
+
+def is_at_rest(kind: Kind, time: float) -> None:
+    out = at_rest(kind, time)
+    force, moment = on_the_ground(kind, out)
+    largest = max(abs(value) for name, value in out.items() if family(name) == "f")
+    torque = max(abs(out[f"{port}.tau"]) for port in kind.stage.ports)
+    assert np.abs(force).max() < FORCES * largest, force / largest
+    assert np.abs(moment).max() < MOMENTS * torque, moment / torque
+
+
+@pytest.mark.parametrize("name", DEAR)
+def test_a_stage_at_rest_is_held_by_its_supports_and_ports(name: str) -> None:
+    """Where its input has made a third of a turn."""
+    is_at_rest(KINDS[name], 2 * math.pi / 3 / KINDS[name].speed)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(20))
+def test_a_drawn_stage_at_rest_is_held_by_its_supports_and_ports(seed: int) -> None:
+    is_at_rest(drawn(seed), 0.0)
+
+
+# ---- dashpots -------------------------------------------------------------------------------------------------------
+@cache
+def layout_of(kind: Kind) -> Layout:
+    stage = kind.model().driven_by_springs().stage
+    bodies = bodies_of(kind.file)
+    carriers = {carrier.name: bodies[carrier.name] for carrier in stage.carriers}
+    return stage_layout(stage, [bodies[gear.name] for gear in stage.gears], carriers)
+
+
+def has_its_dashpots(kind: Kind, **parameters: float) -> None:
+    """Force − k·displacement = c·speed in every direction of every support that has a dashpot."""
+    model, layout = kind.model().driven_by_springs(), layout_of(kind)
+    set_up = {"level": float(level_number(model, "fast")), "h": STEP}
+    out = channels(simulate(model, loaded(kind), 80 * STEP, STEP, set_up | parameters))
+    names = zip(layout.support_names(), layout.displacement_names(), strict=True)
+    constants = [(c, s.damping[i]) for s in layout.supports for i, c in enumerate(np.diag(s.compliance))]
+    seen = 0
+    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for (force, moved), (compliance, c) in zip(names, constants, strict=True):
+        if c == 0.0 or moved not in out:
+            continue
+        speed = (out[moved][2:] - out[moved][:-2]) / (2 * STEP)
+        damped = (out[force] - out[moved] / compliance)[1:-1]
+        parts.setdefault(force.rpartition(".")[0] + family(force), []).append((damped, c * speed))
+        seen += 1
+    assert seen
+    largest: dict[str, float] = {}
+    for name, own in parts.items():
+        largest[name[-1]] = max(largest.get(name[-1], 0.0), *(rms(damped) for damped, _ in own))
+    for name, own in parts.items():
+        assert max(rms(damped - by_hand) for damped, by_hand in own) < DASHPOT * largest[name[-1]], name
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
+@pytest.mark.parametrize("name", DEAR)
+def test_a_support_gives_its_force_by_spring_and_own_dashpot(name: str) -> None:
+    """Seen by it: dashpots of other supports in the force of a bearing; a displacement that is force over stiffness,
+    dashpots included."""
+    has_its_dashpots(KINDS[name])
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(20))
+def test_a_support_of_a_drawn_stage_gives_its_force_by_spring_and_own_dashpot(seed: int) -> None:
+    has_its_dashpots(drawn(seed))
+
+
+# ---- momentum -------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("effect", [None, "friction", "film"])
+@pytest.mark.parametrize("name", ["pair", "helical", "internal"])
+def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | None) -> None:
+    """Σ m (x(t+H) − 2 x(t) + x(t−H))/H² against the means of both steps. Flanks, friction and film act between bodies,
+    whatever they do. Seen by it: dashpots that bearing forces leave out."""
+    kind, step = KINDS[name], 0.5 * STEP
+    stage, bodies = kind.stage, bodies_of(kind.file)
+    gears = [gear.name for gear in stage.gears]
+    observed = assemble(stage, [bodies[name] for name in body_names(stage)], observe=gears).driven_by_springs()
+    set_up = {"level": float(level_number(observed, "full")), "h": step}
+    on = {f"effect.{effect}": 1.0} if effect else {}
+    out = channels(simulate(observed, loaded(kind), 150 * step, step, set_up | on))
+    rate, force = 0.0, 0.0
+    for gear in gears:
+        turned = np.exp(1j * (tooth_phases(stage)[gear] + out[f"{gear}.gear.phi"]))
+        place = turned * (out[f"{gear}.motion.x"] + 1j * out[f"{gear}.motion.y"])
+        mean = out[f"bearing.{gear}.fx_mean"] + 1j * out[f"bearing.{gear}.fy_mean"]
+        rate = rate + bodies[gear].mass * (place[2:] - 2 * place[1:-1] + place[:-2]) / step**2
+        force = force + 0.5 * (mean[1:-1] + mean[2:])
+    later = slice(START, None)
+    assert rms(np.abs(rate + force)[later]) < MOMENTUM * rms(np.abs(force)[later])
+
+
+# ---- energy ---------------------------------------------------------------------------------------------------------
+def keeps_its_energy(kind: Kind, **parameters: float) -> None:
+    model, inputs = kind.model().driven_by_springs(), loaded(kind)
+    set_up = {"level": float(level_number(model, "fast"))}
+    step = kind.step
+    out = channels(simulate(model, inputs, 20 * step, step, set_up | parameters))
+    speeds = {port: inputs(0.0)[f"{port}.w"] for port in kind.stage.ports}
+    powers = {port: -out[f"{port}.tau_mean"][1:] * speed for port, speed in speeds.items()}
+    through = sum(float(np.abs(power).sum()) * step for power in powers.values())
+    work = np.cumsum(sum(powers.values())) * step
+    assert np.abs(out["energy.work"][1:] - work).max() < 1e-6 * through
+    lost = out["energy.dissipated"]
+    stored = out["energy.stored"] - out["energy.stored"][1]
+    left = stored[1:] - (work - work[0]) + lost[1:] - lost[1]
+    assert np.abs(left).max() < ENERGY * through, np.abs(left).max() / through
+    known = sum(out[name] for name in out if name.endswith((".friction_loss", ".film_loss")))
+    assert (np.diff(lost) > -1e-9 * through).all() and (np.diff(lost - known) > -1e-6 * through).all()
+
+
+@pytest.mark.parametrize("name", DEAR)
+def test_power_of_the_ports_is_what_is_stored_and_lost(name: str) -> None:
+    keeps_its_energy(KINDS[name])
+
+
+@pytest.mark.parametrize("effect", ["friction", "film"])
+def test_power_of_the_ports_is_what_is_stored_and_lost_with_oil(effect: str) -> None:
+    keeps_its_energy(KINDS["helical"], **{f"effect.{effect}": 1.0})
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(20))
+def test_power_of_the_ports_of_a_drawn_stage_is_what_is_stored_and_lost(seed: int) -> None:
+    """Seen by it: a planet whose teeth are placed by a branch of atan2 overlaps its neighbours, and the stage gains up
+    to 6 % of what passes."""
+    keeps_its_energy(drawn(seed))
