@@ -3,6 +3,9 @@ same bits."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from small_model import pair_blob
@@ -41,6 +44,35 @@ def test_accumulated_times_give_the_bits_of_counted_ones(start: float) -> None:
     first = accumulated[1] - accumulated[0]
     counted[1:] = counted[0] + first * np.arange(1, STEPS + 1)
     assert forces(start, counted) == forces(start, accumulated)
+
+
+@pytest.mark.parametrize("reference", [0.0, 1.0])
+def test_angles_are_taken_but_for_whole_turns(reference: float) -> None:
+    """A host that wraps angles to ±π, or starts a turn away, gives the run of one that does not; also of a state saved
+    after the first wrap, which holds the turns. Without them a wrap was a jump of 2π: tooth penetration."""
+
+    def outputs(wrap: Callable[[float], float], saved: int) -> np.ndarray:
+        kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1, "phi_reference": reference})
+        kernel.set("pinion.w", 100.0)
+        kernel.set("wheel.w", -100.0 * 16 / 24)
+        rows = []
+        for i in range(STEPS):
+            kernel.set("pinion.phi", wrap(1e-3 + 2e-3 * min(1.0, i / 100) + 100.0 * i * H))
+            kernel.set("wheel.phi", wrap(-100.0 * 16 / 24 * i * H))
+            if i == 0:
+                kernel.initialize(0.0)
+            if i == saved:
+                state = kernel.save()
+                kernel.step(i * H, H)
+                kernel.restore(state)
+            kernel.step(i * H, H)
+            rows.append([kernel.get(name) for name in ("mesh.force", "pinion.tau", "pinion.gear.phi")])
+        return np.array(rows)
+
+    straight = outputs(lambda phi: phi, -1)
+    wrapped = outputs(lambda phi: math.remainder(phi, math.tau), 400)
+    assert np.all(np.abs(straight[:, (0, 2)]).max(axis=0) > (10.0, math.pi))
+    assert np.all(np.abs(wrapped - straight) < 1e-9 * np.abs(straight).max(axis=0))
 
 
 def test_a_step_that_is_not_at_the_present_time_is_refused_and_changes_nothing() -> None:

@@ -9,8 +9,10 @@
 
 #ifdef GK_DOUBLE_MODES
 typedef double gk_real; /* test build: modal states and rows of the gear groups in double */
+typedef int64_t gk_whole;
 #else
 typedef float gk_real;
+typedef int32_t gk_whole;
 #endif
 enum { LANES = 16 }; /* sums run in this many lanes, whatever the vector width */
 
@@ -121,6 +123,12 @@ typedef gk_real gk_four __attribute__((vector_size(4 * sizeof(gk_real)), may_ali
 #define GK_WIDENED(four) __builtin_convertvector(four, gk_quad)
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
                                        aligned(sizeof(gk_real)))); /* states start anywhere */
+/* x, or 0 where it is less than `least` in magnitude: numbers that fade end at 0 before products of them are denormal,
+ * which many processors compute slowly; by the same bits on all */
+typedef gk_whole gk_half_bits
+    __attribute__((vector_size(LANES / 2 * sizeof(gk_whole)), may_alias, aligned(sizeof(gk_whole))));
+#define GK_HALF_FADED(x, least) ((gk_half)((gk_half_bits)(x) & (((x) >= (least)) | ((x) <= -(least)))))
+#define GK_QUAD_FADED(x, least) ((gk_quad)((gk_bits)(x) & (((x) >= (least)) | ((x) <= -(least)))))
 /* a half in double, to and fro, and its quads: the form that compilers turn into single instructions */
 typedef double gk_eight __attribute__((vector_size(LANES / 2 * sizeof(double)), may_alias, aligned(sizeof(double))));
 #define GK_WIDER(half) __builtin_convertvector(half, gk_eight)

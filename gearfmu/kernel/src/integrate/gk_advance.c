@@ -11,6 +11,12 @@
 #define QUADS(array) ((gk_quad *)(array))
 #define SEEN_QUADS(array) ((const gk_quad *)(array))
 
+/* Displacements (m·√kg) and speeds (m/s·√kg) of damped oscillators end where they are less than these: products of the
+ * next step are then not denormal, squares in sums of energy included. STILL of gear groups, far below their rounding;
+ * UNTURNED: angle of a gear in a step. */
+static const gk_real STILL = 1e-15f;
+static const double GROUND_STILL = 1e-140, UNTURNED = 1e-12;
+
 /* half a step of the dashpots of the supports: speeds contract along them; what that takes */
 static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, double *v)
 {
@@ -34,7 +40,8 @@ static int turns(const gk_setup *setup, int g) { return GK_HAS(gyroscopic) ? set
 /* Ωh of a gear */
 static double angle_of(const gk_model *model, const gk_data *data, const gk_coefficients *k, int g)
 {
-    return k->h * GK_OF(data, v)[model->gear[g].rotor];
+    const double angle = k->h * GK_OF(data, v)[model->gear[g].rotor];
+    return fabs(angle) < UNTURNED ? 0.0 : angle;
 }
 
 /* predicts oscillators of a gear group as if alone, those of its n from `from` on */
@@ -133,7 +140,9 @@ static double correct_damped(const gk_setup *setup, const gk_work *work, const g
     const gk_half *bq = SEEN_HALVES(k->flow[g].bq), *bv = SEEN_HALVES(bv_left);
     const gk_half *weight = SEEN_HALVES(k->flow[g].inverse_s2);
     for (int i = 0; i < halves; i++) {
-        const gk_half q1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i], moved = q1 - q[i];
+        gk_half q1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i];
+        q1 = GK_HALF_FADED(q1, STILL), v1 = GK_HALF_FADED(v1, STILL);
+        const gk_half moved = q1 - q[i];
         sum += (f[i] + z[i]) * moved - weight[i] * ((v1 - v[i]) * (v1 + v[i]) + omega2[i] * (moved * (q1 + q[i])));
         q[i] = q1;
         v[i] = v1;
@@ -186,7 +195,9 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
     const gk_quad *bq = SEEN_QUADS(w->bq), *bv = SEEN_QUADS(w->bv), *weight = SEEN_QUADS(w->inverse_s2);
     const gk_quad *omega2 = SEEN_QUADS(base->omega2);
     for (int i = 0; i < n / 4; i++) {
-        const gk_quad x1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i], moved = x1 - x4[i];
+        gk_quad x1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i];
+        x1 = GK_QUAD_FADED(x1, GROUND_STILL), v1 = GK_QUAD_FADED(v1, GROUND_STILL);
+        const gk_quad moved = x1 - x4[i];
         sum += (f4[i] + z[i]) * moved - weight[i] * ((v1 - v0[i]) * (v1 + v0[i]) + omega2[i] * moved * (x1 + x4[i]));
         x4[i] = x1;
         v4[i] = v1;

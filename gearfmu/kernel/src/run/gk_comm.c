@@ -5,6 +5,7 @@
 
 static const double ULP = 2.220446049250313e-16;
 static const double JUMP = 10.0; /* rad/s: an input that begins to move faster than that was not there before */
+static const double MOST_TURNS = 1e9; /* more an input cannot be given */
 enum { HALVINGS = 3 };
 
 double gk_time(const gk_data *data)
@@ -197,11 +198,20 @@ static int starts_late(const gk_model *model, const gk_data *data)
     return 0;
 }
 
+/* A host may give an angle of a spring port but for whole turns: it is taken as the one nearest to where speed and
+ * acceleration carried the outer end. */
+static void unwrap(gk_data *data, int p)
+{
+    const double turns = (GK_OF(data, input)[p].phi - motion_in(data, p).phi) / (2.0 * GK_PI);
+    if (fabs(turns) > 0.5 && fabs(turns) < MOST_TURNS) GK_OF(data, hold)[p] -= 2.0 * GK_PI * gk_floor(turns + 0.5);
+}
+
 /* takes the inputs over; what they jump by is faded out over the step */
 static span begin(const gk_model *model, gk_work *work, gk_data *data)
 {
     span c = {.start = gk_time(data), .H = data->step_H};
     for (int p = 0; p < model->ports; p++) {
+        if (model->port[p].kind == PORT_SPRING) unwrap(data, p);
         const gk_motion next = motion_in(data, p), was = GK_OF(data, input)[p];
         c.jump[p] = (gk_motion){was.phi - next.phi, was.w - next.w, 0.0};
         c.capacity[p] = GK_OF(data, shaft)[p][V_CAPACITY];
