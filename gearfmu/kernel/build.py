@@ -338,7 +338,7 @@ def _libraries(name: str) -> list[str]:
 def _run(command: Sequence[str]) -> None:
     cache = _cache_folder()
     folders = {"ZIG_GLOBAL_CACHE_DIR": str(cache / "zig-global"), "ZIG_LOCAL_CACHE_DIR": str(cache / "zig-local")}
-    done = subprocess.run(command, capture_output=True, text=True, env={**folders, **os.environ})
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", env={**folders, **os.environ})
     if done.returncode:
         raise BuildError(f"the compiler failed: {' '.join(command)}\n{done.stdout}{done.stderr}".rstrip())
 

@@ -71,3 +71,14 @@ def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> No
         full_order(mesh, matrices, [SetInterface("edge")])
     with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
         full_order(mesh, matrices, [SetInterface("edge", "welded")])
+
+
+def test_a_byte_order_mark_and_line_ends_change_no_deck(tmp_path: Path) -> None:
+    nodes, hexes = brick("hexahedron20")
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0)}
+    plain = write_deck(tmp_path / "a.inp", nodes, {"hexahedron20": hexes}, ends)
+    marked = tmp_path / "b.inp"
+    marked.write_bytes(plain.read_text(encoding="utf-8").replace("\n", "\r\n").encode("utf-8-sig"))
+    one, other = read_mesh(plain, MM), read_mesh(marked, MM)
+    assert np.array_equal(one.nodes, other.nodes) and np.array_equal(one.sets["LEFT"], other.sets["LEFT"])
+    assert all(np.array_equal(cells, other.elements[kind]) for kind, cells in one.elements.items())
