@@ -32,12 +32,13 @@ from gearfmu.spec.forms.planetary import CarrierMeshSpec, CarrierSpec
 from gearfmu.spec.reading.base import Quantity, Spec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
-from gearfmu.stage import StageModel
+from gearfmu.stage import StageModel, Steady, simulate
 from gearfmu.stage.run.set_te import stage_te
 
 C = 4.0
 H = 10e-6  # s
 STEPS = 10  # of communication
+FAST = {"level": 1.0}
 COARSEST = BodySpec(
     strip_half_width=4.5e-4,
     modes=12,
@@ -138,8 +139,10 @@ def misfits(kind: Kind, parameters: Parameters) -> dict[str, float]:
     of work and losses over the largest energy that is stored."""
     found = []
     for c in (1.0, C):
+        own, driven = load_at(kind, c), model_at(kind, c).driven_by_springs()
         settings = {name: x * c ** exponent(unit) for name, (x, unit) in parameters.items()}
-        trace = load_at(kind, c).run(model_at(kind, c), settings)
+        wound = Steady(driven, own.speed, own.torque)  # without friction: it is no part of the relation
+        trace = simulate(driven, lambda time, wound=wound: wound(time), own.duration, own.step, FAST | settings)
         assert trace.meta["outcome"] == "completed"
         values = {name: v / c ** exponent(trace.channels[name].unit) for name, v in channels(trace).items()}
         assert values.pop("solver.h")[-1] == pytest.approx(H)
@@ -191,11 +194,11 @@ def test_frequencies_fall_with_the_size(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_transmission_error_grows_with_the_size(name: str) -> None:
-    """Stiffness per face width stays."""
+    """Stiffness per face width stays, to the roughness of light contacts."""
     kind = KINDS[name]
     small, large = (stage_te(model_at(kind, c), [load_at(kind, c).torque], 3) for c in (1.0, C))
     assert large.te / C == pytest.approx(small.te, rel=1e-6)
-    assert large.stage_stiffness / C == pytest.approx(small.stage_stiffness, rel=1e-5)
+    assert large.stage_stiffness / C == pytest.approx(small.stage_stiffness, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", NAMES)
