@@ -1,7 +1,8 @@
-/* Engagements that share a rotor. Each has a problem of its own, solved with the others' forces as they are; what those
- * do to its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and scattered, never
- * through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that
- * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
+/* Engagements of one island (gk_islands.c). Each has a problem of its own, solved with the others' forces as they are.
+ * Their effect on its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and
+ * scattered, never through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at
+ * γ = 1, so that three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with.
+ */
 #include "problem/gk_shared.h"
 #include "problem/gk_exchange.h"
 
@@ -231,8 +232,8 @@ static void take_along(const gk_coupled *c, int e, double *read)
         if (c->setup->engagements_of[mesh->side[w].gear] > 1) take_modes(c, &sliding, w, read);
 }
 
-/* Takes all that the others do; returns how much that has changed: at contacts against their largest gap and deflection,
- * at joints against their deflection alone, since the gap of a given torque is the angle of its port. */
+/* Takes all that the others do; returns how much that has changed: at contacts against their largest gap and
+ * deflection, at joints against their deflection alone, since the gap of a given torque is the angle of its port. */
 static double take_whole(const gk_coupled *c, int e)
 {
     gk_system *s = &c->work->engaged[e].system;

@@ -1,5 +1,5 @@
 /* Islands: engagements that act on each other within a step and are solved in turns (gk_couple.c). */
-#include "setup/gk_setup.h"
+#include "setup/gk_islands.h"
 
 /* Do two gears turn together, or read a common ground oscillator? Their lists ascend. */
 static int share_coordinates(const gk_gear *a, const gk_gear *b, int set)

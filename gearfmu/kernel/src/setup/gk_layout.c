@@ -1,5 +1,6 @@
 /* Where everything of gk_setup and gk_work lies: one block each, arrays behind the head. */
 #include "problem/gk_work.h"
+#include "setup/gk_islands.h"
 #include "setup/gk_tables.h"
 
 /* ---- the plan ---------------------------------------------------------------------------------------------------- */

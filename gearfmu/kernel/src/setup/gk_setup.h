@@ -353,8 +353,6 @@ static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double 
     memcpy(row, x + mesh->part[0].from, (size_t)mesh->part[0].width * sizeof *row);
     memcpy(row + mesh->part[0].width, x + mesh->part[1].from, (size_t)mesh->part[1].width * sizeof *row);
 }
-/* gk_islands.c */
-void gk_islands_find(const gk_model *model, gk_setup *setup);
 /* gk_lubrication.c */
 void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *mesh);
 double gk_lubrication_most(const gk_friction *friction);
