@@ -58,7 +58,8 @@ def deviating(stage: Stage) -> Stage:
     more: dict[str, Any] = {"friction": FrictionSpec(coefficient=0.08)}
     if not stage.planar:
         more["misalignment"] = Misalignment(out_of_plane=8e-6, in_plane=-5e-6, span=0.1)
-    meshes = tuple(mesh.model_copy(update=more) for mesh in stage.engagements)
+    # twice the backlash: the default step counts flanks within 50 µm as closed, near φ = 0, wherever that is
+    meshes = tuple(mesh.model_copy(update=more | {"backlash": 2 * mesh.backlash}) for mesh in stage.engagements)
     return stage.model_copy(update={"bodies": bodies, "rotors": rotors, "engagements": meshes})
 
 
