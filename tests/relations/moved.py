@@ -33,7 +33,7 @@ def speeds(stage: Stage) -> dict[str, float]:
 
 def start_of(stage: Stage, places: Mapping[str, float]) -> tuple[float, dict[str, int]]:
     """Angle (rad) of the input from which the teeth of a stage stand at `places`: angles (rad) of tooth 0 by gear, up
-    to whole pitches; and by gear how many pitches tooth 0 is behind its place."""
+    to whole pitches, to none where that can be; and by gear how many pitches tooth 0 is behind its place."""
     first = stage.engagements[0].gears[0]
     phases, speed = tooth_phases(stage), speeds(stage)
     pitches = {gear.name: 2 * math.pi / gear.teeth for gear in stage.gears}
@@ -45,12 +45,13 @@ def start_of(stage: Stage, places: Mapping[str, float]) -> tuple[float, dict[str
             for name, place in places.items()
         }
 
+    fitting = []
     for n in range(1000):
         start = (places[first] - phases[first] + n * pitches[first]) / speed[stage.rotor_of(first)]
         off = behind(start)
         if all(abs(number - round(number)) < WHOLE for number in off.values()):
-            return start, {name: round(number) for name, number in off.items()}
-    raise AssertionError("no start of the input brings all teeth to their places")
+            fitting.append((start, {name: round(number) for name, number in off.items()}))
+    return next((found for found in fitting if not any(found[1].values())), fitting[0])
 
 
 def renamed(stage: Stage, behind: Mapping[str, int]) -> Stage:

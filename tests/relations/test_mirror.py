@@ -229,7 +229,6 @@ def check(kind: Kind, plane: str) -> None:
     found["mesh.te"] = found["mesh.te"] - np.mean(found["mesh.te"] - expected["mesh.te"])  # the play
     apart = differences(expected, found)
     worst = max(apart, key=apart.__getitem__)
-    print(kind.name, plane, worst, apart[worst])
     assert apart[worst] < SAME, f"{worst} differs by {apart[worst]:.2g} in the image"
 
 
@@ -253,7 +252,6 @@ def check_statics(kind: Kind) -> None:
         expected, got = np.array(found[0]), np.array(found[1])
         order = [image_of_mesh(stage, number) for number in range(len(names))]
         apart = np.abs(got[order] - expected).max(axis=0) / np.abs(expected).max(axis=0)
-        print(kind.name, position, apart)
         assert apart.max() < SAME, f"{got[order]} for {expected}"
 
 
@@ -274,7 +272,8 @@ def test_the_image_along_the_axes() -> None:
     check(KINDS["helical"], ALONG)
 
 
-@pytest.mark.parametrize("name", ["train", pytest.param("set", marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["train", "set"])
 def test_the_image_across_of_several_meshes(name: str) -> None:
     """Statics: without play both flanks of a mesh are near, and steps are too short for a test."""
     check_statics(KINDS[name])
