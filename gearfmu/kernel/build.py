@@ -42,6 +42,7 @@ FLAGS = (
     "-std=c99",
     "-O3",
     "-ffp-contract=off",
+    "-fno-tree-slp-vectorize",  # gcc's makes fused operations of sums beside differences in spite of the flag above
     "-fno-math-errno",
     "-fvisibility=hidden",
     "-Wall",

@@ -4,6 +4,7 @@ GK_ASSERT, of which none fails."""
 from __future__ import annotations
 
 import hashlib
+import platform
 import re
 import struct
 import subprocess
@@ -14,10 +15,12 @@ from pathlib import Path
 import pytest
 from builds import checked_library
 from golden import REALS
+from golden_stages import stage_digests
 from probes import build, compilers, source_folder
 from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
+from gearfmu.kernel.build import FLAGS, fmi_headers
 
 FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": (), "native": ("-march=native",)}
 VARIANTS = [pytest.param(c, f, marks=pytest.mark.full) for c in compilers() for f in FLAG_SETS]
@@ -59,6 +62,33 @@ def run(library: Path, ports: tuple[str, str], integrator: int, steps: int) -> b
 @pytest.mark.parametrize(("compiler", "flags"), VARIANTS)
 def test_same_bits_from_every_compiler(system_library: Path, compiler: str, flags: str, tmp_path: Path) -> None:
     assert bits(build(tmp_path, compilers()[compiler], FLAG_SETS[flags])) == bits(system_library)
+
+
+FUSED_ONCE = ("problem/gk_nodal.c", "run/gk_amplitudes.c", "run/gk_supports.c", "setup/gk_deviation.c")
+WITH_FMA = ("-march=x86-64-v3", "-DGK_PORTABLE")  # processors of 2013 and later
+WHOLE = [pytest.param("**/*.c", marks=pytest.mark.full)]
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or "gcc" not in compilers(), reason="needs gcc for x86-64")
+@pytest.mark.parametrize("files", [*FUSED_ONCE, *WHOLE])
+def test_no_product_and_sum_are_fused(files: str) -> None:
+    """gcc's straight-line vectoriser fuses products with a sum beside a difference (vfmaddsub), whatever -ffp-contract
+    says: other bits on processors that can, first with deviations and nodal contact."""
+    paths = list(source_folder().glob(files))
+    assert paths
+    for path in paths:
+        line = ["gcc", *FLAGS, *WITH_FMA, f"-I{source_folder()}", f"-I{fmi_headers()}", "-S", str(path), "-o", "-"]
+        done = subprocess.run(line, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert not re.search(r"\bvfn?m(add|sub)", done.stdout), path.name
+
+
+@pytest.mark.full
+@pytest.mark.skipif("gcc" not in compilers(), reason="needs gcc")
+def test_a_native_build_runs_every_kind_of_stage_with_the_same_bits(system_library: Path, tmp_path: Path) -> None:
+    native = build(tmp_path, ("gcc",), ("-march=native",))
+    for stage in ("pair", "deviating", "nodal", "pin_errors"):
+        assert stage_digests(native, f"{stage}/") == stage_digests(system_library, f"{stage}/")
 
 
 def test_same_bits_with_checks_and_patterned_memory(system_library: Path) -> None:

@@ -1,5 +1,5 @@
-"""Motion that fades: of a pair that has lost its load nothing becomes denormal, which costs many processors two to three
-times a loaded step. The kernel does so by its own arithmetic and leaves the processor's control word alone."""
+"""Motion that fades: of a pair that has lost its load nothing becomes denormal, which many processors compute two to
+three times as slowly. The kernel does so by its own arithmetic and leaves the processor's control word alone."""
 
 from __future__ import annotations
 

@@ -10,9 +10,11 @@
 #ifdef GK_DOUBLE_MODES
 typedef double gk_real; /* test build: modal states and rows of the gear groups in double */
 typedef int64_t gk_whole;
+#define GK_SIGN INT64_MIN
 #else
 typedef float gk_real;
 typedef int32_t gk_whole;
+#define GK_SIGN INT32_MIN
 #endif
 enum { LANES = 16 }; /* sums run in this many lanes, whatever the vector width */
 
@@ -127,8 +129,8 @@ typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)),
  * which many processors compute slowly; by the same bits on all */
 typedef gk_whole gk_half_bits
     __attribute__((vector_size(LANES / 2 * sizeof(gk_whole)), may_alias, aligned(sizeof(gk_whole))));
-#define GK_HALF_FADED(x, least) ((gk_half)((gk_half_bits)(x) & (((x) >= (least)) | ((x) <= -(least)))))
-#define GK_QUAD_FADED(x, least) ((gk_quad)((gk_bits)(x) & (((x) >= (least)) | ((x) <= -(least)))))
+#define GK_HALF_FADED(x, least) ((gk_half)((gk_half_bits)(x) & (((x) >= (least)) | ((x) <= -(least)) | GK_SIGN)))
+#define GK_QUAD_FADED(x, least) ((gk_quad)((gk_bits)(x) & (((x) >= (least)) | ((x) <= -(least)) | INT64_MIN)))
 /* a half in double, to and fro, and its quads: the form that compilers turn into single instructions */
 typedef double gk_eight __attribute__((vector_size(LANES / 2 * sizeof(double)), may_alias, aligned(sizeof(double))));
 #define GK_WIDER(half) __builtin_convertvector(half, gk_eight)

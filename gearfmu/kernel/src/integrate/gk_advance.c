@@ -44,15 +44,16 @@ static double angle_of(const gk_model *model, const gk_data *data, const gk_coef
     return fabs(angle) < UNTURNED ? 0.0 : angle;
 }
 
-/* predicts oscillators of a gear group as if alone, those of its n from `from` on */
-static void predict_modes(const gk_flow *w, const gk_real *state, int n, int from, int to, gk_work *work, int g)
+/* predicts oscillators of a gear group as if alone, those of n from `from` to the end of a part */
+static void predict_modes(const gk_modal *m, const gk_flow *w, const gk_real *state, int from, gk_real *displaced,
+                          gk_real *speeds)
 {
-    const int halves = 2 * n / LANES;
+    const int halves = 2 * m->n / LANES, end = 2 * (from / m->pairs + 1) * m->pairs / LANES;
     const gk_half *q = SEEN_HALVES(state), *v = q + halves, *f = v + halves;
     const gk_half *d11 = SEEN_HALVES(w->d11), *a12 = SEEN_HALVES(w->a12), *b0q = SEEN_HALVES(w->b0q);
     const gk_half *a21 = SEEN_HALVES(w->a21), *d22 = SEEN_HALVES(w->d22), *b0v = SEEN_HALVES(w->b0v);
-    gk_half *qp = HALVES(work->qp[g]), *vp = HALVES(work->vp[g]);
-    for (int i = 2 * from / LANES; i < 2 * to / LANES; i++) {
+    gk_half *qp = HALVES(displaced), *vp = HALVES(speeds);
+    for (int i = 2 * from / LANES; i < end; i++) {
         qp[i] = q[i] + (d11[i] * q[i] + a12[i] * v[i] + b0q[i] * f[i]);
         vp[i] = v[i] + (a21[i] * q[i] + d22[i] * v[i] + b0v[i] * f[i]);
     }
@@ -65,7 +66,8 @@ static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *
     const gk_flow *w = &k->flow[g];
     const gk_real *state = gk_modal_seen(setup, data, g);
     if (turned) gk_frame_predict(&setup->modal[g], w, angle_of(model, data, k, g), state, work, g);
-    for (int i = 0; i < n; i += pairs) predict_modes(w, state, n, i + turned, i + pairs, work, g);
+    for (int i = 0; i < n; i += pairs)
+        if (turned < pairs) predict_modes(&setup->modal[g], w, state, i + turned, work->qp[g], work->vp[g]);
     work->y[g] = work->qp[g];
     if (!k->curved_read) return;
     for (int i = 0; i < n; i++) work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];

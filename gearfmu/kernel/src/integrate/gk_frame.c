@@ -38,9 +38,9 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
 }
 
 /* ---- gear groups ------------------------------------------------------------------------------------------------- */
-/* A slow gear turns by less than the last place of a speed in single precision: rounded after its turn, the small member
- * of a pair would gain energy and the large one not lose it. So speeds are in double from the first turn of a step to the
- * second, and rounded once with all that changes them. */
+/* A slow gear turns by less than the last place of a speed in single precision: rounded after its turn, the small
+ * member of a pair would gain energy and the large one not lose it. So speeds are in double from the first turn of a
+ * step to the second, and rounded once with all that changes them. */
 
 /* turns members v, w of eight pairs by half a step (17j): by the angle Ωh times the rate, with the cosine and sine of
  * Cayley's form. half: ½Ωh. */
