@@ -72,7 +72,8 @@ def stage_modes(
         np.stack([own.values[k][order[lowest]] for own, order in zip(found, orders, strict=True)]) for k in range(4)
     )
     meshes = tuple(mesh.name for mesh in model.stage.engagements)
-    rigid = np.stack([own.rigid for own in found])
+    most = max(own.rigid.size for own in found)
+    rigid = np.stack([np.pad(own.rigid, (most - own.rigid.size, 0)) for own in found])
     return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, rigid)
 
 
@@ -108,10 +109,12 @@ def linearised(
 
 
 def free_rotations(stage: Stage, linear: LinearModel) -> np.ndarray:
-    """(n, d): rotations of the stage that neither its meshes, as rigid gears, nor springs of ports resist, orthonormal
-    by the mass."""
+    """(n, d): rotations that neither meshes in contact, as rigid gears, nor springs of ports resist, orthonormal by the
+    mass: of the whole stage, of a planet without load."""
     spins = np.flatnonzero(linear.group == SPIN)
-    rolls = np.array([[float(own.get(name, 0)) for name in stage.rotors] for own in rolling(stage)])
+    carrying, equations = set(linear.label[:, 0].tolist()), rolling(stage)
+    equations = [own for e, own in enumerate(equations) if e >= len(stage.engagements) or e in carrying]
+    rolls = np.array([[float(own.get(name, 0)) for name in stage.rotors] for own in equations])
     of_rotors = np.zeros((len(rolls), len(spins)))
     number = linear.number[spins]
     known = number < len(stage.rotors)

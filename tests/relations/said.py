@@ -112,7 +112,7 @@ class Said:
     def drive_sign(self, mesh: str) -> float:
         """Sign of the force under a positive torque on the first port (channel: torque of the stage on the shaft)."""
         torque = -next(values for name, values in self.trace.items() if re.fullmatch(r"\w+\.tau", name))
-        return float(np.sign((self.trace[f"{mesh}.force"] * torque).sum()))
+        return -1.0 if (self.trace[f"{mesh}.force"] * torque).sum() < 0 else 1.0
 
     def share(self, mesh: str) -> float:
         central = mesh.rpartition("_")[0]
@@ -126,7 +126,7 @@ class Said:
     def face_load_factor(self, mesh: str, samples: np.ndarray) -> float:
         names = [n for n in self.trace if n.startswith(f"{mesh}.slice_") and np.any(self.trace[n])]
         means = np.abs([self.trace[name][samples].mean() for name in names])
-        return float(means.max() / means.mean())
+        return float(means.max() / means.mean()) if means.any() else 0.0  # a planet without load
 
     # ---- columns of the CSV files ------------------------------------------------------------------------------------
     def column(self, head: str, table: dict[str, np.ndarray]) -> np.ndarray | None:
