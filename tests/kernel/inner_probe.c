@@ -50,3 +50,15 @@ GK_API void probe_set_gamma(gk_setup *setup, double gamma)
 {
     for (int i = 0; i < GAMMAS; i++) setup->gamma_at[i] = gamma;
 }
+
+/* out: number of the first of four nodes on a grid of `count` from `form` to `tip`, their weights and slopes */
+GK_API void probe_grid(double form, double tip, int count, double roll, double *out)
+{
+    gk_gear gear;
+    memset(&gear, 0, sizeof gear);
+    gear.s_form = form, gear.s_tip = tip;
+    const gk_grid grid = gk_grid_flank(&gear, count, roll);
+    *out++ = grid.index;
+    memcpy(out, grid.weight, sizeof grid.weight);
+    memcpy(out + 4, grid.slope, sizeof grid.slope);
+}
