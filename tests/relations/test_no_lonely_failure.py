@@ -36,16 +36,12 @@ def lonely(model: StageModel, count: int, seed: int) -> list[tuple[float, float,
     kernel, place, most = statics_of(model), place_of(model, None), largest_torque(model)
     dice, found = np.random.default_rng(seed), []
     for number in range(count):
-        size = dice.uniform() if number % 3 else 10.0 ** dice.uniform(-5, 0)
-        torque, part = most * (size if number % 4 else -size), dice.uniform()
-        at = -part * place.pitch
-        near = [
-            solved(kernel, at, torque * (1 + STEP)),
-            solved(kernel, at, torque, keep=True),
-            solved(kernel, at, torque * (1 - NEAR), keep=True),
-            solved(kernel, at, torque * (1 - STEP), keep=True),
-            solved(kernel, at, torque),
-        ]
+        torque, part = most * (dice.uniform() if number % 3 else 10.0 ** dice.uniform(-5, 0)), dice.uniform()
+        torque = torque if number % 5 else float(np.round(torque)) or 1.0
+        part = part if number % 7 else round(part * 41) / 41
+        torque, at = -torque if number % 4 == 1 else torque, -part * place.pitch
+        near = [solved(kernel, at, torque)]
+        near += [solved(kernel, at, torque * (1 + share), keep=True) for share in (0, -STEP, STEP, NEAR, -NEAR)]
         if any(near) and not all(near):
             found.append((torque, part, str(near)))
     return found

@@ -35,4 +35,4 @@ def test_a_set_with_61_teeth_in_its_ring_is_reduced_and_moves(tmp_path: Path) ->
     assert shares == pytest.approx(np.ones(shares.shape), abs=0.05)
     model = model.driven_by_springs()
     trace = simulate(model, Steady(model, 40.0, 300.0), 1e-3, 20e-6, {"level": 1.0})
-    assert trace.meta["outcome"] == "completed" and trace["sun_planet1.force_mean"][-1] > 0
+    assert trace.meta["outcome"] == "completed" and abs(trace["sun_planet1.force_mean"][-1]) > 100
