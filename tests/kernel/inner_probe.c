@@ -65,3 +65,15 @@ GK_API double probe_friction(const double *given)
         .load = given[6], .total = given[7], .slides = given[8], .rolls = given[9], .turns = given[10]};
     return gk_lubrication_coefficient(&law, given[5], &at);
 }
+
+/* out: number of the first of four nodes on a grid of `count` from `form` to `tip`, their weights and slopes */
+GK_API void probe_grid(double form, double tip, int count, double roll, double *out)
+{
+    gk_gear gear;
+    memset(&gear, 0, sizeof gear);
+    gear.s_form = form, gear.s_tip = tip;
+    const gk_grid grid = gk_grid_flank(&gear, count, roll);
+    *out++ = grid.index;
+    memcpy(out, grid.weight, sizeof grid.weight);
+    memcpy(out + 4, grid.slope, sizeof grid.slope);
+}

@@ -10,7 +10,8 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.geometry.planetary import PlanetaryGeometry, mount_spaces
+from gearfmu.spec.forms.expand import motion_problems
 from gearfmu.spec.proposals.numbers import Wish, draft_of, new_from_numbers
 from gearfmu.spec.stage import load_stage
 
@@ -41,6 +42,17 @@ def test_a_set_is_valid_as_it_is_written(tmp_path: Path) -> None:
     assert spec.ring.mounts.points == 6 and len(spec.carrier.coupling) == 6
     for mesh in (geometry.sun_mesh, geometry.ring_mesh):
         assert mesh.nominal_backlash == pytest.approx(0.0, abs=1e-8)
+
+
+@pytest.mark.parametrize("teeth", [(19, 21, 61), (21, 23, 67), (23, 24, 71), (23, 25, 73)], ids=lambda t: str(t[2]))
+def test_a_ring_whose_teeth_no_number_divides_moves_on_six_mounts(teeth: tuple[int, int, int], tmp_path: Path) -> None:
+    """Sees mounts that a ring may have only at every n-th tooth: such sets could not move at all."""
+    planets = next(n for n in (4, 3, 2, 5) if (teeth[0] + teeth[2]) % n == 0)
+    spec = load_stage(new_from_numbers("mine", Wish(teeth, 2.5e-3, 20e-3, planets=planets), tmp_path))
+    assert spec.ring.mounts.points == 6 and motion_problems(spec) == []
+    spaces = mount_spaces(spec.ring.teeth, 6)
+    assert len(set(spaces)) == 6
+    assert all(abs(space - k * spec.ring.teeth / 6) <= 0.5 for k, space in enumerate(spaces))
 
 
 @pytest.mark.parametrize("wish", [PAIR, SET, replace(SET, helix=0.2)], ids=["pair", "set", "helical set"])

@@ -1,0 +1,134 @@
+"""Refinement: a discretisation twice as fine moves results by less than the product states: every harmonic of the mesh
+by 1 dB or 1 nm, the order levels of forces by 1 dB or 1e-3 of the mean. And no level is worse than a cheaper one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from kinds import COARSE, KINDS, assembled, bodies_of, level_number
+
+from gearfmu.body.toothed import reduced_gear
+from gearfmu.spec.forms.members import members
+from gearfmu.stage import StageModel, Steady
+from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.trace import Trace
+
+HARMONICS, POSITIONS = 8, 64
+LEVEL, LENGTH = 1.0, 1e-9  # dB, m
+SHARE = 1e-3  # of the mean force: below it an order is not heard
+HELICAL = "cut slices of helical pairs open as a whole: harmonics from 3 on change by 8 to 20 dB with their number"
+
+
+def harmonics(model: StageModel, torque: float, positions: int = POSITIONS, **parameters: float) -> np.ndarray:
+    """(HARMONICS,) m, rms, of the static transmission error."""
+    return stage_te(model, [torque], positions, **parameters).harmonics(HARMONICS)[0]
+
+
+def moved(coarse: np.ndarray, fine: np.ndarray, least: float) -> list[str]:
+    """Harmonics that move by more than LEVEL and more than `least`, in words."""
+    change = 20 * np.log10(np.maximum(coarse, 1e-30) / np.maximum(fine, 1e-30))
+    wrong = (np.abs(change) > LEVEL) & (np.abs(coarse - fine) > least)
+    return [f"{k + 1}: {coarse[k]:.3g} → {fine[k]:.3g}" for k in np.flatnonzero(wrong)]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pair",
+        pytest.param("internal", marks=pytest.mark.full),
+        pytest.param("helical", marks=[pytest.mark.full, pytest.mark.xfail(strict=True, reason=HELICAL)]),
+        pytest.param("train", marks=[pytest.mark.full, pytest.mark.xfail(strict=True, reason=HELICAL)]),
+    ],
+)
+def test_twice_the_slices(name: str) -> None:
+    kind = KINDS[name]
+    five, ten = (harmonics(kind.model(), kind.torque, slices=slices) for slices in (5.0, 10.0))
+    assert moved(five, ten, LENGTH) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["pair", "internal", *(pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train"))]
+)
+def test_twice_the_positions(name: str) -> None:
+    """What a harmonic above half the number of positions folds down."""
+    kind = KINDS[name]
+    few, many = (harmonics(kind.model(), kind.torque, positions) for positions in (POSITIONS, 2 * POSITIONS))
+    assert moved(few, many, LENGTH) == []
+
+
+@cache
+def _refined(**finer: Any) -> StageModel:
+    """The internal pair with finer bodies."""
+    stage = KINDS["internal"].stage
+    body = COARSE.model_copy(update=finer)
+    bodies = {name: own.model_copy(update={"body": body}) for name, own in stage.bodies.items()}
+    finer_stage = stage.model_copy(update={"bodies": bodies})
+    made = {name: reduced_gear(member, "0" * 64) for name, member in members(finer_stage).items()}
+    return assembled(finer_stage, made)
+
+
+@pytest.mark.parametrize("finer", [{"modes": 48}, {"roll_points": 16}, {"width_functions": 5}], ids=lambda f: [*f][0])
+def test_twice_the_numbers_of_a_body(finer: Mapping[str, int]) -> None:
+    kind = KINDS["internal"]
+    coarse = harmonics(kind.model(), kind.torque)
+    assert moved(coarse, harmonics(_refined(**finer), kind.torque), LENGTH) == []
+
+
+@pytest.mark.parametrize("name", ["pair", pytest.param("helical", marks=pytest.mark.full)])
+def test_twice_the_rolls_of_the_grid(name: str) -> None:
+    from gearfmu.stage import assemble
+    from gearfmu.stage.build.tables import ROLLS
+
+    kind, known = KINDS[name], bodies_of(KINDS[name].file)
+    finer = assemble(kind.stage, [known[body] for body in known], 2 * ROLLS)
+    assert moved(harmonics(kind.model(), kind.torque), harmonics(finer, kind.torque), LENGTH) == []
+
+
+def run(name: str, level: str, h: float = 0.0, step: float = 20e-6, duration: float = 3e-3) -> Trace:
+    """A kind's own run; h 0: the default step of the level."""
+    kind = KINDS[name]
+    model = kind.model().driven_by_springs()
+    settings = {"level": float(level_number(model, level)), "h": h}
+    return simulate(model, Steady(model, kind.speed, kind.torque), duration, step, settings)
+
+
+def alternating(trace: Trace, ending: str, every: float = 20e-6) -> np.ndarray:
+    """(channels, samples) of the last two thirds, without means."""
+    skip = round(every / (trace.time[1] - trace.time[0]))
+    rows = np.array([c.values[::skip] for name, c in trace.channels.items() if name.endswith(ending)])
+    rows = rows[:, rows.shape[1] // 3 :]
+    return np.asarray(rows - rows.mean(axis=1, keepdims=True))
+
+
+def rms(rows: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(rows**2)))
+
+
+@pytest.mark.parametrize("name", ["pair", pytest.param("train", marks=pytest.mark.full)])
+def test_half_the_step_and_half_the_communication_step(name: str) -> None:
+    """rms of the transmission error and of the bearings' forces, against the same run at half the default step and at
+    half the communication step."""
+    plain = run(name, "fast")
+    h = 0.5 * float(plain["solver.h"][-1])
+    for finer in (run(name, "fast", h), run(name, "fast", step=10e-6)):
+        for ending in (".te", ".fx_mean", ".fy_mean") if finer.time[1] > 15e-6 else (".te",):
+            change = 20 * np.log10(rms(alternating(plain, ending)) / rms(alternating(finer, ending)))
+            assert abs(change) < LEVEL, ending
+
+
+MARGIN = 1.25  # at equal error the sign of what a level leaves out decides: some parts of it cancel
+
+
+@pytest.mark.parametrize("name", ["pair", *(pytest.param(name, marks=pytest.mark.full) for name in ("set", "helical"))])
+def test_level_full_is_not_worse_than_standard_at_their_default_steps(name: str) -> None:
+    """Against level full at a tenth of the step: transmission error and mesh forces."""
+    reference = run(name, "full", 0.625e-6)
+    for ending in (".te", ".force_mean"):
+        exact = alternating(reference, ending)
+        standard, full = (rms(alternating(run(name, level), ending) - exact) for level in ("standard", "full"))
+        assert full < MARGIN * standard, (ending, full / rms(exact), standard / rms(exact))
