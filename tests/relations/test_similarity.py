@@ -220,6 +220,8 @@ def test_friction_of_a_constant_coefficient_scales(name: str) -> None:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [seed for seed in range(20) if not drawn(seed).name.startswith("set")])
 def test_a_drawn_stage_scales(seed: int) -> None:
+    """Not spur sets, whose γ is lowered for one size alone: flanks closer than 50 µm count as closed in the limit of
+    the step (gk_limit.c), and pin errors and runout reach that far in the larger one."""
     holds(drawn(seed), {}, 5e-3)
