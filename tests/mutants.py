@@ -109,7 +109,7 @@ MUTANTS: tuple[Mutant, ...] = (
         "gk_supports.c",
         "stage/test_bearing_forces.py stage/test_planetary_statics.py stage/test_planetary_motion.py",
         ("[q] = x[q] - kappa[q] * f[q];", "[q] = x[q] + kappa[q] * f[q];"),
-        ("out[s] += model->ground[base->set].damper[s] *", "out[s] -= model->ground[base->set].damper[s] *"),
+        ("of_spring[s] = out[s] - model->ground", "of_spring[s] = out[s] + model->ground"),
         ("force[s + 1] = sine * x + cosine * y;", "force[s + 1] = cosine * y - sine * x;"),
     ),
     *of(
