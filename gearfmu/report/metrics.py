@@ -227,8 +227,8 @@ def _coefficients(angle: np.ndarray, values: np.ndarray, orders: np.ndarray, wid
     """Rms amplitude of each order by Hann-weighted least squares in angle  (docs/theory eq. 14)."""
     weight = np.cos(np.pi * angle / width) * np.sqrt(np.gradient(angle))
     harmonics = np.outer(angle, orders)
-    basis = np.column_stack([np.ones_like(angle), np.cos(harmonics), np.sin(harmonics)])
-    solution = np.linalg.lstsq(basis * weight[:, None], values * weight, rcond=None)[0]
+    basis = np.column_stack([np.ones_like(angle), np.cos(harmonics), np.sin(harmonics)]) * weight[:, None]
+    solution = np.linalg.solve(basis.T @ basis, basis.T @ (values * weight))  # columns are all but orthogonal
     k = orders.size
     return np.hypot(solution[1 : k + 1], solution[k + 1 :]) / np.sqrt(2)
 
