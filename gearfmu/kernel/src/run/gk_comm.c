@@ -4,7 +4,7 @@
 #include "setup/gk_kinematics.h"
 
 static const double ULP = 2.220446049250313e-16;
-static const double JUMP = 10.0; /* rad/s: an input that begins to move faster than that was not there before */
+static const double JUMP = 10.0;      /* rad/s: an input that begins to move faster than that was not there before */
 static const double MOST_TURNS = 1e9; /* more an input cannot be given */
 enum { HALVINGS = 3 };
 
