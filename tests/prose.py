@@ -1,4 +1,4 @@
-"""Counts of a page's prose: words, sentences that are too long, words that the pages should do without.
+"""Counts of a page's prose: sentences that are too long, words that the pages should do without.
 
 `python tests/prose.py [PAGE …]` lowers the limits of tests/prose.json to today's counts, raises none, and prints the
 faults of the named pages."""
@@ -54,11 +54,6 @@ def counts(page: Path) -> tuple[int, int]:
     return len(too_long(text)), len(banned(text))
 
 
-def words() -> int:
-    """All words of the pages, as `wc -w` counts them."""
-    return sum(len(page.read_text(encoding="utf-8").split()) for page in PAGES)
-
-
 def name(page: Path) -> str:
     """A page's path in the checkout."""
     return page.relative_to(ROOT).as_posix()
@@ -66,7 +61,7 @@ def name(page: Path) -> str:
 
 def lowered(limits: dict[str, list[int]]) -> dict[str, list[int]]:
     """Limits of pages as they are or as today's counts, whichever is lower; pages without a fault have no line."""
-    found = {"words": [words()]} | {name(page): list(counts(page)) for page in PAGES}
+    found = {name(page): list(counts(page)) for page in PAGES}
     lower = {k: [min(pair) for pair in zip(found[k], limit, strict=True)] for k, limit in limits.items() if k in found}
     return {key: value for key, value in (lower or found).items() if any(value)}
 

@@ -161,9 +161,8 @@ def test_make_targets_named_in_the_readme_exist() -> None:
 
 
 def test_prose_gets_no_worse() -> None:
-    """Long sentences and banned words of a page, and all words but for 1 %: tests/prose.json may only fall."""
+    """Long sentences and banned words of a page: tests/prose.json may only fall."""
     limits = json.loads(prose.LIMITS.read_text(encoding="utf-8"))
-    assert prose.words() <= 1.01 * limits["words"][0]
     worse = []
     for page in prose.PAGES:
         found, most = prose.counts(page), limits.get(prose.name(page), [0, 0])

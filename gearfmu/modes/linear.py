@@ -32,7 +32,7 @@ from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.limits import places_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
-FULL = 3.0  # level at which every oscillator is dynamic
+EVERY = {"level": 3.0, "h": 1e-7}  # full, at a step that resolves every oscillator
 SPARE = 10  # modes followed beyond those asked for: some leave the lowest ones on their way through the pitch
 RIGID = 0.5  # of a mode's kinetic energy in free rotation of the stage: beyond it the mode is that rotation
 
@@ -132,7 +132,7 @@ def free_rotations(stage: Stage, linear: LinearModel) -> np.ndarray:
 
 def full_kernel(model: StageModel) -> Kernel:
     """The kernel prepared at level full."""
-    kernel = model.kernel(level=FULL)
+    kernel = model.kernel(**EVERY)
     kernel.prepare()
     return kernel
 

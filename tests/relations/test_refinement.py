@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 from kinds import COARSE, KINDS, assembled, bodies_of, level_number
 
+from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.members import members
+from gearfmu.spec.scene import load_scene
+from gearfmu.spec.stage import load_set
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.run.set_te import stage_te
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.trace import Trace
+from gearfmu.study.sets import Point, errors, measure, models_for, window
 
 HARMONICS, POSITIONS = 8, 64
 LEVEL, LENGTH = 1.0, 1e-9  # dB, m
@@ -121,7 +125,7 @@ def test_half_the_step_and_half_the_communication_step(name: str) -> None:
             assert abs(change) < LEVEL, ending
 
 
-MARGIN = 1.25  # at equal error the sign of what a level leaves out decides: some parts of it cancel
+MARGIN = 1.05  # at equal error the sign of what a level leaves out decides: some parts of it cancel
 
 
 @pytest.mark.parametrize("name", ["pair", *(pytest.param(name, marks=pytest.mark.full) for name in ("set", "helical"))])
@@ -132,3 +136,18 @@ def test_level_full_is_not_worse_than_standard_at_their_default_steps(name: str)
         exact = alternating(reference, ending)
         standard, full = (rms(alternating(run(name, level), ending) - exact) for level in ("standard", "full"))
         assert full < MARGIN * standard, (ending, full / rms(exact), standard / rms(exact))
+
+
+@pytest.mark.full
+def test_level_full_is_not_worse_than_standard_under_a_brake() -> None:
+    """A set under a brake whose torque follows sampled speeds. Sees: oscillators that the step does not follow, dynamic
+    at level full, ring with such a brake (.99 % of the transmission error where standard has .46)."""
+    scene, spec = window(load_scene("planetary_paper")), load_set("planetary54")
+    model = models_for(scene, load_bodies(spec), set=spec.set, carrier=spec.carrier)
+
+    def run(level: str, h: float) -> Any:
+        return measure(scene, model, Point(level, h=h, slices=scene.stage.slices)).signals
+
+    exact = run("full", 0.4e-6)
+    standard, full = (errors(run(level, 0.0), exact) for level in ("standard", "full"))
+    assert full.te < MARGIN * standard.te and full.force < MARGIN * standard.force

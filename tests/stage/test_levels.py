@@ -65,3 +65,17 @@ def test_a_level_with_its_own_integrator_runs_what_is_said(plain: StageModel, le
         kernel.step(0.0, 2e-5)
         forces.append([kernel.get("mesh.force"), kernel.get("solver.steps")])
     assert forces[0] == forces[1]
+
+
+def test_level_full_takes_the_oscillators_that_its_step_follows(plain: StageModel) -> None:
+    """All that standard takes, more with a shorter step, in the end all that are stored; explicit integrators all."""
+
+    def taken(**parameters: float) -> int:
+        kernel = plain.kernel(**parameters)
+        kernel.prepare()
+        kernel.initialize()
+        return int(kernel.get("solver.n_dyn"))
+
+    every, standard = taken(level=5.0), taken(level=2.0)
+    by_step = [taken(level=3.0, h=h) for h in (20e-6, 0.0, 4e-6, 1e-7)]
+    assert standard <= by_step[0] <= by_step[1] < by_step[2] < by_step[3] == every

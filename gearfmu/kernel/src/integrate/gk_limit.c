@@ -7,6 +7,7 @@
  * that stick follow the gaps: C less C_nt C_tt⁻¹ C_tn, and C − K likewise. */
 #include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
+#include "setup/gk_choose.h"
 #include "setup/gk_tables.h"
 #include <stdio.h>
 
@@ -317,7 +318,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
     const int corrected = gk_scheme_of(setup->integrator)->corrected;
     const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work, data)
                                                        : INFINITY; /* explicit: a limit of stability */
-    double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
+    double limit = gk_min(gk_longest_step(model), WITHIN * stable), h = wished;
     if (corrected) keep_all(model, setup, work, data);
     if (!(wished > 0.0)) h = default_step(model, setup, work, data, limit, corrected);
     if (h > period / 8.0) {

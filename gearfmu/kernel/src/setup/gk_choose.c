@@ -4,6 +4,11 @@
 #include "setup/gk_setup.h"
 #include <stdio.h>
 
+static const double RESOLVED = 4.0; /* ωh up to which the step follows an oscillator */
+
+/* the longest step that a run is given which asks for none, s */
+double gk_longest_step(const gk_model *model) { return gk_min(model->h_max, model->period_min / 40.0); }
+
 /* ---- level and integrator ---------------------------------------------------------------------------------------- */
 static int has_nodes(const gk_model *model, const gk_data *data)
 {
@@ -82,6 +87,15 @@ static gk_outcome check_friction(const gk_model *model, const gk_setup *setup, c
     return GK_OK;
 }
 
+/* ω up to which oscillators beyond those of level standard are dynamic at level full, rad/s. Faster ones would only
+ * ring with the step: they follow their forces at once, as those above the cut of other levels do. */
+static double highest_of(const gk_model *model, const gk_data *data, const gk_setup *setup)
+{
+    const double wished = data->stage[V_H];
+    if (setup->level != LEVEL_FULL || gk_scheme_of(setup->integrator)->is_explicit) return INFINITY;
+    return RESOLVED / (wished > 0.0 ? wished : gk_longest_step(model));
+}
+
 /* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal
  * contact, rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
@@ -106,6 +120,7 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
         return GK_BAD_VALUE;
     }
     if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
+    setup->highest = highest_of(model, data, setup);
     gk_outcome outcome = choose_contact(model, data, setup, message);
     if (!outcome) outcome = check_needs(setup, message);
     if (!outcome) outcome = check_friction(model, setup, message);
@@ -132,11 +147,14 @@ int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
 {
     GK_ASSERT(gk_is_gear(model, g));
     const gk_gear *gear = &model->gear[g];
+    int all = gear->level_modes[2];
     switch (setup->level) {
     case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? gear->level_modes[0] : 0;
     case LEVEL_FAST: return gear->level_modes[1];
     case LEVEL_STANDARD: return gear->level_modes[2];
-    default: return gear->modes;
+    default:
+        while (all < gear->modes && (gear->omega[all] <= setup->highest || gear->member[all] == 2)) all++;
+        return all;
     }
 }
 
@@ -157,8 +175,8 @@ static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
     if (!setup->on.elastic) return 0;
     if (setup->level == LEVEL_RIGID)
         return shares(model, setup) && ground->omega[k] < GK_SHARED_BELOW * 2.0 * GK_PI * model->cut[0];
-    if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
-    return ground->omega[k] < 2.0 * GK_PI * model->cut[setup->level == LEVEL_STANDARD];
+    const double cut = 2.0 * GK_PI * model->cut[setup->level != LEVEL_FAST];
+    return ground->omega[k] < cut || (setup->level > LEVEL_STANDARD && ground->omega[k] <= setup->highest);
 }
 
 /* the rotor whose part of the ground group an oscillator belongs to: of the first gear that reads it */

@@ -219,6 +219,7 @@ struct gk_setup {
     gk_level level;
     gk_integrator integrator;
     gk_effects on;
+    double highest; /* ω up to which oscillators are dynamic at level full, rad/s */
     int slices;
     int nodal;   /* contact by nodes and penalty, else by lines */
     int spatial; /* axial motion and tilt count, every strip has its own gap; else those of a tooth pair share one */
