@@ -12,7 +12,7 @@ static const double TOLERANCE = 1e-11;
 #else
 static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
 #endif
-static const double NEGLIGIBLE = 1e-12; /* m, rad: gaps and deflections that are none */
+static const double NEGLIGIBLE = 1e-12; /* m, rad: of a gap and deflection that are none */
 
 /* all that forces do to gaps in the step; their deflection at once alone, under those at the end or at the start; at
  * the start with what dampers and friction do there */
@@ -232,20 +232,22 @@ static void take_along(const gk_coupled *c, int e, double *read)
         if (c->setup->engagements_of[mesh->side[w].gear] > 1) take_modes(c, &sliding, w, read);
 }
 
-/* Takes all that the others do; returns how much that has changed: at contacts against their largest gap and
- * deflection, at joints against their deflection alone, since the gap of a given torque is the angle of its port. */
+/* Takes all that the others do; returns how much that has changed, against the largest gap and deflection: of contacts
+ * where there are any, else of joints. A joint's gap may be the angle of a port, which grows as it turns. */
 static double take_whole(const gk_coupled *c, int e)
 {
     gk_system *s = &c->work->engaged[e].system;
-    double read[MAX_STRIDE], change[2] = {0.0, 0.0}, scale[2] = {NEGLIGIBLE, NEGLIGIBLE};
+    const int judged = s->contacts ? s->contacts : s->n;
+    double read[MAX_STRIDE], change = 0.0, scale = NEGLIGIBLE;
     take(c, e, 0, read);
     for (int i = 0; i < s->n; i++) {
-        const int joint = i >= s->contacts;
-        change[joint] = gk_max(change[joint], fabs(read[i] - s->outer[i] - s->beyond[i]));
-        scale[joint] = gk_max(scale[joint], (joint ? 0.0 : fabs(s->g[i])) + fabs(s->Dz[i]) + fabs(s->Al[i]));
+        if (i < judged) {
+            change = gk_max(change, fabs(read[i] - s->outer[i] - s->beyond[i]));
+            scale = gk_max(scale, fabs(s->Dz[i]) + fabs(s->Al[i]) + (s->contacts ? fabs(s->g[i]) : 0.0));
+        }
         s->outer[i] = read[i] - s->beyond[i];
     }
-    return gk_max(change[0] / scale[0], change[1] / scale[1]);
+    return change / scale;
 }
 
 /* tells the deflection at once from the rest of what was taken */
