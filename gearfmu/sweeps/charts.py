@@ -66,6 +66,7 @@ def _harris(table: SweepTable, path: Path) -> Path:
         mesh_stiffness=1e6 * np.array(mesh[: len(parts)]) if mesh else None,
         stage_stiffness=1e6 * np.array(stage[: len(parts)]),
     )
+    result.found = result  # a sweep keeps no torque without equilibrium
     result.harmonics = partial(mesh_harmonics, result.te, pitches=int(result.position[-1]) + 1)
     write_plot(result, path)
     return path

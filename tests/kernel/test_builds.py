@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 from builds import checked_library
-from golden import REALS
-from golden_stages import stage_digests
+from golden import REALS, results
 from probes import build, compilers, source_folder
 from small_model import pair_blob
 
@@ -88,7 +87,7 @@ def test_no_product_and_sum_are_fused(files: str) -> None:
 def test_a_native_build_runs_every_kind_of_stage_with_the_same_bits(system_library: Path, tmp_path: Path) -> None:
     native = build(tmp_path, ("gcc",), ("-march=native",))
     for stage in ("pair", "deviating", "nodal", "pin_errors"):
-        assert stage_digests(native, f"{stage}/") == stage_digests(system_library, f"{stage}/")
+        assert results(native, f"{stage}/") == results(system_library, f"{stage}/")
 
 
 def test_same_bits_with_checks_and_patterned_memory(system_library: Path) -> None:

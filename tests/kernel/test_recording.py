@@ -55,9 +55,9 @@ def test_a_refused_input_is_named_and_what_was_made_is_kept() -> None:
 
 
 def test_a_step_that_fails_ends_the_rows() -> None:
-    """Shaft ends that jump apart by a turn press the teeth through each other."""
+    """Shaft ends that jump apart by half a turn press the teeth through each other."""
     record, inputs = Recording(started(), NAMES, STEPS, H), given(STEPS)
-    inputs["pinion.phi"][30:] += 6.0
+    inputs["pinion.phi"][30:] += 3.0
     with pytest.raises(SimulationError, match="last good time"):
         record.advance(STEPS, inputs)
     assert 30 <= record.done < STEPS and np.all(np.isfinite(record.rows[: record.done + 1]))

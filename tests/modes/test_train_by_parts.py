@@ -14,7 +14,7 @@ from slices import by_functions_alone
 from train_by_parts import Load, frequencies
 
 from gearfmu.body import load_bodies
-from gearfmu.modes.linear import FULL, Linearised, linearised
+from gearfmu.modes.linear import EVERY, Linearised, linearised
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
@@ -43,7 +43,7 @@ def train() -> tuple[Stage, list[Any], StageModel]:
 def at(model: StageModel, position: float) -> tuple[Linearised, list[Load], dict[str, float]]:
     """The kernel's linear model under LIGHT, the slices that carry it, angles of the rotors: the output stands where it
     is held, the others where the flanks that carry touch them."""
-    kernel = model.kernel(**{"level": FULL, "effect.tip_contact": 0.0})
+    kernel = model.kernel(**EVERY | {"effect.tip_contact": 0.0})
     kernel.prepare()
     system = linearised(model, LIGHT, position, kernel)
     rows = zip(system.linear.label, system.linear.force, strict=True)

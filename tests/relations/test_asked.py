@@ -65,8 +65,6 @@ def deviations(trace: Trace, model: StageModel, kind: Kind) -> dict[str, float]:
 def ran(kind: Kind, parameters: dict[str, float], step: float = STEP) -> tuple[Trace, StageModel]:
     model = kind.model().driven_by_springs()
     known = {"level": float(level_number(model, "fast")), **parameters}
-    if kind.name == "internal" and known.get("effect.friction"):
-        known["level"] = 0.0  # friction of this coarse ring on its modes has no stable step: a named outcome
     return simulate(model, Steady(model, kind.speed, kind.torque), DURATION, step, known), model
 
 
