@@ -183,7 +183,7 @@ MUTANTS: tuple[Mutant, ...] = (
     # ---- planted from outside: what relations, constants and planning must see ----
     *of(
         "gk_flank.c",
-        "relations/test_mirror.py",
+        "relations/test_mirror.py relations/test_place.py relations/test_balance.py",
         ("const double ex = sg * t->n[1], ey = -sg * t->n[0];", "const double ex = t->n[1], ey = -t->n[0];"),
         ("slide[RXA] = -sense * up * ey,", "slide[RXA] = sense * up * ey,"),
         ("roll = sg * gear->r_b * angle;", "roll = gear->r_b * angle;"),
@@ -192,14 +192,14 @@ MUTANTS: tuple[Mutant, ...] = (
     *of("gk_lubrication.c", "stage/test_constants.py", ("gk_log(29660.0 * load", "gk_log(31143.0 * load")),
     *of(
         "gk_deviation.c",
-        "relations/test_mirror.py relations/test_place.py",
+        "relations/test_reciprocal.py relations/test_mirror.py relations/test_place.py",
         ("motion[SPACE * w + TURNING[i]] += turn[", "motion[SPACE * w + TURNING[i]] += (i < 2) * turn["),
     ),
     *of("gk_grid.c", "relations/test_continuity.py", ("w[3] = k[2] + 3.0 * k[3]", "w[3] = k[2] + 2.0 * k[3]")),
     *of("gk_adopt.c", "relations/test_split.py", ("[d] -= c->k->rigid_kappa *", "[d] -= 0.0 * c->k->rigid_kappa *")),
     *of(
         "meshes.py",
-        "relations/test_order.py relations/test_place.py",
+        "relations/test_any_order.py relations/test_place.py",
         ("- (first - gamma) * pair.gears[0].r_b / pair", "- (first - gamma) * 1.001 * pair.gears[0].r_b / pair"),
     ),
     *of(

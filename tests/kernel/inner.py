@@ -55,6 +55,13 @@ class Inner:
         """Keep this γ whatever the limit of the step says; after `kernel.initialize`."""
         self._lib.probe_set_gamma(self._handles()[1], ctypes.c_double(gamma))
 
+    def runout(self, pose: np.ndarray, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(12,) each: where the toothings of the first engagement stand at a pose of their gears, and how they move
+        there. Of either gear x, y, φ, z, and tilt about x and y."""
+        full, moving = (ctypes.c_double * 12)(*pose), (ctypes.c_double * 12)(*motion)
+        self._lib.probe_runout(*self._handles(), full, moving)
+        return np.array(full), np.array(moving)
+
     def mu(self, h: float, gamma: float = 1.0) -> float:
         """μ′ at step h (s)."""
         memory = ctypes.c_void_p(self.kernel._work), ctypes.c_void_p(self.kernel._data)

@@ -77,3 +77,11 @@ GK_API void probe_grid(double form, double tip, int count, double roll, double *
     memcpy(out, grid.weight, sizeof grid.weight);
     memcpy(out + 4, grid.slope, sizeof grid.slope);
 }
+
+/* pose (12), in place: where both toothings of engagement 0 stand; motion (12), in place: how they move there */
+GK_API void probe_runout(const gk_model *model, const gk_setup *setup, double *pose, double *motion)
+{
+    double turn[POSE];
+    gk_runout_move(model, setup, &model->engagement[0], pose, turn);
+    gk_runout_follow(turn, motion);
+}

@@ -4,12 +4,15 @@ own. Gradients of gaps that are no derivatives break this; turning and mirroring
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from inner import Inner
 from kinds import KINDS, Kind
 
 from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.tables.flanks import Eccentricity
+from gearfmu.spec.tables.flanks import Eccentricity, Wobble
 from gearfmu.stage import StageModel, Steady
 
 STEP = 2e-6  # rad: of the angles of ports
@@ -49,3 +52,25 @@ def test_each_port_answers_the_other_alike(name: str) -> None:
     ends = [[torques(kind, model, tuple(s * STEP * np.eye(2)[k])) for s in (-1, 1)] for k in range(2)]
     stiffness = np.array([(high - low) / (2 * STEP) for low, high in ends])
     assert abs(stiffness[0, 1] - stiffness[1, 0]) < SAME * abs(stiffness).max()
+
+
+def wobbling(stage: Stage) -> Stage:
+    """With toothings beside their axes and tilted."""
+    bodies = {
+        name: body.model_copy(update={"wobble": Wobble(amount=3e-4, angle=0.7 - i)})
+        if isinstance(body, ToothedBody)
+        else body
+        for i, (name, body) in enumerate(unsteady(stage).bodies.items())
+    }
+    return stage.model_copy(update={"bodies": bodies})
+
+
+def test_toothings_move_as_their_places_change(inner_library: Path) -> None:
+    """The motion of a toothing that runs out is the derivative of its place. Sees: rates of eccentricity or wobble that
+    are missing or of the wrong sign, which act on nodal contact and its dampers alone."""
+    inner = Inner(inner_library, KINDS["helical"].model(wobbling).blob)
+    pose, motion, step = np.linspace(0.1, 1.2, 12), np.linspace(-3.0, 2.0, 12), 1e-6
+    (before, _), (after, _) = (inner.runout(pose + side * step * motion, motion) for side in (-1, 1))
+    _, moving = inner.runout(pose, motion)
+    assert np.ptp(moving - motion) > 1e-4
+    assert np.allclose(moving, (after - before) / (2 * step), rtol=0, atol=1e-9)
