@@ -42,7 +42,7 @@ def test_a_free_train_goes_on_with_the_force_it_starts_with(
 
 def test_level_explicit_is_central_with_all_modes_below_its_limit(pair_free: FreePair) -> None:
     kernel = started(pair_free, Rattle(), {"level": EXPLICIT})
-    full = started(pair_free, Rattle(), {"level": FULL})
+    full = started(pair_free, Rattle(), {"level": FULL, "h": 1e-7})
     kernel.step(0.0, 1e-4)
     assert kernel.get("solver.n_dyn") == full.get("solver.n_dyn") and 1e-6 < kernel.get("solver.h") < 1.5e-6
 
