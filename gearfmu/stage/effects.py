@@ -297,7 +297,7 @@ EFFECTS: tuple[Effect, ...] = (
             "(two_stage), 4 % (planetary54), 0.4 % (fzg_c)"
         ),
         off="bodies tilt and vibrate as at rest",
-        code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
+        code="gk_frame.c (gk_frame_turn, gk_frame_predict)",
         test="tests/kernel/test_gyroscopic.py::test_a_kicked_pair_whirls_as_its_linear_system",
         indicator="gyroscopic",
     ),
