@@ -184,9 +184,9 @@ MUTANTS: tuple[Mutant, ...] = (
     *of(
         "gk_flank.c",
         "relations/test_mirror.py relations/test_place.py relations/test_balance.py",
-        ("const double ex = sg * t->n[1], ey = -sg * t->n[0];", "const double ex = t->n[1], ey = -t->n[0];"),
+        ("const double ex = sg * t->n[1], ey = -sg * t->n[0];", "const double ex = sg * sg * t->n[1], ey = -sg * sg * t->n[0];"),
         ("slide[RXA] = -sense * up * ey,", "slide[RXA] = sense * up * ey,"),
-        ("roll = sg * gear->r_b * angle;", "roll = gear->r_b * angle;"),
+        ("roll = sg * gear->r_b * angle;", "roll = sg * sg * gear->r_b * angle;"),
     ),
     *of("gk_flank.c", "stage/test_constants.py", ("    p->curvature *= mesh->cosine;\n", "")),
     *of("gk_lubrication.c", "stage/test_constants.py", ("gk_log(29660.0 * load", "gk_log(31143.0 * load")),
