@@ -184,7 +184,10 @@ MUTANTS: tuple[Mutant, ...] = (
     *of(
         "gk_flank.c",
         "relations/test_mirror.py relations/test_place.py relations/test_balance.py",
-        ("const double ex = sg * t->n[1], ey = -sg * t->n[0];", "const double ex = sg * sg * t->n[1], ey = -sg * sg * t->n[0];"),
+        (
+            "const double ex = sg * t->n[1], ey = -sg * t->n[0];",
+            "const double ex = sg * sg * t->n[1], ey = -sg * sg * t->n[0];",
+        ),
         ("slide[RXA] = -sense * up * ey,", "slide[RXA] = sense * up * ey,"),
         ("roll = sg * gear->r_b * angle;", "roll = sg * sg * gear->r_b * angle;"),
     ),

@@ -55,7 +55,7 @@ def test_every_level_once_and_modes_pay(made: tuple[Path, tuple[Row, ...]]) -> N
     assert 1.1 < by_level["full"].cpu_ratio / by_level["rigid"].cpu_ratio < 3.0, "sums over modes are tabulated"
     assert (out / "study.csv").read_text().splitlines()[0] == COLUMNS
     reference = read_rows(out / "references.csv", ReferenceRow)[0]
-    assert reference.h_s < min(row.h_s for row in rows) / 3 and reference.n_dyn == by_level["full"].n_dyn
+    assert reference.h_s < min(row.h_s for row in rows) / 3 and reference.n_dyn > by_level["full"].n_dyn
 
 
 def test_finer_is_better(scene: SceneSpec) -> None:
