@@ -79,8 +79,8 @@ def test_work_is_accounted_for(steady: Trace) -> None:
 @pytest.mark.parametrize(("level", "modes"), [(0, 4), (1, 74), (2, 144), (3, 144), (4, 404)])
 def test_every_level_runs_and_carries_the_load(relieved: StageModel, level: int, modes: int) -> None:
     """Levels rigid, fast, standard, full, paper at their default integrator and step; modes of both gears and four of
-    the gears on their bearings; full has those of standard at this step (ωh ≤ 4). Half of the 799 stored ones are antisymmetric about mid-width: no symmetric load
-    excites them, the model leaves them out."""
+    the gears on their bearings. Level full has those of standard at this step (ωh ≤ 4). Half of the 799 stored ones are
+    antisymmetric about mid-width: no symmetric load excites them, the model leaves them out."""
     trace = simulate(relieved, Steady(relieved, SPEED, LOAD), 4e-3, H, {"level": level})
     assert trace.meta["outcome"] == "completed" and trace.meta["n_dyn"] == modes
     force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / PairGeometry.of(relieved.spec).gears[0].r_b
