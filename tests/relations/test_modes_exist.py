@@ -75,8 +75,8 @@ def require_real_modes(kind: Kind, positions: int) -> None:
 
 @pytest.mark.parametrize(
     ("name", "positions"),
-    [("pair", 12), ("helical", 3), ("internal", 12), ("helical_set", 2),
-     pytest.param("train", 3, marks=pytest.mark.full), pytest.param("set", 12, marks=pytest.mark.full)],
+    [("pair", 12), ("helical", 3), ("internal", 12),
+     *(pytest.param(*dear, marks=pytest.mark.full) for dear in (("train", 3), ("set", 12), ("helical_set", 2)))],
 )  # fmt: skip
 def test_reported_modes_exist_at_every_position_and_none_is_missing(name: str, positions: int) -> None:
     """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means

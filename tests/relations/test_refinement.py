@@ -76,7 +76,13 @@ def _refined(**finer: Any) -> StageModel:
     return assembled(finer_stage, made)
 
 
-@pytest.mark.parametrize("finer", [{"modes": 48}, {"roll_points": 16}, {"width_functions": 5}], ids=lambda f: [*f][0])
+FINER = {"modes": 200, "roll_points": 16, "width_functions": 5}
+
+
+@pytest.mark.parametrize(
+    "finer",
+    [pytest.param({name: n}, id=name, marks=[pytest.mark.full] * (name != "modes")) for name, n in FINER.items()],
+)
 def test_twice_the_numbers_of_a_body(finer: Mapping[str, int]) -> None:
     kind = KINDS["internal"]
     coarse = harmonics(kind.model(), kind.torque)
