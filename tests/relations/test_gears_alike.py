@@ -1,5 +1,5 @@
-"""R10, continuity over the gears themselves: a vanishing helix angle of either hand is a spur gear, neighbouring numbers
-of teeth have neighbouring results, and a wider search finds no other contacts."""
+"""R10, continuity over the gears themselves: a vanishing helix angle of either hand is a spur gear, neighbouring
+numbers of teeth have neighbouring results, and a wider search finds no other contacts."""
 
 from __future__ import annotations
 
