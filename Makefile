@@ -9,7 +9,7 @@ JOBS   ?= 2
 BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
-EVIDENCE = $(RUN) benchmarks/evidence.py
+EVIDENCE = $(RUN) evidence/ledger.py
 export JOBS
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -26,7 +26,7 @@ demo: $(VENV)/.base
 test: lint
 	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
-## make test-full   make test, then the slow tests; how those ended is kept in benchmarks/evidence.json
+## make test-full   make test, then the slow tests; how those ended is kept in evidence/ledger.json
 test-full: test
 	$(EVIDENCE) make --again test-full
 
@@ -34,11 +34,11 @@ test-full: test
 bench: $(STAMP)
 	$(EVIDENCE) make --again $(BENCHMARKS)
 
-## make stability   the hard cases at every level and step: benchmarks/stability.csv and .json, docs/stability.md
+## make stability   the hard cases at every level and step: evidence/stability.csv and .json, docs/stability.md
 stability: $(STAMP)
 	$(EVIDENCE) make --again stability
 
-## make study       what accuracy costs: tables and charts of docs/study.md in benchmarks/study (bodies alone: make study-bodies)
+## make study       what accuracy costs: tables and charts of docs/study.md in evidence/study (bodies alone: make study-bodies)
 study: $(STAMP)
 	$(EVIDENCE) make --again study study_sets study_cuts study_limits levels cost
 

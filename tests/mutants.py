@@ -3,7 +3,7 @@ any change of a number moves, are not among them: the physics must see it.
 
     python tests/mutants.py [--only PATTERN] [--judges relations] [--jobs 2]
 
-works on copies of the checkout and writes benchmarks/mutants.csv; exit code 1 where fewer than 95 % are caught. The
+works on copies of the checkout and writes evidence/mutants.csv; exit code 1 where fewer than 95 % are caught. The
 test that caught a defect last time runs first, the others where it passes."""
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-TABLE = ROOT / "benchmarks" / "mutants.csv"
+TABLE = ROOT / "evidence" / "mutants.csv"
 LEAST = 0.95  # share that must be caught
 LONGEST = 900  # s for the tests of one defect
 LEFT_OUT = shutil.ignore_patterns("__pycache__", ".*_cache", ".hypothesis", ".git", ".venv")

@@ -76,7 +76,7 @@ def test_every_claim_names_what_shows_it() -> None:
     for claim, shown in claims:
         names = re.findall(r"`([^`]+)`", shown)
         paths = [name.removeprefix("python ").split()[0].partition("::") for name in names]
-        files = [(path, test) for path, _, test in paths if path.startswith(("tests/", "benchmarks/", "."))]
+        files = [(path, test) for path, _, test in paths if path.startswith(("tests/", "evidence/", "."))]
         known = [_exists(ROOT / path, test) for path, test in files]
         assert all(known) and (known or names and names[0].startswith(("make ", "gearfmu "))), claim
 

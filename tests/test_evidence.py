@@ -8,12 +8,12 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from evidence import GOLDEN, Ledger, check, content, make
+from ledger import GOLDEN, Ledger, check, content, make
 
 ROOT = Path(__file__).resolve().parents[1]
 
 GENERATED = (
-    r"benchmarks/.*\.(csv|json|png|svg)|docs/pictures/.*\.(png|svg)|docs/(stability|variables|effects)\.md|"
+    r"evidence/.*\.(csv|json|png|svg)|docs/pictures/.*\.(png|svg)|docs/(stability|variables|effects)\.md|"
     r"gearfmu/.*\.csv|reduced_models/.*\.csv"
 )
 
@@ -22,7 +22,7 @@ GENERATED = (
 def test_every_generated_file_has_one_entry() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
     made = [file for entry in Ledger().read().values() for file in entry["makes"]]
-    wanted = {file for file in listed if re.fullmatch(GENERATED, file)} - {"benchmarks/evidence.json"}
+    wanted = {file for file in listed if re.fullmatch(GENERATED, file)} - {"evidence/ledger.json"}
     assert len(made) == len(set(made)) and set(made) == wanted
 
 
@@ -30,7 +30,7 @@ def test_no_file_was_written_without_a_record() -> None:
     ledger = Ledger()
     touched = {name: ledger.touched(entry) for name, entry in ledger.read().items()}
     wrong = {name: files for name, files in touched.items() if files}
-    assert not wrong, f"python benchmarks/evidence.py make --again {' '.join(wrong)} (or forget)"
+    assert not wrong, f"python evidence/ledger.py make --again {' '.join(wrong)} (or forget)"
 
 
 def test_inputs_exist_and_are_made_before_they_are_used() -> None:

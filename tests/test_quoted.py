@@ -19,9 +19,9 @@ from typing import NamedTuple
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-STUDY, SETS, BODIES = (f"benchmarks/study/{name}.csv" for name in ("study", "sets", "bodies"))
-WAYS, HARNESS = "benchmarks/set_ways.csv", "benchmarks/harness.csv"
-KERNEL, IN_TIME, FRF = "benchmarks/in_time/kernel.csv", "benchmarks/in_time/errors.csv", "benchmarks/frf_{}.csv"
+STUDY, SETS, BODIES = (f"evidence/study/{name}.csv" for name in ("study", "sets", "bodies"))
+WAYS, HARNESS = "evidence/set_ways.csv", "evidence/harness.csv"
+KERNEL, IN_TIME, FRF = "evidence/in_time/kernel.csv", "evidence/in_time/errors.csv", "evidence/frf_{}.csv"
 METHODS = {"modal": "modal truncation", "craig_bampton": "Craig–Bampton", "rubin": "Rubin / MacNeal"}
 METHODS |= {"krylov": "block Krylov"}
 NUMBER = r"(\d[\d.]*(?:e[+-]?\d+)?)"

@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 SCENE, SLICES = "pair_loaded", 5
 SET, PLANETS, LEVELS = "planetary_paper", 4, {"fast": "-", "full": ":"}
 
-folder = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parents[1] / "benchmarks" / "study"
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parents[1] / "evidence" / "study"
 rows = [row for row in read_rows(folder / "study.csv", Row) if row.scene == SCENE and row.slices == SLICES]
 of_set = ladder([row for row in read_rows(folder / "sets.csv", SetRow) if row.scene == SET], PLANETS)
 if not (rows and of_set):

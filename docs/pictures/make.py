@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.append(str(HERE.parents[1] / "benchmarks"))
+sys.path.append(str(HERE.parents[1] / "evidence"))
 from browser import Browser  # noqa: E402
 
 WIDE, NARROW = (1200, 1000), (420, 900)

@@ -1,4 +1,4 @@
-"""docs/stability.md from the table: `python -m gearfmu.stability.page benchmarks/stability.csv docs/stability.md`."""
+"""docs/stability.md from the table: `python -m gearfmu.stability.page evidence/stability.csv docs/stability.md`."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ belongs to the model, not to the step.
 
 Scenes that begin with `set_` run on `planetary54` with three pins out of place (12 µm ahead, 6 µm outward, 8 µm \
 behind). Equal planets on ideal pins would hide the modes of sun and carrier. Runs of a set last hundredths of a \
-second. Longer ones (10 s, 1e7 steps, 10⁴ rollbacks) are in `benchmarks/set_endurance.py`. No scene gives sets pitch \
+second. Longer ones (10 s, 1e7 steps, 10⁴ rollbacks) are in `evidence/set_endurance.py`. No scene gives sets pitch \
 errors.
 
 ## Results
@@ -66,7 +66,7 @@ unsolved ([theory](theory.md)); the rest shows in the energy residual.
 
 ## The table
 
-[benchmarks/stability.csv](../benchmarks/stability.csv) has a row for each case; `stability.json` beside it has the \
+[evidence/stability.csv](../evidence/stability.csv) has a row for each case; `stability.json` beside it has the \
 statistics of each run. The site draws the table below.
 
 | column | meaning |
@@ -81,7 +81,7 @@ largest stored energy |
 The default step is the largest at which γ stays 1 ([theory](theory.md), 3.5). At its half and quarter γ may be \
 lowered, which costs accuracy but no energy; bit 8 of `status` in the statistics reports it.
 
-<!-- csv: benchmarks/stability.csv -->
+<!-- csv: evidence/stability.csv -->
 """
 KINDS = ("gear pair", "gear pair with friction or oil", "train of two meshes", "planetary set")
 

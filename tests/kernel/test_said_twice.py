@@ -77,5 +77,5 @@ def test_laws_of_friction_are_in_one_order() -> None:
 
 
 def test_the_benchmark_of_nodal_rows_has_the_kernels_points() -> None:
-    text = (ROOT / "benchmarks" / "nodal_rows.py").read_text(encoding="utf-8")
+    text = (ROOT / "evidence" / "nodal_rows.py").read_text(encoding="utf-8")
     assert re.search(rf"^POINTS = {said('gk_grid.h', 'POINTS')} ", text, re.M)

@@ -1,7 +1,7 @@
 """Free frequencies of gear, ring and carrier against CalculiX: the same mesh, and the mesh of the stage file.
 
 The goldens come from CalculiX's own elements (C3D20) and eigensolver on all teeth, or, on the meshes of the stage
-files, on one sector with its own cyclic symmetry and every nodal diameter (benchmarks/calculix/frequencies.py); ours
+files, on one sector with its own cyclic symmetry and every nodal diameter (evidence/calculix/frequencies.py); ours
 from one sector.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLES = ROOT / "benchmarks" / "calculix"
+TABLES = ROOT / "evidence" / "calculix"
 GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))[
     "frequencies_Hz"
 ]

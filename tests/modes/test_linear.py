@@ -26,7 +26,7 @@ from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.limits import largest_torque, places_of
 from gearfmu.stage.run.te import statics_of
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[2] / "evidence"
 TORQUE = 302.0
 FREE = {name: {"kind": "torque", "chain": None} for name in ("pinion", "wheel")}
 
@@ -405,7 +405,7 @@ def test_a_chain_with_heavy_inertia_holds_the_shaft(fzg: Stage) -> None:
 
 @pytest.mark.full
 def test_mesh_mode_and_its_damping(fzg: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against benchmarks/mesh_mode.py, which takes gears as rigid on a mean mesh stiffness: elastic gears change its
+    """Against evidence/mesh_mode.py, which takes gears as rigid on a mean mesh stiffness: elastic gears change its
     7.8 kHz a little; the contact dashpots that give it 3 % there give 3 % here."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     rigid = importlib.import_module("mesh_mode").mesh_mode("fzg_c", TORQUE)

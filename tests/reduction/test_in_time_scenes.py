@@ -1,4 +1,4 @@
-"""Scenes of the time-domain comparison (benchmarks/in_time): contact points, ranking of reductions, CalculiX and the
+"""Scenes of the time-domain comparison (evidence/in_time): contact points, ranking of reductions, CalculiX and the
 kernel beside the finite elements."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gearfmu.femesh.mesh import rotated
 from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.spec.stage import load_stage
 
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks" / "in_time"
+FOLDER = Path(__file__).resolve().parents[2] / "evidence" / "in_time"
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from gearfmu.stability.scenes import SCENES
 from gearfmu.stability.suite import Task, read, table, tasks
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLE = ROOT / "benchmarks" / "stability.csv"
+TABLE = ROOT / "evidence" / "stability.csv"
 REMEDY = "run `make stability`"
 
 

@@ -1,7 +1,7 @@
 """Tooth pair and loaded transmission error against CalculiX, an independent finite-element code with its own contact.
 
 The goldens come from static contact solutions of the whole gears with a fine mesh where the teeth touch
-(benchmarks/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
+(evidence/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLES = ROOT / "benchmarks" / "calculix"
+TABLES = ROOT / "evidence" / "calculix"
 GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))
 SECANT = GOLDEN["pitch_point_secant_N_per_mm_um"]
 LINE_LOAD = 1e3 * GOLDEN["line_load_N_per_mm"]  # N/m

@@ -27,8 +27,8 @@ def test_every_effect_has_its_measured_cost() -> None:
 
 @pytest.fixture(scope="module")
 def benchmark_() -> ModuleType:
-    """benchmarks/effects_cost.py as a module."""
-    spec = importlib.util.spec_from_file_location("effects_cost", ROOT / "benchmarks" / "effects_cost.py")
+    """evidence/effects_cost.py as a module."""
+    spec = importlib.util.spec_from_file_location("effects_cost", ROOT / "evidence" / "effects_cost.py")
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -1,4 +1,4 @@
-"""Helical pairs beside an independent finite-element program: CalculiX's columns of benchmarks/calculix/helical.csv,
+"""Helical pairs beside an independent finite-element program: CalculiX's columns of evidence/calculix/helical.csv,
 our side computed here."""
 
 from __future__ import annotations

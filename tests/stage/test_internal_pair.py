@@ -30,7 +30,7 @@ from gearfmu.stage.build.meshes import tooth_phases
 ROOT = Path(__file__).parents[2]
 
 
-STAGE = ROOT / "benchmarks" / "calculix" / "internal" / "stage.toml"
+STAGE = ROOT / "evidence" / "calculix" / "internal" / "stage.toml"
 COARSE = BodySpec(
     strip_half_width=4.5e-4,
     modes=24,

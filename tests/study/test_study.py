@@ -207,8 +207,8 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
 
 
 def test_committed_tables_have_the_columns(tmp_path: Path) -> None:
-    """benchmarks/study holds what the documentation shows."""
-    folder = Path(__file__).parents[2] / "benchmarks" / "study"
+    """evidence/study holds what the documentation shows."""
+    folder = Path(__file__).parents[2] / "evidence" / "study"
     with (folder / "study.csv").open(encoding="utf-8", newline="") as file:
         assert ",".join(next(csv.reader(file))) == COLUMNS
     assert {row.scene for row in read_rows(folder / "study.csv", Row)} >= {"pair_loaded"}

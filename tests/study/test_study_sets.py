@@ -17,7 +17,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.study.sets import DURATION, SETTLE, SetRow, at_speed, ladder, window, with_planets
 from gearfmu.study.table import read_rows, write_rows
 
-LIST = Path(__file__).parents[2] / "benchmarks" / "study" / "sets.csv"
+LIST = Path(__file__).parents[2] / "evidence" / "study" / "sets.csv"
 ROW = SetRow("s", 4, 85.0, "fast", 5e-6, 5, "", 248, "full, 0.312 µs", 0.02, -0.001, 0.07, 0.03, 35.0, 1.0)
 
 
