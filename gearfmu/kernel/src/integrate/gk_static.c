@@ -178,7 +178,7 @@ static void set_compliance(gk_equilibrium *r)
     r->k.timeless = 0;
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &r->setup.modal[g];
-        r->k.flow[g].exact = m->pairs;
+        r->k.flow[g].yields = m->pairs;
         for (int i = 0; i < m->n; i++)
             r->k.flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
         for (int i = 0; i < r->soft[g]; i++) r->k.flow[g].kappa[r->lane[g][i]] = 0;

@@ -9,7 +9,7 @@ static const double HUGE_FORCE = 1e15;             /* N: no gear force reaches t
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
-static double speed_lead(double h, double gamma) { return h * h * (2.0 * gk_correction(gamma) - 1.0) / 12.0; }
+static double speed_lead(const gk_coefficients *k) { return k->rigid_kappa - k->h * k->h / 12.0; }
 
 /* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the
  * speed of free masses. At rest κ = 0. Another expression has another energy: the balance goes on from there. */
@@ -27,8 +27,7 @@ static void express(const gk_model *model, const gk_setup *setup, gk_work *work,
         gk_real *q = gk_modal_of(setup, data, g);
         for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
     }
-    const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma)
-                                            : 0.0;
+    const double lead = data->state_h > 0.0 ? speed_lead(k) - speed_lead(old) : 0.0;
     for (int d = 0; d < setup->spins; d++)
         GK_OF(data, v)[d] += lead * setup->inverse_inertia[d] * GK_OF(data, f_rate)[d];
     for (int d = 0; d < setup->spins; d++)

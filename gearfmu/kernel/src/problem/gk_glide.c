@@ -34,16 +34,16 @@ static void slide_modes(const gk_setup *setup, gk_work *work, const gk_coefficie
     const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
     const gk_half *gaps = (const gk_half *)engaged->basis[which], *slides = (const gk_half *)glide->basis[which];
     gk_half *scaled = (gk_half *)work->scaled;
-    const int exact = 2 * flow->exact / LANES;
+    const int lanes = 2 * flow->yields / LANES;
     for (int j = 0; j < s->contacts && width; j++) {
         const gk_half *row = slides + (size_t)(j * width);
         const int at = j * s->stride;
         for (int l = 0; l < width; l++) scaled[l] = row[l] * mobility[l];
         gk_multiply_rows(scaled, gaps, s->contacts, width, width, glide->gap_moves + at);
         gk_multiply_rows(scaled, slides, s->contacts, width, width, glide->moves + at);
-        for (int first = 0; first < width && exact; first += half) { /* κ is 0 beyond */
-            for (int l = first; l < first + exact; l++) scaled[l] = -row[l] * kappa[l];
-            gk_multiply_rows(scaled + first, gaps + first, s->contacts, width, exact, glide->gap_yields + at);
+        for (int first = 0; first < width && lanes; first += half) { /* κ is 0 beyond */
+            for (int l = first; l < first + lanes; l++) scaled[l] = -row[l] * kappa[l];
+            gk_multiply_rows(scaled + first, gaps + first, s->contacts, width, lanes, glide->gap_yields + at);
         }
     }
 }

@@ -133,6 +133,7 @@ struct gk_work {
     double *spread;    /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
+    double *island;                /* the limit of the step: (2, rows, rows) of all engagements */
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     gk_bores sum_bores;
     gk_field field[2];             /* nodal contact: teeth of A and B in hand */
@@ -185,6 +186,8 @@ typedef struct gk_coupled { /* an island in a step */
 } gk_coupled;
 GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
 GK_HOT void gk_couple_recall(gk_coupled *coupled);
+GK_HOT void gk_couple_unit(const gk_coupled *coupled, int from, int row);
+GK_HOT void gk_couple_read(const gk_coupled *coupled, int to, double *read);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
 static inline int gk_block_end(int i)
 {

@@ -176,8 +176,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
 }
 
 #define FLOW_ARRAYS(f)                                                                                                 \
-    {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,                                  \
-     &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2}
+    {&f->d11,      &f->a12,    &f->a21,    &f->d22,   &f->b0q,        &f->b0v,  &f->bq,   &f->bv,                      \
+     &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2, &f->unit, &f->lead, &f->hold}
 
 static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
@@ -301,6 +301,8 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     size_t blocks;
     work->spread = doubles(&b, gk_spread_scratch(model, &blocks));
     work->blocks = reals(&b, blocks);
+    const size_t rows = (size_t)model->engagements * (MAX_PAIRS * (size_t)setup->strips + MAX_JOINTS);
+    work->island = doubles(&b, 2 * rows * rows);
     work->sum_ground = doubles(&b, ground);
     for (int w = 0; w < 2; w++) {
         gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};

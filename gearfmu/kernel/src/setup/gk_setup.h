@@ -166,11 +166,13 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
                                                              the start and at the end of the step */
     gk_real *mobility, *read_q, *read_v; /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
     gk_real *kappa, *inverse_s2;
-    int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
+    gk_real *unit, *lead, *hold; /* v = unit ẋ + lead ḟ + hold f */
+    int yields;                  /* the first `yields` lanes of each half: κ ≠ 0 */
 } gk_flow;
 
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
+    double *unit, *lead, *hold;
     double *pulls;          /* (supports, n) s²e/n of a dashpot */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
@@ -179,16 +181,12 @@ typedef struct gk_ground_flow { /* the same of the ground group */
 
 typedef struct gk_coefficients {
     double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
-    double stretched_h;                                               /* step of the trapezoidal ones */
     int timeless;                                                     /* forces move nothing in the step: D = 0 */
     int curved_read;                                                  /* mix4: the gap reads more than q */
     gk_flow flow[MAX_GEARS];
     gk_ground_flow ground;
     uint64_t age;
 } gk_coefficients;
-
-/* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
-static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
 /* what an integrator is: the one place where they differ in more than their own file */
 typedef struct gk_scheme {
