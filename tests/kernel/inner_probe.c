@@ -1,5 +1,6 @@
 /* Opens inner functions of the kernel to tests: places of contact with gap and gradient, the local law. Compiled
  * together with gearfmu/kernel/src. */
+#include "integrate/gk_closed.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_oscillator.h"
 
@@ -104,7 +105,7 @@ GK_API void probe_oscillator(const double *pace, double omega, double zeta, doub
 {
     const gk_pace of = {pace[0], pace[1], pace[2], pace[3] != 0.0};
     const gk_oscillator o = gk_oscillator_of(&of, omega, zeta);
-    const double all[] = {o.a11,        o.a12,  o.a21,  o.a22,  o.bq,  o.bv, o.kappa,
-                          o.inverse_s2, o.unit, o.lead, o.hold, gk_oscillator_free_kappa(&of)};
+    const double all[] = {o.a11,   o.a12,        o.a21,  o.a22,  o.bq,   o.bv,
+                          o.kappa, o.inverse_s2, o.unit, o.lead, o.hold, gk_oscillator_free_kappa(&of)};
     memcpy(out, all, sizeof all);
 }

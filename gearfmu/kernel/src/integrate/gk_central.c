@@ -10,6 +10,7 @@
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
 #include "base/gk_dense.h"
 #include "integrate/gk_energy.h"
+#include "integrate/gk_closed.h"
 #include "integrate/gk_integrate.h"
 #include "problem/gk_exchange.h"
 

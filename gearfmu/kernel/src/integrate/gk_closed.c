@@ -5,7 +5,8 @@
  * Friction cλ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide. Contacts that
  * stick follow the gaps: C less C_nt C_tt⁻¹ C_tn, and C − K likewise. */
 #include "base/gk_dense.h"
-#include "integrate/gk_integrate.h"
+#include "integrate/gk_closed.h"
+#include "problem/gk_engage.h"
 #include "problem/gk_shared.h"
 #include "setup/gk_kinematics.h"
 #include "setup/gk_tables.h"

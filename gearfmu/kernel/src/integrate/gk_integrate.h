@@ -31,13 +31,6 @@ GK_HOT gk_step_function gk_central_step;
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h);
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
-/* gk_closed.c */
-void gk_closed_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);
-int gk_closed_place(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e,
-                    double position);
-void gk_closed_keep(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
-int gk_closed_holds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                    const gk_coefficients *k, double mu);
 /* gk_limit.c */
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h);
 void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);

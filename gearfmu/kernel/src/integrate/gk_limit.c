@@ -2,6 +2,7 @@
  * compliance, so μ′ goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and
  * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9: first more oscillators yield at once, then
  * fewer are exponential, then κ is weakened (gk_oscillator.c). Above 1/8 of the period h is refused. */
+#include "integrate/gk_closed.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_choose.h"
 #include <stdio.h>

@@ -223,6 +223,7 @@ static void spread(gk_equilibrium *r)
     data->state_h = data->state_gamma = 0.0;
     gk_exchange_scatter(r->model, setup, work, gk_step_force, gk_step_force);
     memcpy(x + 2 * n, work->ground_force, (size_t)n * sizeof *x);
+    memset(x + 3 * n, 0, (size_t)n * sizeof *x);
     gk_frame_load(r->model, setup, data, work->ground_force);
     for (int i = 0; i < n; i++) {
         x[i] = setup->base.omega2[i] > 0.0 ? work->ground_force[i] / setup->base.omega2[i] : 0.0;
@@ -235,6 +236,7 @@ static void spread(gk_equilibrium *r)
             q[i] = m->omega2[i] > 0 ? work->force[g][i] / m->omega2[i] : 0;
             q[m->n + i] = 0;
             q[2 * m->n + i] = work->force[g][i];
+            q[3 * m->n + i] = 0;
         }
     }
     memset(GK_OF(data, f), 0, (size_t)setup->spins * sizeof(double));

@@ -1,8 +1,7 @@
 /* Engagements of one island (gk_islands.c). Each has a problem of its own, solved with the others' forces as they are.
  * Their effect on its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and
  * scattered, never through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at
- * γ = 1, so that three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with.
- */
+ * γ = 1: three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_shared.h"
 #include "problem/gk_exchange.h"
 
@@ -322,8 +321,7 @@ static void sweep(const gk_island *island)
     gk_coupled *c = island->context;
     double change = INFINITY, next = INFINITY, gaps = INFINITY;
     give_all(c, WHOLE);
-    const int most = c->sweeps ? c->sweeps : SWEEPS;
-    for (int round = 0; round < most && !(next < TOLERANCE); round++) {
+    for (int round = 0; round < (c->sweeps ? c->sweeps : SWEEPS) && !(next < TOLERANCE); round++) {
         const double last = change;
         change = gaps = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
@@ -386,18 +384,11 @@ void gk_couple_unit(const gk_coupled *c, int from, int row)
     GK_ASSERT(within(c, from) && row < c->work->engaged[from].system.n);
     forget_all(c);
     for (int e = 0; e < c->model->engagements; e++) {
-        gk_engaged *engaged = &c->work->engaged[e];
-        memset(&engaged->forces, 0, sizeof engaged->forces);
-        for (int w = 0; w < 2 && GK_ON(c->setup, friction); w++) {
-            const int g = c->setup->mesh[e].side[w].gear;
-            if (c->setup->engagements_of[g] > 1)
-                memset(engaged->given_modes[w], 0, (size_t)c->setup->modal[g].n * sizeof *engaged->given_modes[w]);
-        }
+        gk_forces *f = &c->work->engaged[e].forces;
+        memset(f, 0, sizeof *f);
+        if (e == from) f->once[row] = 1.0, f->far[row] = row < c->work->engaged[e].system.contacts;
+        if (within(c, e)) give_forces(c, e);
     }
-    gk_engaged *engaged = &c->work->engaged[from];
-    engaged->forces.once[row] = 1.0;
-    engaged->forces.far[row] = row < engaged->system.contacts ? 1.0 : 0.0;
-    give_forces(c, from);
 }
 
 /* what was given does at once to the rows of another engagement */

@@ -70,7 +70,7 @@ static double mesh_mode(const gk_model *model, const gk_setup *setup)
 
 static gk_oscillator oscillator_of(const gk_setup *setup, const gk_pace *pace, double omega, double zeta)
 {
-    const gk_oscillator nothing = {0};
+    const gk_oscillator nothing = {.unit = 1.0};
     return omega > 0.0 ? gk_oscillator_of(pace, omega, GK_ON(setup, modal_damping) ? zeta : 0.0) : nothing;
 }
 
@@ -135,7 +135,7 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, const gk_p
         f->b0q[i] = o.b0q, f->b0v[i] = o.b0v, f->bq[i] = o.bq, f->bv[i] = o.bv;
         f->mobility[i] = o.mobility, f->read_q[i] = o.read_q, f->read_v[i] = o.read_v;
         f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
-        f->unit[i] = there ? o.unit : 1.0, f->lead[i] = o.lead, f->hold[i] = o.hold;
+        f->unit[i] = o.unit, f->lead[i] = o.lead, f->hold[i] = o.hold;
     }
     fill_dampers(model, setup, k);
     fill_turns(setup, k);
@@ -164,6 +164,7 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
     oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
     oldest->rigid_kappa = gk_oscillator_free_kappa(&pace);
+    oldest->rigid_lead = oldest->rigid_kappa - h * h / 12.0; /* as of an oscillator with ω → 0 */
     for (int g = 0; g < model->gears; g++) fill_gear(setup, &pace, oldest, g);
     fill_ground(model, setup, &pace, oldest);
     oldest->age = ++work->clock;

@@ -146,7 +146,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     for (int g = 0; g < model->gears; g++) {
         lay_out_modal(&b, &model->gear[g], &setup->modal[g], modes[g]);
         setup->modal[g].at = at;
-        at += 3 * (size_t)setup->modal[g].n;
+        at += OSCILLATOR_STATE * (size_t)setup->modal[g].n;
     }
     for (int g = 0; g < model->gears; g++)
         setup->far[g] = doubles(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * FAR : 0);
@@ -167,7 +167,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
         setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
     }
-    setup->amplitudes = 3 * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
+    setup->amplitudes = OSCILLATOR_STATE * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
     uint32_t arrays[ARRAYS];
     gk_data_plan(model, arrays);
     setup->state_size = sizeof(gk_data) +

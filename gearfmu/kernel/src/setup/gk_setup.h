@@ -10,10 +10,11 @@
 #include "setup/gk_spread.h"
 
 enum {
-    NODES = 88,          /* of a side's table in one pitch */
-    CACHE = 4,           /* coefficient sets kept */
-    GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
-    MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
+    NODES = 88,           /* of a side's table in one pitch */
+    CACHE = 4,            /* coefficient sets kept */
+    OSCILLATOR_STATE = 4, /* q, v, f, f_rate */
+    GAMMAS = 25,          /* γ is known at h·2^(−i/4) */
+    MAX_CANDIDATES = 24,  /* tooth pairs that can be near contact at any position, both flanks */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
     FAR = 12,     /* patterns by which engagements of one gear feel each other */
     MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
@@ -180,9 +181,9 @@ typedef struct gk_ground_flow { /* the same of the ground group */
 } gk_ground_flow;
 
 typedef struct gk_coefficients {
-    double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
-    int timeless;                                                     /* forces move nothing in the step: D = 0 */
-    int curved_read;                                                  /* mix4: the gap reads more than q */
+    double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa, rigid_lead; /* the same of a free mass */
+    int timeless;    /* forces move nothing in the step: D = 0 */
+    int curved_read; /* mix4: the gap reads more than q */
     gk_flow flow[MAX_GEARS];
     gk_ground_flow ground;
     uint64_t age;
@@ -264,13 +265,13 @@ static inline double *gk_ground_of(gk_data *data) { return GK_OF(data, oscillato
 static inline gk_real *gk_modal_of(const gk_setup *setup, gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
+    return (gk_real *)(GK_OF(data, oscillator) + OSCILLATOR_STATE * setup->base.n) + setup->modal[g].at;
 }
 static inline const double *gk_ground_seen(const gk_data *data) { return GK_OF(data, oscillator); }
 static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (const gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
+    return (const gk_real *)(GK_OF(data, oscillator) + OSCILLATOR_STATE * setup->base.n) + setup->modal[g].at;
 }
 /* kinetic energy of a spin */
 static inline double gk_kinetic(const gk_setup *setup, int d, double speed)
