@@ -188,13 +188,18 @@ def test_a_run_that_goes_on_with_its_own_setup_is_not_disturbed(kind: Kind) -> N
 
 
 SETUPS = {"standard": {"level": 2.0}, "half": {"h": INNER / 2}, "gyroscopic": {"effect.gyroscopic": 0.0}}
+SWITCHED = "modes that become exponential in the shorter step move the force by 7 %; at 3 µs, where none does, by 2e-5"
 
 
 @pytest.mark.parametrize("new", list(SETUPS.values()), ids=list(SETUPS))
 @pytest.mark.parametrize("kind", kinds(("pair", "internal")))
-def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(kind: Kind, new: dict[str, float]) -> None:
+def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(
+    kind: Kind, new: dict[str, float], request: pytest.FixtureRequest
+) -> None:
     """One communication step later motion and forces are those of the run that stays, but for what the setups differ by
     over it."""
+    if kind.name == "internal" and "h" in new:
+        request.applymarker(pytest.mark.xfail(reason=SWITCHED, strict=True))
     if not new.keys() <= {v.name for v in kind.model().kernel_variables()}:
         pytest.skip("the stage has no such effect")
     assert max(adopted(kind, new, range(40, 56, 4)).values()) < ELSEWHERE
