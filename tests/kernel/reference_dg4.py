@@ -90,8 +90,8 @@ class Scheme:
 
 @dataclass
 class State:
-    """y, v (n,): modal state, y = displacement + κ f · f (n,): modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta, dash (m,):
-    η of the last step, the dashpots' part of it, and their force at its end."""
+    """y, v (n,): modal state, y = displacement + κ f · f (n,): modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta,
+    dash (m,): η of the last step, the dashpots' part of it, and their force at its end."""
 
     y: np.ndarray
     v: np.ndarray
@@ -217,8 +217,8 @@ class Reference:
         return State(y, v, external + self.w.T @ force, force, reached, eta, dash, late)
 
     def energy(self, state: State) -> float:
-        """The invariant of the undamped step without external work: Σ weight (½v² + ½ω²y²) + ½λᵀC′λ, J, and what the dashpots'
-        force holds in the compliance outside their paths."""
+        """The invariant of the undamped step without external work: Σ weight (½v² + ½ω²y²) + ½λᵀC′λ, J, and
+        what the dashpots' force holds in the compliance outside their paths."""
         modal = 0.5 * self.weight @ (state.v**2 + (self.problem.omega * state.y) ** 2)
         held = self.a @ state.late @ (state.force + 0.5 * state.late)
         return float(modal + 0.5 * state.force @ self.c @ state.force + held)

@@ -56,10 +56,9 @@ static void take_head(const passage *c)
 /* rigid rotations: what the scheme adds to displacement and speed is taken off */
 static void take_spins(const passage *c)
 {
-    for (int d = 0; d < c->old->spins; d++)
-        GK_OF(c->data, x)
-        [d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * GK_OF(c->from, f)[d],
-            GK_OF(c->data, v)[d] -= c->k->rigid_lead * c->old->inverse_inertia[d] * GK_OF(c->from, f_rate)[d];
+    for (int d = 0; d < c->old->spins; d++) GK_OF(c->data, x)
+    [d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * GK_OF(c->from, f)[d],
+        GK_OF(c->data, v)[d] -= c->k->rigid_lead * c->old->inverse_inertia[d] * GK_OF(c->from, f_rate)[d];
 }
 
 /* displacement, speed and force of the ground oscillators; pushed: modal forces on those that were compliance */

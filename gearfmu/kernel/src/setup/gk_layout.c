@@ -167,7 +167,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
         setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
     }
-    setup->amplitudes = OSCILLATOR_STATE * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
+    setup->amplitudes = OSCILLATOR_STATE * (size_t)setup->base.n +
+                        (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
     uint32_t arrays[ARRAYS];
     gk_data_plan(model, arrays);
     setup->state_size = sizeof(gk_data) +
