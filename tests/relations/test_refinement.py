@@ -77,8 +77,7 @@ def _refined(**finer: Any) -> StageModel:
     return assembled(finer_stage, made)
 
 
-MESH = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=4)
-FINER = {"modes": 200, "roll_points": 16, "width_functions": 5, "mesh": MESH}
+FINER = {"modes": 200, "roll_points": 16, "width_functions": 5}
 
 
 @pytest.mark.parametrize(
@@ -89,6 +88,14 @@ def test_twice_the_numbers_of_a_body(finer: Mapping[str, int]) -> None:
     kind = KINDS["internal"]
     coarse = harmonics(kind.model(), kind.torque)
     assert moved(coarse, harmonics(_refined(**finer), kind.torque), LENGTH) == []
+
+
+@pytest.mark.full
+def test_one_and_a_half_times_the_mesh() -> None:
+    """From eight elements along a flank on: with four, a tenth of the eighth harmonic is missing."""
+    kind, mesh = KINDS["internal"], MeshSpec(flank=8, thickness=2, root=4, rim=4, width=4)
+    coarse, fine = (_refined(mesh=mesh.model_copy(update={"scale": scale})) for scale in (1.0, 1.5))
+    assert moved(harmonics(coarse, kind.torque), harmonics(fine, kind.torque), LENGTH) == []
 
 
 @pytest.mark.parametrize("name", ["pair", pytest.param("helical", marks=pytest.mark.full)])
