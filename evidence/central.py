@@ -22,11 +22,11 @@ import time
 from pathlib import Path
 
 import numpy as np
+from rattling.free import FreePair, Rattle, energies, free_pair, started
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.run.trace import write_columns

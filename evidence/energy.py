@@ -25,10 +25,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_states, variant  # noqa: E402
+from rattling.free import FreePair, Rattle, energies, free_pair, started  # noqa: E402
 
 from gearfmu.body import load_bodies  # noqa: E402
 from gearfmu.errors import SimulationError  # noqa: E402
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
 from gearfmu.stage.run.trace import write_columns  # noqa: E402
 

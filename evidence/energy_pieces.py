@@ -23,10 +23,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from kernel_variants import double_states, variant  # noqa: E402
+from rattling.free import FreePair, Rattle, free_pair, started  # noqa: E402
 
 from gearfmu.body import load_bodies  # noqa: E402
 from gearfmu.kernel import Kernel  # noqa: E402
-from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
 from gearfmu.stage import StageModel, Steady, assemble  # noqa: E402
 from gearfmu.stage.run.trace import write_columns  # noqa: E402

@@ -16,9 +16,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from rattling.light import STEP, LightRattle, run, statistics
 
 from gearfmu.body import load_bodies
-from gearfmu.scenes.light_rattle import STEP, LightRattle, run, statistics
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.trace import write_columns

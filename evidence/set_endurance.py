@@ -12,9 +12,10 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from stability.case import Case, Finding
+from stability.set_stepping import astray_for, standing_for, turning_for
+
 from gearfmu.files import write_text
-from gearfmu.stability.case import Case, Finding
-from gearfmu.stability.set_stepping import astray_for, standing_for, turning_for
 
 CASE = Case("fast", "default")
 

@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 from matplotlib import rc_context
+from step_benches.sets import SetRow, ladder
 
 from gearfmu.files import written_whole
 from gearfmu.report.study import draw
 from gearfmu.report.style import COLOURS, panels, styled
 from gearfmu.study import Row
-from gearfmu.study.sets import SetRow, ladder
 from gearfmu.study.table import read_rows
 
 HERE = Path(__file__).parent

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scenes import Scene
-
-from gearfmu.reduction.transient import Motion
+from transient import Motion
 
 LATE = 0.2  # the last part of a run whose error stands apart
 

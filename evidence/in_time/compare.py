@@ -27,12 +27,12 @@ from channels import channels, errors
 from chart import RUNS, draw
 from scenes import Meshes, Scene, carrier_planet, hammering
 from tables import read_rows, write_columns, write_rows
+from transient import Assembly, Member, Scheme, integrate
 
 from gearfmu.files import written_whole
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.reduction.transient import Assembly, Member, Scheme, integrate
 
 HERE = Path(__file__).parent
 TABLE = HERE / "errors.csv"

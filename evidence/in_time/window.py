@@ -20,9 +20,8 @@ import numpy as np
 from channels import channels
 from scenes import Meshes, Scene, carrier_planet, hammering
 from tables import read_columns, read_rows, write_columns, write_rows
+from transient import Motion, Scheme, integrate
 from transient_deck import Deck
-
-from gearfmu.reduction.transient import Motion, Scheme, integrate
 
 HERE = Path(__file__).parent
 sys.path.append(str(HERE.parent / "calculix"))

@@ -6,12 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from reduction_methods import METHODS
+from reduction_methods.interpolation import Sample, interpolate
 from small_body import ring_body, web_body
 
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
-from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, relative_error, transfer
 

@@ -5,10 +5,9 @@ planetary sets a few. All of them, at every level and step, are run by `make sta
 from __future__ import annotations
 
 import pytest
-
-from gearfmu.stability.case import Case
-from gearfmu.stability.scenes import SCENES
-from gearfmu.stability.suite import Row, Task, judge
+from stability.case import Case
+from stability.scenes import SCENES
+from stability.suite import Row, Task, judge
 
 QUICK = ("fast", "default")
 LONG = (  # more than ten seconds

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from gearfmu.stability.case import Case
-from gearfmu.stability.motion import Constant
-from gearfmu.stability.record import Record
-from gearfmu.stability.set_bench import (
+from stability.case import Case
+from stability.motion import Constant
+from stability.record import Record
+from stability.set_bench import (
     CENTRALS,
     MESHES,
     NOMINAL,

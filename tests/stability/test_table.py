@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gearfmu.stability.case import LEVELS, STEPS
-from gearfmu.stability.page import page
-from gearfmu.stability.scenes import SCENES
-from gearfmu.stability.suite import Task, read, table, tasks
+from stability.case import LEVELS, STEPS
+from stability.page import page
+from stability.scenes import SCENES
+from stability.suite import Task, read, table, tasks
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "evidence" / "stability.csv"

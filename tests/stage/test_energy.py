@@ -12,10 +12,10 @@ import light_rattle
 import numpy as np
 import pytest
 from kernel_variants import WITHOUT_ETA, variant
+from rattling.free import FreePair, Rattle, energies, free_pair, started
+from rattling.light import run, statistics
 
 from gearfmu.body import ReducedBody
-from gearfmu.scenes.light_rattle import run, statistics
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, simulate
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rattling.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from scipy.optimize import brentq
 
 import gearfmu as gf
@@ -17,7 +18,6 @@ from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
