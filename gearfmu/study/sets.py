@@ -32,7 +32,7 @@ from gearfmu.study.run import identity
 from gearfmu.study.table import KeptTable
 
 SETTLE, DURATION = 5e-3, 15e-3  # s
-STEPS = (10e-6, 5e-6, 2.5e-6, 1.25e-6)  # s
+STEPS = (10e-6, 6.7e-6, 5e-6, 2.5e-6, 1.25e-6)  # s
 BASE_STEP, FINEST = 5e-6, 0.4e-6  # s
 SLICES = (1, 10)
 PLANETS = (3, 5)
