@@ -40,7 +40,7 @@ VERBS = {
         "Loss of every mesh to friction of its flanks.",
     ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
-    "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),
+    "frf": ("gearfmu.commands.frf:frf", "Reduction of a body judged by its transfer matrix."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),
@@ -53,13 +53,9 @@ VERBS = {
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),
-    "stability": (
-        "gearfmu.commands.stability:stability",
-        "Run the hard cases at every level; exit code = number of failures.",
-    ),
     "effects": ("gearfmu.commands.effects:effects", "Effects: price of each, how to switch it."),
     "inspect": ("gearfmu.commands.files:inspect", "Show the contents of a stage, scene, body, trace or FMU."),
-    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; tables of variables, effects."),
+    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files."),
 }
 
 

@@ -15,6 +15,7 @@ from gearfmu import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "reduced_models").rglob("*.md")])
+TODAY = [page for page in PAGES if page.name != "CHANGELOG.md"]  # which names verbs and options of its time
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
@@ -35,14 +36,14 @@ def _exists(path: Path, test: str) -> bool:
     return path.exists() and (not test or f"def {test}(" in path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("page", TODAY, ids=lambda p: str(p.relative_to(ROOT)))
 def test_verbs_it_shows_are_real(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     shown = re.findall(r"(?:^|`)gearfmu ([a-z]+)\b", text, flags=re.MULTILINE)
     assert not set(shown) - set(cli.VERBS)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("page", TODAY, ids=lambda p: str(p.relative_to(ROOT)))
 def test_options_it_shows_are_those_of_their_verb(page: Path) -> None:
     """In code blocks and code spans; remarks behind # and other commands of a line are no options."""
     shown = re.findall(

@@ -22,10 +22,10 @@ from pathlib import Path
 
 import numpy as np
 
+from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_states, variant
 from gearfmu.body import load_bodies
 from gearfmu.errors import SimulationError
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import write_columns
 

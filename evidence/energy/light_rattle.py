@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from evidence.energy.light import STEP, LightRattle, run, statistics
 from gearfmu.body import load_bodies
-from gearfmu.scenes.light_rattle import STEP, LightRattle, run, statistics
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.trace import write_columns

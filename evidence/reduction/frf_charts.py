@@ -8,7 +8,7 @@ ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 v
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
 cost    : time and memory against the number of unknowns and of inputs. points : where the Krylov method expands.
 thickness : carriers interpolated between plates of 9.6 to 14.4 mm.
-Each writes evidence/frf_<name>.csv (ring and carrier also the curves) and charts in docs/pictures, and prints its
+Each writes frf_<name>.csv beside this file (ring and carrier also the curves) and charts in docs/pictures, and prints its
 table. References are verified by direct complex solutions of the full model at three lines.
 """
 
@@ -30,28 +30,27 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import numpy as np
 
-from gearfmu.commands.frf import loaded_rows
+from evidence.reduction.methods import METHODS
+from evidence.reduction.methods.charts import write_cost_chart, write_growth_chart
+from evidence.reduction.methods.comparison import Comparison, Contest, Trial, compare, rows_named
+from evidence.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.errors import BodyError
 from gearfmu.files import write_text
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.comparison import Comparison, Contest, Trial, compare
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
-from gearfmu.report.frf import label_of, write_cost_chart, write_error_chart, write_growth_chart
+from gearfmu.report.frf import error_curves, write_error_chart
 from gearfmu.spec.stage import load_stage
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parents[1] / "docs" / "pictures"
 FOUR = ("modal", "craig_bampton", "rubin", "krylov")
 SIZES = (24, 48, 72, 120, 168)
-PROCESSES = 2
 GROWTH_SCALE = 0.5
 MESH_SCALES = (0.35, 0.5, 0.7, 1.0)  # of the counts of the stage file's mesh
 RING_SCALE = 0.2
@@ -80,7 +79,7 @@ def _carrier(name: str, scale: float, title: str) -> None:
     body = carrier_full_order(load_stage("planetary54"), scale)
     body = body if name == "carrier_free" else body.grounded()
     before, load = time.process_time() - started, os.getloadavg()[0]
-    found = judged(body, [(method, 120) for method in FOUR], IN_PLANE, PROCESSES)
+    found = judged(body, [(method, 120) for method in FOUR], IN_PLANE)
     cost = {"all_cpu_s": before + found.seconds, "all_wall_s": time.perf_counter() - wall, "load_before": load}
     curves(found, f"frf_{name}", title)
     write(HERE / f"frf_{name}.csv", [{**row, **cost} for row in summary(body, with_memory(body, found))])
@@ -98,7 +97,7 @@ def growth() -> None:
     """Error against n and time, without and with the static residual."""
     body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
     entries = [(method, n) for n in SIZES for method in (*FOUR, "snapshots")]
-    found = judged(body, entries, IN_PLANE, PROCESSES)
+    found = judged(body, entries, IN_PLANE)
     rows = summary(body, found, verify=False)
     for row in rows:
         del row["memory_MB"]  # not traced
@@ -176,22 +175,19 @@ def thickness() -> None:
     write(HERE / "frf_thickness.csv", rows)
 
 
-def judged(
-    body: FullOrder, entries: Iterable[tuple[str, int]], loaded: str | None = None, processes: int = 1
-) -> Comparison:
+def judged(body: FullOrder, entries: Iterable[tuple[str, int]], loaded: str | None = None) -> Comparison:
     """All entries (method, n) on `body`. Measured without tracing, which costs a quarter."""
     labels = [(i.name, c) for i in body.interfaces if i.name not in body.ground for c in i.components]
-    chosen = loaded_rows(labels, loaded) if loaded else None
+    chosen = rows_named(labels, loaded) if loaded else None
     contest = Contest(tuple((method, Size(n)) for method, n in entries), Judging.over(), chosen)
-    return compare(body, contest, processes=processes)
+    return compare(body, contest)
 
 
 def with_memory(body: FullOrder, found: Comparison) -> Comparison:
     """The same with the memory of each trial, from another run of them all."""
     entries = tuple((t.method, Size(t.model.size)) for t in found.trials)
-    again = replace(body)  # nothing kept
     tracemalloc.start()
-    traced = compare(again, Contest(entries, found.reference.judging), processes=PROCESSES)
+    traced = compare(body, Contest(entries, found.reference.judging))
     tracemalloc.stop()
     return replace(found, trials=tuple(map(_with_memory_of, found.trials, traced.trials)))
 
@@ -232,13 +228,8 @@ def summary(body: FullOrder, found: Comparison, verify: bool = True) -> list[dic
 
 def curves(found: Comparison, name: str, title: str) -> None:
     """The curves as `method,n,frequency_Hz,error` and as a chart."""
-    frequency = found.reference.judging.frequency
-    drawn = {"norm": (frequency, np.linalg.norm(found.reference.matrix, axis=(1, 2)))}
-    lines = ["method,n,frequency_Hz,error"]
-    for t in found.trials:
-        drawn[f"{label_of(t.method)}, n = {t.model.size}"] = (frequency, t.error)
-        lines += [f"{t.method},{t.model.size},{f:.6g},{e:.4e}" for f, e in zip(frequency, t.error, strict=True)]
-    write_text(HERE / f"{name}_curves.csv", "\n".join(lines) + "\n")
+    table, drawn = error_curves(found.reference, [(t.method, t.model.size, t.error) for t in found.trials])
+    write_text(HERE / f"{name}_curves.csv", table)
     write_error_chart(drawn, PICTURES / name, title)
 
 

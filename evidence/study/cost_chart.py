@@ -7,11 +7,11 @@ from pathlib import Path
 
 from matplotlib import rc_context
 
+from evidence.study.sets import SetRow, ladder
 from gearfmu.files import written_whole
 from gearfmu.report.study import draw
 from gearfmu.report.style import COLOURS, panels, styled
 from gearfmu.study import Row
-from gearfmu.study.sets import SetRow, ladder
 from gearfmu.study.table import read_rows
 
 HERE = Path(__file__).resolve().parent

@@ -82,27 +82,24 @@ def write_report(
     stage: PathLike | Form | None = None,
     home: PathLike | None = None,
     tell: Callable[[str], None] = warnings.warn,
-    sound: str | None = None,
 ) -> Path:
     """Write report.html of a trace into the folder `out`; returns its path.
 
     trace : a Trace, or the file of one.
-    stage : of the run, for the picture of the deformed gears; the one that the trace names when None.
+    stage : of the run, for the deformed gears; the one that the trace names when None.
     home : folder of the run's other files (deformation.h5); `out` when None.
-    tell : is called with a sentence where stage or bodies cannot be read and the report goes without that picture.
-    sound : the channel to be heard, a bearing or mesh force when None. TraceError for one that there is not.
+    tell : is called with a sentence where stage or bodies cannot be read and the report goes without them.
     """
     trace = trace if isinstance(trace, Trace) else Trace.load(trace)
-    summary = {**trace.meta, "sound": trace.chosen([sound])[0]} if sound is not None else trace.meta
     if not (stage or stage_of(trace.meta)):
-        return write(trace, summary, Path(out))
+        return write(trace, trace.meta, Path(out))
     try:
         spec, bodies = stage_and_bodies(trace.meta, stage)
         deformation = recorded_deformation(trace, Path(home or out))
-        return write(trace, summary, Path(out), spec, bodies, deformation)
+        return write(trace, trace.meta, Path(out), spec, bodies, deformation)
     except GearfmuError as error:
-        tell(f"the report goes without the deformed pair: {error}")
-        return write(trace, summary, Path(out))
+        tell(f"the report goes without the deformed gears: {error}")
+        return write(trace, trace.meta, Path(out))
 
 
 def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike], path: PathLike) -> Path:

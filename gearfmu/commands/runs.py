@@ -157,15 +157,14 @@ def deformed(path: Path, stage: str | None, out: Path | None) -> None:
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
-@click.option("--stage", help="STAGE of the run, for the picture of the deformed gears.")
+@click.option("--stage", help="STAGE of the run, for the deformed gears.")
 @click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
-@click.option("--sound", metavar="CHANNEL", help="Channel to be heard: data/sound.wav and in the page.")
-def report(path: Path, stage: str | None, out: Path | None, sound: str | None) -> None:
+def report(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
     from gearfmu.api.results import trace_file, write_report
 
     source = trace_file(path)
-    click.echo(write_report(source, out or source.parent, stage, source.parent, _tell, sound))
+    click.echo(write_report(source, out or source.parent, stage, source.parent, _tell))
 
 
 @click.command()

@@ -22,7 +22,7 @@ from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
-from gearfmu.study.ladder import base_point, points, quick_scene
+from gearfmu.study.ladder import base_point, points, window
 from gearfmu.study.norm import band_error, errors, lock_time
 from gearfmu.study.notes import notes
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
@@ -68,7 +68,7 @@ class Job:
     @property
     def window(self) -> SceneSpec:
         """The scene as it is run."""
-        return quick_scene(self.scene) if self.quick else self.scene
+        return window(self.scene, self.quick)
 
 
 @dataclass(frozen=True)

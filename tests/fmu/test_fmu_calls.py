@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from fmpy.fmi2 import fmi2CallbackLoggerTYPE
 
-from gearfmu.fmu.probes import CHECKS, ERROR, OK, Subject
-from gearfmu.fmu.validate import exchange_functions
+from evidence.fmu_probes.everything import exchange_functions
+from evidence.fmu_probes.probes import CHECKS, ERROR, OK, Subject
 
 MODES = ("instantiated", "initialization", "step", "discarded", "terminated")
 ALLOWED = {

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from small_model import pair_blob, with_nodes
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage.build.blob import read_blob, write_blob
 from gearfmu.stage.build.fields import order_sections
-from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 DG4, RK45, CENTRAL = 0, 3, 4
 FULL, PAPER = 3, 4

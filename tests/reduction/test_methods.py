@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small_body import mounted, small, tiny
 
+from evidence.reduction.methods import METHODS, snapshots
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
-from gearfmu.reduction.methods import METHODS, snapshots
 from gearfmu.reduction.moments import input_loads
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer

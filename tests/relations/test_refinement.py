@@ -20,7 +20,9 @@ from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.run.set_te import stage_te
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.trace import Trace
-from gearfmu.study.sets import Point, errors, measure, models_for, window
+from gearfmu.study.bench import Point, measure, models_for
+from gearfmu.study.ladder import window
+from gearfmu.study.norm import errors
 
 HARMONICS, POSITIONS = 8, 64
 LEVEL, LENGTH = 1.0, 1e-9  # dB, m

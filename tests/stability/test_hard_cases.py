@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import pytest
 
-from gearfmu.stability.case import Case
-from gearfmu.stability.scenes import SCENES
-from gearfmu.stability.suite import Row, Task, judge
+from evidence.stability.case import Case
+from evidence.stability.scenes import SCENES
+from evidence.stability.suite import Row, Task, judge
 
 QUICK = ("fast", "default")
 LONG = (  # more than ten seconds

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfmu.stability.case import Case
-from gearfmu.stability.motion import Constant
-from gearfmu.stability.record import Record
-from gearfmu.stability.set_bench import (
+from evidence.stability.case import Case
+from evidence.stability.motion import Constant
+from evidence.stability.record import Record
+from evidence.stability.set_bench import (
     CENTRALS,
     MESHES,
     NOMINAL,

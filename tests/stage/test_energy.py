@@ -7,15 +7,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import energy
-import light_rattle
 import numpy as np
 import pytest
 
+from evidence.energy import energy, light_rattle
+from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
+from evidence.energy.light import run, statistics
 from gearfmu.body import ReducedBody
-from gearfmu.scenes.light_rattle import run, statistics
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, simulate
 

@@ -7,9 +7,9 @@ import central
 import energy_pieces
 import pytest
 
+from evidence.energy.free import FreePair, Rattle, free_pair, started
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
-from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started
 from gearfmu.spec.stage import StageSpec
 
 FAST, FULL, EXPLICIT = 1, 3, 5

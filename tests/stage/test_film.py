@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
+from evidence.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, set_bodies, set_spec
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FilmSpec
-from gearfmu.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, set_bodies, set_spec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.build.film import REACH, film_impulse, film_resistance
-from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 DG4, EM, RK45, CENTRAL = 0.0, 2.0, 3.0, 4.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m

@@ -13,11 +13,11 @@ import pytest
 from scipy.optimize import brentq
 
 import gearfmu as gf
+from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate

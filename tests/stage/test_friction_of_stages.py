@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from evidence.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, SPEED, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, SPEED, set_bodies, set_spec
 from gearfmu.stage import assemble
 
 TORQUE, STEP, RUN, SETTLED = -150.0, 2e-5, 350, 100  # N·m on the sun, s, communication steps

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from evidence.energy.free import Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate

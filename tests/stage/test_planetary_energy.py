@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
+from evidence.stability.set_bench import ALL_MESHES, TORQUE, SetVariant, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.stability.set_bench import ALL_MESHES, TORQUE, SetVariant, set_bodies, set_spec
 from gearfmu.stage import StageModel, assemble
 
 H, STEPS = 5e-6, 400

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from evidence.reduction.in_time.scenes import Scene
-from gearfmu.reduction.transient import Motion
+from evidence.reduction.in_time.transient import Motion
 
 LATE = 0.2  # the last part of a run whose error stands apart
 

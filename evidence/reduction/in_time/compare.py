@@ -28,11 +28,11 @@ from evidence.reduction.in_time.channels import channels, errors
 from evidence.reduction.in_time.chart import RUNS, draw
 from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
 from evidence.reduction.in_time.tables import read_rows, write_columns, write_rows
+from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
 from gearfmu.files import written_whole
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.reduction.transient import Assembly, Member, Scheme, integrate
 
 HERE = Path(__file__).parent
 TABLE = HERE / "errors.csv"

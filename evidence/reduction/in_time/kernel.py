@@ -16,17 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
+from evidence.energy.free import Rattle, free_pair, started
 from evidence.reduction.in_time.channels import errors
 from evidence.reduction.in_time.contact_points import contact_points
 from evidence.reduction.in_time.scenes import GRID, Solid, gear, joint_rows, nominal_play, placed_gear, touching
 from evidence.reduction.in_time.tables import write_columns, write_rows
+from evidence.reduction.in_time.transient import Assembly, Joints, Member, Scheme, integrate
 from gearfmu.body import reduce_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.reduction.transient import Assembly, Joints, Member, Scheme, integrate
-from gearfmu.scenes.rattle import Rattle, free_pair, started
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage.build.nodal import mesh_penalty

@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from evidence.reduction.in_time.contact_points import Grid, Placed, Points, contact_points
+from evidence.reduction.in_time.transient import Assembly, Joints, Member
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import rotated
 from gearfmu.femesh.sector import gear_sector
@@ -24,7 +25,6 @@ from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.reduction.carrier import carrier_elements
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
-from gearfmu.reduction.transient import Assembly, Joints, Member
 from gearfmu.spec.stage import load_stage
 
 TORQUE, RAMP = 150.0, 0.1e-3  # N·m, s

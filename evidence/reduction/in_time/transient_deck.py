@@ -15,8 +15,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from evidence.reduction.in_time.scenes import Scene, Solid
+from evidence.reduction.in_time.transient import Scheme
 from gearfmu.fem.coupling import rigid_fields
-from gearfmu.reduction.transient import Scheme
 
 MM = 1e3
 ARM, OPENING, CLOSING = 10.0, 1e3, 5.0  # mm: length of a contact's spring, ends of its table

@@ -22,8 +22,8 @@ from evidence.peers.calculix.ccx import require_ccx, run
 from evidence.reduction.in_time.channels import channels
 from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
 from evidence.reduction.in_time.tables import read_columns, read_rows, write_columns, write_rows
+from evidence.reduction.in_time.transient import Motion, Scheme, integrate
 from evidence.reduction.in_time.transient_deck import Deck
-from gearfmu.reduction.transient import Motion, Scheme, integrate
 
 HERE = Path(__file__).parent
 
