@@ -1,10 +1,10 @@
-"""Writes docs/variables.md and docs/effects.md. From evidence/:  python -m pages"""
+"""Writes docs/variables.md and docs/effects.md: python -m evidence.pages"""
 
 from pathlib import Path
 
+from evidence.pages.effects import effects_page
+from evidence.pages.variables import variables_page
 from gearfmu.files import write_text
-from pages.effects import effects_page
-from pages.variables import variables_page
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

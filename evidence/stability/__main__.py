@@ -1,4 +1,4 @@
-"""Hard cases at every level, from evidence/:  python -m stability [--level …] [--h …] [--scene …] [--out TABLE]"""
+"""Hard cases at every level: python -m evidence.stability [--level …] [--h …] [--scene …] [--out TABLE]"""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
+from evidence.stability.case import LEVELS, STEPS
 from gearfmu.commands.shared import Quantity, progress_bar
-from stability.case import LEVELS, STEPS
 
 
 class StepSize(Quantity):
@@ -29,10 +29,18 @@ class StepSize(Quantity):
 
 @click.command()
 @click.option(
-    "--level", "levels", multiple=True, type=click.Choice(LEVELS), help="Level; may repeat. All when not given."
+    "--level",
+    "levels",
+    multiple=True,
+    type=click.Choice(LEVELS),
+    help="Level; may repeat. All when not given.",
 )
 @click.option(
-    "--h", "steps", multiple=True, type=StepSize(), help="Internal step; may repeat. The three words when not given."
+    "--h",
+    "steps",
+    multiple=True,
+    type=StepSize(),
+    help="Internal step; may repeat. The three words when not given, at level fast alone.",
 )
 @click.option("--scene", "scenes", multiple=True, help="Scene; may repeat. All when not given.")
 @click.option(
@@ -52,13 +60,14 @@ def stability(
     levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int, listed: bool
 ) -> int:
     """Run the hard cases. Exit code: the number of failures (at most 99), 0 for none."""
-    from stability import suite
-    from stability.scenes import SCENES, what
+    from evidence.stability import suite
+    from evidence.stability.scenes import SCENES, what
 
     if listed:
         click.echo("\n".join(f"{name}: {what(name)}" for name in scenes or SCENES))
         return 0
     wanted = suite.tasks(scenes or tuple(SCENES), levels or LEVELS, steps or tuple(STEPS))
+    wanted = wanted if levels or steps else list(filter(suite.usual, wanted))
     with progress_bar("stability") as progress:
         rows = suite.run_suite(wanted, out, jobs, progress)
     click.echo(suite.table(rows), nl=False)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from evidence.stability.case import STEPS, Case
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
@@ -17,7 +18,6 @@ from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec
 from gearfmu.spec.tables.lead import LeadSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from stability.case import STEPS, Case
 
 RELIEVED, PLAIN = "fzg_c/stage_relief", "fzg_c"
 SHAFTS = ("pinion", "wheel")

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from evidence.stability.bench import Variant, geometry, internal_step, kernel, model
+from evidence.stability.case import COMPLETED, Case, Finding
+from evidence.stability.checks import Expected, at_least, finding, lost, statistics
+from evidence.stability.record import NAMES, Record, Stopped, run
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import run as run_scene
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.tables.ports import ChainSpec, PortSpec
-from stability.bench import Variant, geometry, internal_step, kernel, model
-from stability.case import COMPLETED, Case, Finding
-from stability.checks import Expected, at_least, finding, lost, statistics
-from stability.record import NAMES, Record, Stopped, run
 
 DUMP = "clutch_dump"  # the shipped scene
 LOCKINGS, PERIOD = 100, 5e-3  # number, s

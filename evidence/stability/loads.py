@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.spec.tables.ports import PortSpec
-from stability.bench import PLAIN, Variant, geometry, kernel, model
-from stability.case import Case, Finding
-from stability.checks import (
+from evidence.stability.bench import PLAIN, Variant, geometry, kernel, model
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import (
     CLEARANCE,
     SOFTEST,
     Expected,
@@ -26,8 +25,9 @@ from stability.checks import (
     near,
     statistics,
 )
-from stability.motion import RPM, Constant, Step, Turning, loaded, mid_backlash, winding
-from stability.record import Inputs, overlap, run
+from evidence.stability.motion import RPM, Constant, Step, Turning, loaded, mid_backlash, winding
+from evidence.stability.record import Inputs, overlap, run
+from gearfmu.spec.tables.ports import PortSpec
 
 H = 1e-4  # s, communication step
 OVERLOAD_ENERGY = 1e-3  # not 1e-4: under 6000 N·m the balance drifts by 2e-4 at every h and level (docs/stability.md)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from stability.bench import SHAFTS, Variant, geometry, mean_te, model
+from evidence.stability.bench import SHAFTS, Variant, geometry, mean_te, model
 
 RPM = 3.141592653589793 / 30.0
 

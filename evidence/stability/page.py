@@ -1,4 +1,4 @@
-"""docs/stability.md from the table: from evidence/: python -m stability.page stability.csv ../docs/stability.md."""
+"""docs/stability.md from the table: python -m evidence.stability.page TABLE docs/stability.md."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from evidence.stability.case import LEVELS, STEPS
+from evidence.stability.checks import ENERGY
+from evidence.stability.loads import OVERLOAD_ENERGY
+from evidence.stability.scenes import SCENES
+from evidence.stability.set_bench import SET_ENERGY
+from evidence.stability.set_loads import JAMMED_ENERGY
+from evidence.stability.suite import Row, read
 from gearfmu.files import write_text
-from stability.case import LEVELS, STEPS
-from stability.checks import ENERGY
-from stability.loads import OVERLOAD_ENERGY
-from stability.scenes import SCENES
-from stability.set_bench import SET_ENERGY
-from stability.set_loads import JAMMED_ENERGY
-from stability.suite import Row, read
 
 HEAD = """# Hard cases
 
@@ -21,13 +21,14 @@ For users who ask how much a stage survives, and for developers who change the k
 hard case, read its row and judge a failure.
 
 The suite has {scenes} scenes: lost contact, overload, jammed teeth, clutch dumps, pin errors, rollbacks and very long \
-runs. It runs each at levels `fast`, `standard` and `full`, with the kernel's default step, half and a quarter of it.
+runs. It runs each at levels `fast`, `standard` and `full` with the kernel's default step, and at `fast` with half \
+and a quarter of it.
 
 ```
-python -m stability --list                                   # every scene: event and checks
-python -m stability --level fast --h default                   # what continuous integration runs
-python -m stability --scene rollbacks --h "5 us" --out my.csv  # one scene, another step; a later call continues my.csv
-make stability                                               # everything: table and this page, four hours of one core
+python -m evidence.stability --list                                     # every scene: event and checks
+python -m evidence.stability --level fast --h default                   # what continuous integration runs
+python -m evidence.stability --scene rollbacks --h "5 us" --out my.csv  # one scene; a later call continues my.csv
+make stability                                                          # everything: table and this page
 ```
 
 The exit code is the number of failures.
@@ -47,7 +48,7 @@ belongs to the model, not to the step.
 
 Scenes that begin with `set_` run on `planetary54` with three pins out of place (12 µm ahead, 6 µm outward, 8 µm \
 behind). Equal planets on ideal pins would hide the modes of sun and carrier. Runs of a set last hundredths of a \
-second. Longer ones (10 s, 1e7 steps, 10⁴ rollbacks) are in `evidence/set_endurance.py`. No scene gives sets pitch \
+second. Longer ones (10 s, 1e7 steps, 10⁴ rollbacks) ran through on 2026-11-27. No scene gives sets pitch \
 errors.
 
 ## Results
@@ -61,12 +62,12 @@ read.
 |---|---|---|---|---|---|---|
 """
 TAIL = """
-All rows are of the present kernel. A step whose energy balance has no root is solved without it and counts as \
-unsolved ([theory](theory.md)); the rest shows in the energy residual.
+The rows were made <!-- made: stability --><!-- -->. A step whose energy balance has no root is solved without it and \
+counts as unsolved ([theory](theory.md)); the rest shows in the energy residual.
 
 ## The table
 
-[evidence/stability.csv](../evidence/stability.csv) has a row for each case; `stability.json` beside it has the \
+[stability.csv](../evidence/stability/stability.csv) has a row for each case; `stability.json` beside it has the \
 statistics of each run. The site draws the table below.
 
 | column | meaning |
@@ -81,7 +82,7 @@ largest stored energy |
 The default step is the largest at which γ stays 1 ([theory](theory.md), 3.5). At its half and quarter γ may be \
 lowered, which costs accuracy but no energy; bit 8 of `status` in the statistics reports it.
 
-<!-- csv: evidence/stability.csv -->
+<!-- csv: evidence/stability/stability.csv -->
 """
 KINDS = ("gear pair", "gear pair with friction or oil", "train of two meshes", "planetary set")
 
@@ -106,7 +107,7 @@ def kind_of(scene: str) -> str:
 def _summary(rows: Sequence[Row]) -> str:
     failed = [row for row in rows if row.failed]
     names = "".join(f"\n- {r.scene}, {r.case.level}, {r.case.step}: {'; '.join(r.finding.complaints)}" for r in failed)
-    every = len(SCENES) * len(LEVELS) * len(STEPS)
+    every = len(SCENES) * (len(LEVELS) + len(STEPS) - 1)
     return f"{len(rows)} of {every} cases run, {len(failed)} failed.{names}\n"
 
 

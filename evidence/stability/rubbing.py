@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from stability.bench import Variant, geometry, kernel, model
-from stability.case import Case, Finding
-from stability.checks import at_least, at_most, finding, mean_torque, near
-from stability.loads import DRAG, DRIVEN, LARGEST, LOOSE, NOMINAL, RELIEVED, SWING, H, swinging
-from stability.motion import RPM, Constant, Step, Turning, loaded, winding
-from stability.record import run
+from evidence.stability.bench import Variant, geometry, kernel, model
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_least, at_most, finding, mean_torque, near
+from evidence.stability.loads import DRAG, DRIVEN, LARGEST, LOOSE, NOMINAL, RELIEVED, SWING, H, swinging
+from evidence.stability.motion import RPM, Constant, Step, Turning, loaded, winding
+from evidence.stability.record import run
 
 MU = 0.1
 FRICTION = {"effect.friction": 1.0, "friction_coefficient": MU}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from stability import (
+from evidence.stability import (
     clutches,
     loads,
     rubbing,
@@ -20,7 +20,7 @@ from stability import (
     stepping,
     trains,
 )
-from stability.case import Case, Finding
+from evidence.stability.case import Case, Finding
 
 SCENES: dict[str, Callable[[Case], Finding]] = {
     function.__name__: function

@@ -11,6 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from evidence.stability.bench import kernel
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import CLEARANCE, deep, judged, near
+from evidence.stability.motion import Motion, Step
+from evidence.stability.record import Inputs, Record, Stopped, Watched, run
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.kernel import Kernel
@@ -20,11 +25,6 @@ from gearfmu.spec.stage import load_set
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
-from stability.bench import kernel
-from stability.case import Case, Finding
-from stability.checks import CLEARANCE, deep, judged, near
-from stability.motion import Motion, Step
-from stability.record import Inputs, Record, Stopped, Watched, run
 
 SET = "planetary54"
 PLANETS, SHAFTS = 4, ("carrier", "sun")

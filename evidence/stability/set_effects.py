@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.spec.tables.ports import PortSpec
-from stability.case import COMPLETED, Case, Finding
-from stability.checks import at_most
-from stability.motion import Constant, Step
-from stability.set_bench import (
+from evidence.stability.case import COMPLETED, Case, Finding
+from evidence.stability.checks import at_most
+from evidence.stability.motion import Constant, Step
+from evidence.stability.set_bench import (
     MESHES,
     NOMINAL,
     PLAIN_SET,
@@ -23,6 +22,7 @@ from stability.set_bench import (
     set_run,
     steady,
 )
+from gearfmu.spec.tables.ports import PortSpec
 
 EFFECTS = (
     "residual",

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.spec.tables.ports import PortSpec
-from stability.case import Case, Finding
-from stability.checks import at_least, at_most, near
-from stability.motion import Constant
-from stability.set_bench import (
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_least, at_most, near
+from evidence.stability.motion import Constant
+from evidence.stability.set_bench import (
     MESHES,
     NOMINAL,
     RATIO,
@@ -24,6 +23,7 @@ from stability.set_bench import (
     steady,
     sun_torque,
 )
+from gearfmu.spec.tables.ports import PortSpec
 
 TURNING = Constant(SPEED)
 DURATION, SETTLED = 0.022, 0.012  # s

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from stability.case import Case, Finding
-from stability.checks import Expected, at_least, near, statistics
-from stability.motion import Constant, Step
-from stability.record import Record
-from stability.set_bench import (
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import Expected, at_least, near, statistics
+from evidence.stability.motion import Constant, Step
+from evidence.stability.record import Record
+from evidence.stability.set_bench import (
     ALL_MESHES,
     MESHES,
     NOMINAL,

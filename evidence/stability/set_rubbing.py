@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from stability.case import Case, Finding
-from stability.checks import at_least
-from stability.motion import Constant, Step
-from stability.rubbing import MU
-from stability.set_bench import ALL_MESHES, NOMINAL, PLAIN_SET, SPEED, Carried, carries, set_finding, set_run
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_least
+from evidence.stability.motion import Constant, Step
+from evidence.stability.rubbing import MU
+from evidence.stability.set_bench import ALL_MESHES, NOMINAL, PLAIN_SET, SPEED, Carried, carries, set_finding, set_run
 
 FRICTION = {"effect.friction": 1.0, **{f"{mesh}.friction_coefficient": MU for mesh in ALL_MESHES}}
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_least
+from evidence.stability.motion import Constant
+from evidence.stability.record import Record
+from evidence.stability.set_bench import MESHES, RATIO, SPEED, Carried, SetVariant, set_finding, set_run, steady
 from gearfmu.spec.tables.ports import ChainSpec, PortSpec
-from stability.case import Case, Finding
-from stability.checks import at_least
-from stability.motion import Constant
-from stability.record import Record
-from stability.set_bench import MESHES, RATIO, SPEED, Carried, SetVariant, set_finding, set_run, steady
 
 SHIFTS, PERIOD, CLOSED = 100, 1e-3, 0.6  # number, s, share of the period
 BRAKED = SetVariant(

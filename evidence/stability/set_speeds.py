@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from stability.case import Case, Finding
-from stability.checks import at_least
-from stability.motion import RPM, Constant, UpAndDown
-from stability.record import Record
-from stability.set_bench import (
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_least
+from evidence.stability.motion import RPM, Constant, UpAndDown
+from evidence.stability.record import Record
+from evidence.stability.set_bench import (
     NOMINAL,
     PLAIN_SET,
     RATIO,

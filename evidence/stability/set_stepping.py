@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from gearfmu.kernel import Kernel
-from stability.astray import run_astray
-from stability.case import Case, Finding
-from stability.checks import at_most
-from stability.motion import Constant
-from stability.record import Record, Stopped, run_times
-from stability.set_bench import (
+from evidence.stability.astray import run_astray
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_most
+from evidence.stability.motion import Constant
+from evidence.stability.record import Record, Stopped, run_times
+from evidence.stability.set_bench import (
     ALL_MESHES,
     NOMINAL,
     PLAIN_SET,
@@ -25,6 +24,7 @@ from stability.set_bench import (
     set_run,
     steady,
 )
+from gearfmu.kernel import Kernel
 
 TURNING = Carried(Constant(SPEED), steady(NOMINAL))
 MESH_PERIOD = 2 * math.pi / (SPEED * 54)  # s
@@ -35,7 +35,7 @@ SHORTEST, LONGEST, EQUAL = 1e-6, 3e-4, 2e-5  # s, communication steps
 
 
 def set_standstill(case: Case) -> Finding:
-    """600 N·m at rest for 0.1 s (10 s: evidence/set_endurance.py): forces and transmission errors may not creep by
+    """600 N·m at rest for 0.1 s (10 s on 2026-11-27): forces and transmission errors may not creep by
     more than 1e-4."""
     return standing_for(0.1, case)
 
@@ -53,7 +53,7 @@ def standing_for(duration: float, case: Case) -> Finding:
 
 
 def set_many_steps(case: Case) -> Finding:
-    """600 N·m at 85 rad/s for 2e4 internal steps (1e7: evidence/set_endurance.py): once the start has died away
+    """600 N·m at 85 rad/s for 2e4 internal steps (1e7 on 2026-11-27): once the start has died away
     forces and transmission errors of all meshes, over whole mesh periods, drift by no more than 1e-3."""
     return turning_for(INTERNAL_STEPS, case)
 
@@ -106,7 +106,7 @@ def _apart(made: Record, equal: Record, name: str) -> float:
 
 def set_rollbacks(case: Case) -> Finding:
     """600 N·m at 85 rad/s; at every step the state is saved, the run goes astray for 1 to 3 steps under other torques
-    through the backlash and returns: 400 times (10⁴: evidence/set_endurance.py), and the end is bit for bit that of
+    through the backlash and returns: 400 times (10⁴ on 2026-11-27), and the end is bit for bit that of
     the straight run."""
     return astray_for(ROLLBACKS, case)
 

@@ -6,6 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from evidence.stability.bench import internal_step
+from evidence.stability.case import COMPLETED, Case, Finding
+from evidence.stability.checks import CLEARANCE, Expected, at_least, at_most, deep, judged, statistics
+from evidence.stability.record import Record, Watched
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
@@ -14,10 +18,6 @@ from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel
-from stability.bench import internal_step
-from stability.case import COMPLETED, Case, Finding
-from stability.checks import CLEARANCE, Expected, at_least, at_most, deep, judged, statistics
-from stability.record import Record, Watched
 
 BACKFIRE = "planetary_backfire"  # the shipped scene
 PLANETS, CENTRALS, SHAFTS = 4, ("sun", "ring"), ("carrier", "sun")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from stability.bench import geometry, kernel, model
-from stability.case import Case, Finding
-from stability.checks import Expected, at_least, finding, statistics
-from stability.loads import RELIEVED, H
-from stability.motion import RPM, UpAndDown, loaded
-from stability.record import Record, run
+from evidence.stability.bench import geometry, kernel, model
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import Expected, at_least, finding, statistics
+from evidence.stability.loads import RELIEVED, H
+from evidence.stability.motion import RPM, UpAndDown, loaded
+from evidence.stability.record import Record, run
 
 LOW, HIGH, DURATION = 5000.0, 18000.0, 2.0  # rpm, rpm, s
 TORQUE = 15.0  # N·m: so little that tip relief excites far more than the stiffness does

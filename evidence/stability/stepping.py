@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from stability.astray import run_astray
-from stability.bench import Variant, geometry, kernel, model
-from stability.case import Case, Finding
-from stability.checks import at_most, finding, mean_torque, near
-from stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, swinging
-from stability.motion import RPM, Constant, loaded
-from stability.record import run, run_times
+from evidence.stability.astray import run_astray
+from evidence.stability.bench import Variant, geometry, kernel, model
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import at_most, finding, mean_torque, near
+from evidence.stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, swinging
+from evidence.stability.motion import RPM, Constant, loaded
+from evidence.stability.record import run, run_times
 
 SPEED = 2000 * RPM
 MESH_PERIOD = 60.0 / 2000 / 16  # s

@@ -15,22 +15,21 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from evidence.stability.bench import PLAIN, RELIEVED, Variant, geometry, model
+from evidence.stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
+from evidence.stability.checks import finding
+from evidence.stability.clutches import DUMP
+from evidence.stability.record import Stopped
+from evidence.stability.scenes import SCENES
+from evidence.stability.sets import BACKFIRE, planetary
+from evidence.stability.trains import CLOSING, train
 from gearfmu.errors import GearfmuError, ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.scene import scene_path
 from gearfmu.stage.build.blob import rounded_hash
-from stability.bench import PLAIN, RELIEVED, Variant, geometry, model
-from stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
-from stability.checks import finding
-from stability.clutches import DUMP
-from stability.record import Stopped
-from stability.scenes import SCENES
-from stability.sets import BACKFIRE, planetary
-from stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
-RUBBING = {"rubbing", "set_rubbing"}  # files of the scenes with friction
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -72,6 +71,11 @@ def tasks(scenes: Sequence[str], levels: Sequence[str], steps: Sequence[str | fl
         for level in levels
         for step in steps
     ]
+
+
+def usual(task: Task) -> bool:
+    """Whether a combination is one of the table: level fast at every step, every level at the default step."""
+    return task.case.level == "fast" or task.case.step == "default"
 
 
 def run_suite(wanted: Sequence[Task], out: Path | None, jobs: int, progress: Progress | None = None) -> list[Row]:
@@ -122,19 +126,16 @@ def _nothing(outcome: str, case: Case, message: str) -> Finding:
 
 
 def key_of(scene: str) -> str:
-    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`; its parts behind "+" only where a scene has
-    friction, or slices with gaps of their own) and what the scene is made from: the file of the scene and those of
-    this package that it imports, the assembled stages (bodies, damping, cuts), files of scenes.
+    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`) and what the scene is made from: the file of
+    the scene and those of this package that it imports, the assembled stages (bodies, damping, cuts), files of scenes.
     """
     used, left = set[str](), [SCENES[scene].__module__.rpartition(".")[2]]
-    kernel, friction, slices, *_ = [*fingerprint().split("+"), "", ""]
     while left:
         name = left.pop()
         if name not in used:
             used.add(name)
-            left += re.findall(r"^from stability\.(\w+) import", _source(name), flags=re.MULTILINE)
-    parts = kernel, friction if used & RUBBING else "", slices if "trains" in used else ""
-    digest = hashlib.sha256("".join(parts).encode())
+            left += re.findall(r"^from evidence\.stability\.(\w+) import", _source(name), flags=re.MULTILINE)
+    digest = hashlib.sha256(fingerprint().encode())
     for name in sorted(used):
         digest.update(_source(name).encode())
         digest.update(_made_from(name, (PLAIN, RELIEVED)).encode())

@@ -9,6 +9,11 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from evidence.stability.bench import internal_step, kernel
+from evidence.stability.case import COMPLETED, Case, Finding
+from evidence.stability.checks import at_least, deep, judged, near
+from evidence.stability.motion import RPM, Step
+from evidence.stability.record import Record, Stopped, Watched, run
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import run as run_scene
@@ -18,11 +23,6 @@ from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from stability.bench import internal_step, kernel
-from stability.case import COMPLETED, Case, Finding
-from stability.checks import at_least, deep, judged, near
-from stability.motion import RPM, Step
-from stability.record import Record, Stopped, Watched, run
 
 TRAIN, CLOSING = "two_stage", "clutch_closure_train"  # shipped stage and scene
 WATCHED = Watched(("stage1", "stage2"), ("input", "output"))

@@ -5,9 +5,10 @@ planetary sets a few. All of them, at every level and step, are run by `make sta
 from __future__ import annotations
 
 import pytest
-from stability.case import Case
-from stability.scenes import SCENES
-from stability.suite import Row, Task, judge
+
+from evidence.stability.case import Case
+from evidence.stability.scenes import SCENES
+from evidence.stability.suite import Row, Task, judge
 
 QUICK = ("fast", "default")
 LONG = (  # more than ten seconds

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stability.case import Case
-from stability.motion import Constant
-from stability.record import Record
-from stability.set_bench import (
+
+from evidence.stability.case import Case
+from evidence.stability.motion import Constant
+from evidence.stability.record import Record
+from evidence.stability.set_bench import (
     CENTRALS,
     MESHES,
     NOMINAL,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, SPEED, set_bodies, set_spec
 
+from evidence.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, SPEED, set_bodies, set_spec
 from gearfmu.kernel import Kernel
 from gearfmu.stage import assemble
 

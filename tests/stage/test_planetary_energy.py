@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernel_variants import WITHOUT_ETA, variant
-from stability.set_bench import ALL_MESHES, TORQUE, SetVariant, set_bodies, set_spec
 
+from evidence.energy.kernel_variants import WITHOUT_ETA, variant
+from evidence.stability.set_bench import ALL_MESHES, TORQUE, SetVariant, set_bodies, set_spec
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
 
