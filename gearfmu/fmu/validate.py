@@ -20,7 +20,6 @@ from lxml import etree
 
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu.probes import CHECKS
-from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, read_stage_file
 from gearfmu.fmu.symbols import exported_symbols
 from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 
@@ -95,6 +94,8 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
 
 def _stage(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
     """An FMU of ours says which stage it is, and means the model beside it."""
+    from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, read_stage_file  # with all of stages and bodies
+
     if not (folder / MODEL_FILE).is_file():
         return
     if not (folder / STAGE_FILE).is_file():

@@ -11,7 +11,8 @@ import energy
 import light_rattle
 import numpy as np
 import pytest
-from kernel_variants import WITHOUT_ETA, variant
+from builds import edited_library
+from kernel_variants import WITHOUT_ETA
 
 from gearfmu.body import ReducedBody
 from gearfmu.scenes.light_rattle import run, statistics
@@ -26,9 +27,8 @@ SHORT = {"starts": 1, "duration": 0.01, "level": "fast"}
 
 
 @pytest.fixture(scope="module")
-def libraries(double_library: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None]:
-    folder = tmp_path_factory.mktemp("kernels")
-    return {"shipped": None, "double": double_library, "no eta": variant(folder, "no_eta", WITHOUT_ETA)}
+def libraries(double_library: Path) -> dict[str, Path | None]:
+    return {"shipped": None, "double": double_library, "no eta": edited_library("no_eta", WITHOUT_ETA, "double")}
 
 
 @pytest.fixture(scope="module")
