@@ -1,12 +1,16 @@
-"""What all tests share: needs of a test that a machine may lack, with one message for each."""
+"""What all tests share: results that are made once, a budget of processor time, and needs of a test that a machine may
+lack, with one message for each."""
 
 from __future__ import annotations
 
 import importlib.util
+import resource
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
+import reuse
 from builds import double_library as double_build
 from builds import inner_library as inner_build
 
@@ -19,8 +23,59 @@ REMEDY = {
 }
 
 
+BUDGET = 20.0  # core-minutes of the tests that are not full; the aim is 12
+SPENT = pytest.StashKey[list[float]]()
+
+reuse.share()  # before the modules of tests import what is replaced
+
+
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "needs(*names): programs or Python packages this test cannot do without")
+    config.stash[SPENT] = []
+
+
+# ---- budget: core-minutes of this process or its workers, with all that they started ---------------------------------
+def core_minutes() -> float:
+    """Processor time of this process and of its children that have ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used) / 60
+
+
+def is_worker(config: pytest.Config) -> bool:
+    return hasattr(config, "workerinput")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """A worker has ended."""
+    node.config.stash[SPENT].append(node.workeroutput["core_minutes"] if hasattr(node, "workeroutput") else 0.0)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """The session fails where the whole of the fast tests takes more than the budget."""
+    config = session.config
+    if is_worker(config):
+        config.workeroutput["core_minutes"] = core_minutes()  # type: ignore[attr-defined]
+        return
+    if not config.stash[SPENT]:  # no workers: all was done here
+        config.stash[SPENT].append(core_minutes())
+    if over_budget(config) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def over_budget(config: pytest.Config) -> bool:
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS and config.option.markexpr == "not full"
+    return whole and not config.option.keyword and sum(config.stash[SPENT]) > BUDGET
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    spent, of = sum(config.stash[SPENT]), f" of {BUDGET:g}" if config.option.markexpr == "not full" else ""
+    over = over_budget(config)
+    terminalreporter.write_line(f"{spent:.1f}{of} core-minutes{': over budget' * over}", red=over, bold=True)
+
+
+# ---- needs -----------------------------------------------------------------------------------------------------------
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

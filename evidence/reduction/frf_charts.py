@@ -8,8 +8,8 @@ ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 v
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
 cost    : time and memory against the number of unknowns and of inputs. points : where the Krylov method expands.
 thickness : carriers interpolated between plates of 9.6 to 14.4 mm.
-Each writes frf_<name>.csv beside this file (ring and carrier also the curves) and charts in docs/pictures, and prints its
-table. References are verified by direct complex solutions of the full model at three lines.
+Each writes frf_<name>.csv beside this file (ring and carrier also the curves) and charts in docs/pictures, and prints
+its table. References are verified by direct complex solutions of the full model at three lines.
 """
 
 from __future__ import annotations

@@ -9,13 +9,14 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from builds import leaky_library
 
 from evidence.fmu_probes.everything import findings
 from gearfmu.body import load_body
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
-from gearfmu.kernel.build import PORTABLE, build_library, host_platform
+from gearfmu.kernel.build import host_platform
 from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
@@ -109,9 +110,8 @@ def test_damaged_model_is_refused_by_the_binary(members, tmp_path):
 
 @pytest.mark.needs("gcc")
 def test_leaked_symbols_are_found(members, tmp_path):
-    one_more = ("gcc", "-O0", PORTABLE, "-Wl,--defsym=leaked=fmi2GetVersion")
-    leaky = build_library(out=tmp_path / "leaky.so", compiler=one_more)
-    found = findings(damaged(members, {binary_of(members): leaky.read_bytes()}, tmp_path), ())
+    leaky = leaky_library().read_bytes()
+    found = findings(damaged(members, {binary_of(members): leaky}, tmp_path), ())
     assert len(found) == 1 and "leaked is exported" in found[0]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import reuse
 
 from gearfmu.kernel import Kernel
 
@@ -53,6 +54,7 @@ class Inner:
 
     def force_gamma(self, gamma: float) -> None:
         """Keep this γ whatever the limit of the step says; after `kernel.initialize`."""
+        reuse.keep(self.kernel)
         self._lib.probe_set_gamma(self._handles()[1], ctypes.c_double(gamma))
 
     def runout(self, pose: np.ndarray, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

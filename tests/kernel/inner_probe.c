@@ -28,7 +28,7 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
 {
     gk_system s;
     memset(&s, 0, sizeof s);
-    s.contacts = 1;
+    s.contacts = s.n = 1, s.stride = 4;
     s.curvature[0] = curvature, s.force[0] = force;
     s.width[0] = model->engagement[0].width / setup->slices;
     s.per_width[0] = 1.0 / s.width[0];

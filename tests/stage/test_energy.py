@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builds import edited_library
 
 from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
-from evidence.energy.kernel_variants import WITHOUT_ETA, variant
+from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
 from gearfmu.body import ReducedBody
 from gearfmu.spec.stage import StageSpec
@@ -25,9 +26,8 @@ SHORT = {"starts": 1, "duration": 0.01, "level": "fast"}
 
 
 @pytest.fixture(scope="module")
-def libraries(double_library: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None]:
-    folder = tmp_path_factory.mktemp("kernels")
-    return {"shipped": None, "double": double_library, "no eta": variant(folder, "no_eta", WITHOUT_ETA)}
+def libraries(double_library: Path) -> dict[str, Path | None]:
+    return {"shipped": None, "double": double_library, "no eta": edited_library("no_eta", WITHOUT_ETA, "double")}
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,144 @@
+"""What many tests of one process would make again: bodies read, models assembled and opened, kernels prepared.
+
+Each is a function of its arguments alone, so `share()` keeps its results by them; a test that changes an input gets a
+result of its own. Kept arrays cannot be written to.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache, wraps
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import gearfmu.body.bodies as bodies
+import gearfmu.stage.build.assembly as assembly
+from gearfmu.kernel import instance
+
+SHIPPED = Path(__file__).resolve().parents[1] / "reduced_models"
+PREPARED = 6e9  # bytes of the largest setups of the kernels that are kept; a tenth of them is used
+HEAD = 1 << 20  # bytes: more than the head of gk_work, behind which there is scratch only
+MODELS = 24  # opened models, and assembled ones of the same bodies
+
+
+def share() -> None:
+    """Keep results for the life of this process."""
+    bodies.load_body = _read_once(bodies.load_body)
+    bodies.load_interface_body = _read_once(bodies.load_interface_body)
+    everywhere(assembly.assemble, _assembled_once(assembly.assemble))
+    instance._opened = lru_cache(MODELS)(instance._opened.__wrapped__)
+    instance.Kernel.prepare = _prepared_once(instance.Kernel.prepare)
+
+
+def everywhere(old: Callable[..., Any], new: Callable[..., Any]) -> None:
+    """Put `new` in the place of `old` in all modules that have imported it by its name."""
+    for module in list(sys.modules.values()):
+        if getattr(module, old.__name__, None) is old:
+            setattr(module, old.__name__, new)
+
+
+def _read_once(load: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    @lru_cache
+    def known(path: Path, _time: int, _size: int) -> Any:
+        return _frozen(load(path))
+
+    @wraps(load)
+    def read(path: Any) -> Any:
+        path = Path(path).resolve()
+        if SHIPPED not in path.parents or not path.is_file():
+            return load(path)
+        return known(path, path.stat().st_mtime_ns, path.stat().st_size)
+
+    return read
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif is_dataclass(value):
+        for field in fields(value):
+            _frozen(getattr(value, field.name))
+    return value
+
+
+def _assembled_once(assemble: Callable[..., Any]) -> Callable[..., Any]:
+    kept: OrderedDict[tuple[Any, ...], list[tuple[Any, Any, Any]]] = OrderedDict()
+
+    @wraps(assemble)
+    def found(spec: Any, of: Sequence[Any], rolls: int = assembly.ROLLS, observe: Sequence[str] = ()) -> Any:
+        key = (type(spec), rolls, tuple(observe), *map(id, of))
+        for known, _, model in kept.get(key, ()):
+            if known == spec:
+                kept.move_to_end(key)
+                return model
+        model = assemble(spec, of, rolls, observe)
+        kept.setdefault(key, []).append((spec, tuple(of), model))  # with the bodies: their ids stay theirs
+        del kept[key][:-MODELS]
+        if len(kept) > MODELS:
+            kept.popitem(last=False)
+        return model
+
+    return found
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Memory of a prepared kernel, with the head of its work as prepared."""
+
+    setup: tuple[Any, int]
+    work: tuple[Any, int]
+    head: bytes
+    warning: str
+    model: Any  # kept open
+
+
+def _prepared_once(prepare: Callable[[Any], None]) -> Callable[[Any], None]:
+    """gk_prepare reads the model and its parameters and fills setup and work. A kernel that is prepared as a former
+    one, which is no more, takes over its memory: setup is constant since, the head of work is put back."""
+    free: OrderedDict[tuple[Any, ...], list[Prepared]] = OrderedDict()
+
+    def give_back(key: tuple[Any, ...], memory: Prepared) -> None:
+        free.setdefault(key, []).append(memory)
+        free.move_to_end(key)
+        while sum(len(one.setup[0]) for ones in free.values() for one in ones) > PREPARED:
+            free.popitem(last=False)
+
+    @wraps(prepare)
+    def found(kernel: Any) -> None:
+        if former := kernel.__dict__.pop("_gives_back", None):  # prepared once more
+            former()
+            kernel._setup_keep, kernel._setup = instance.aligned(len(kernel._setup_keep))
+            kernel._work_keep, kernel._work = instance.aligned(len(kernel._work_keep))
+            return prepare(kernel)
+        key = (id(kernel._opened), *map(kernel.get, _parameters(kernel)))
+        if ones := free.get(key):
+            memory = ones.pop()
+            ctypes.memmove(memory.work[1], memory.head, len(memory.head))
+        else:
+            prepare(kernel)
+            head = ctypes.string_at(kernel._work, min(HEAD, len(kernel._work_keep)))
+            setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
+            memory = Prepared(setup, work, head, kernel.warning, kernel._opened)
+        (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work) = memory.setup, memory.work
+        kernel.warning = memory.warning
+        kernel._gives_back = weakref.finalize(kernel, give_back, key, memory)
+        kernel._gives_back.atexit = False
+
+    return found
+
+
+def keep(kernel: Any) -> None:
+    """For a test that writes to a setup: nobody takes this one over."""
+    if gives_back := kernel.__dict__.pop("_gives_back", None):
+        gives_back.detach()
+
+
+def _parameters(kernel: Any) -> list[str]:
+    return [name for name, variable in kernel.variables.items() if variable.causality == "parameter"]
