@@ -7,7 +7,6 @@ import importlib.util
 import resource
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 import reuse
@@ -46,9 +45,9 @@ def is_worker(config: pytest.Config) -> bool:
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node: Any) -> None:
+def pytest_testnodedown(node: object) -> None:
     """A worker has ended."""
-    node.config.stash[SPENT].append(node.workeroutput["core_minutes"] if hasattr(node, "workeroutput") else 0.0)
+    node.config.stash[SPENT].append(getattr(node, "workeroutput", {}).get("core_minutes", 0.0))
 
 
 @pytest.hookimpl(trylast=True)
@@ -69,7 +68,7 @@ def over_budget(config: pytest.Config) -> bool:
     return whole and not config.option.keyword and sum(config.stash[SPENT]) > BUDGET
 
 
-def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     spent, of = sum(config.stash[SPENT]), f" of {BUDGET:g}" if config.option.markexpr == "not full" else ""
     over = over_budget(config)
     terminalreporter.write_line(f"{spent:.1f}{of} core-minutes{': over budget' * over}", red=over, bold=True)

@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -37,20 +36,20 @@ def share() -> None:
     instance.Kernel.prepare = _prepared_once(instance.Kernel.prepare)
 
 
-def everywhere(old: Callable[..., Any], new: Callable[..., Any]) -> None:
+def everywhere(old: Callable[..., object], new: Callable[..., object]) -> None:
     """Put `new` in the place of `old` in all modules that have imported it by its name."""
     for module in list(sys.modules.values()):
         if getattr(module, old.__name__, None) is old:
             setattr(module, old.__name__, new)
 
 
-def _read_once(load: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def _read_once(load: Callable[[Path], object]) -> Callable[[Path], object]:
     @lru_cache
-    def known(path: Path, _time: int, _size: int) -> Any:
+    def known(path: Path, _time: int, _size: int) -> object:
         return _frozen(load(path))
 
     @wraps(load)
-    def read(path: Any) -> Any:
+    def read(path: Path) -> object:
         path = Path(path).resolve()
         if SHIPPED not in path.parents or not path.is_file():
             return load(path)
@@ -59,7 +58,7 @@ def _read_once(load: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return read
 
 
-def _frozen(value: Any) -> Any:
+def _frozen(value: object) -> object:
     if isinstance(value, np.ndarray):
         value.flags.writeable = False
     elif is_dataclass(value):
@@ -68,11 +67,11 @@ def _frozen(value: Any) -> Any:
     return value
 
 
-def _assembled_once(assemble: Callable[..., Any]) -> Callable[..., Any]:
-    kept: OrderedDict[tuple[Any, ...], list[tuple[Any, Any, Any]]] = OrderedDict()
+def _assembled_once(assemble: Callable[..., object]) -> Callable[..., object]:
+    kept: OrderedDict[tuple[object, ...], list[tuple[object, object, object]]] = OrderedDict()
 
     @wraps(assemble)
-    def found(spec: Any, of: Sequence[Any], rolls: int = assembly.ROLLS, observe: Sequence[str] = ()) -> Any:
+    def found(spec: object, of: Sequence[object], rolls: int = assembly.ROLLS, observe: Sequence[str] = ()) -> object:
         key = (type(spec), rolls, tuple(observe), *map(id, of))
         for known, _, model in kept.get(key, ()):
             if known == spec:
@@ -92,26 +91,26 @@ def _assembled_once(assemble: Callable[..., Any]) -> Callable[..., Any]:
 class Prepared:
     """Memory of a prepared kernel, with the head of its work as prepared."""
 
-    setup: tuple[Any, int]
-    work: tuple[Any, int]
+    setup: tuple[ctypes.Array, int]
+    work: tuple[ctypes.Array, int]
     head: bytes
     warning: str
-    model: Any  # kept open
+    model: object  # kept open
 
 
-def _prepared_once(prepare: Callable[[Any], None]) -> Callable[[Any], None]:
+def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[instance.Kernel], None]:
     """gk_prepare reads the model and its parameters and fills setup and work. A kernel that is prepared as a former
     one, which is no more, takes over its memory: setup is constant since, the head of work is put back."""
-    free: OrderedDict[tuple[Any, ...], list[Prepared]] = OrderedDict()
+    free: OrderedDict[tuple[object, ...], list[Prepared]] = OrderedDict()
 
-    def give_back(key: tuple[Any, ...], memory: Prepared) -> None:
+    def give_back(key: tuple[object, ...], memory: Prepared) -> None:
         free.setdefault(key, []).append(memory)
         free.move_to_end(key)
         while sum(len(one.setup[0]) for ones in free.values() for one in ones) > PREPARED:
             free.popitem(last=False)
 
     @wraps(prepare)
-    def found(kernel: Any) -> None:
+    def found(kernel: instance.Kernel) -> None:
         if former := kernel.__dict__.pop("_gives_back", None):  # prepared once more
             former()
             kernel._setup_keep, kernel._setup = instance.aligned(len(kernel._setup_keep))
@@ -134,11 +133,11 @@ def _prepared_once(prepare: Callable[[Any], None]) -> Callable[[Any], None]:
     return found
 
 
-def keep(kernel: Any) -> None:
+def keep(kernel: instance.Kernel) -> None:
     """For a test that writes to a setup: nobody takes this one over."""
     if gives_back := kernel.__dict__.pop("_gives_back", None):
         gives_back.detach()
 
 
-def _parameters(kernel: Any) -> list[str]:
+def _parameters(kernel: instance.Kernel) -> list[str]:
     return [name for name, variable in kernel.variables.items() if variable.causality == "parameter"]

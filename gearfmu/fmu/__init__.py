@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gearfmu.fmu.validate import validate
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["export", "validate"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name != "export":
         raise AttributeError(f"module 'gearfmu.fmu' has no attribute {name!r}")
     from gearfmu.fmu.package import export

@@ -91,7 +91,7 @@ def check_turned(kind: Kind, angles: tuple[float, ...]) -> None:
         assert apart[worst] < SAME, f"{worst} differs by {apart[worst]:.2g} where the layout is turned by {angle:.3g}"
 
 
-@pytest.mark.parametrize("name", ["pair", "helical", "internal", "train"])
+@pytest.mark.parametrize("name", ["pair", "helical", "internal", pytest.param("train", marks=pytest.mark.full)])
 def test_a_layout_turned_as_a_whole(name: str) -> None:
     """Sees a tooth that is found across −x, a tilt or an offset that does not turn with the layout."""
     check_turned(KINDS[name], ANGLES if name == "pair" else ANGLES[-1:])
