@@ -65,15 +65,15 @@ def leaky_library() -> Path:
 
 def edited_library(name: str, edits: Mapping[str, str], real: str = "float") -> Path:
     """The kernel with every match of the regular expressions in `edits` replaced; each must change something."""
-    changed = {}
+    changed, idle = {}, set(edits)
     for path in _c_files():
-        before = path.read_text(encoding="utf-8")
-        after = before
+        text = before = path.read_text(encoding="utf-8")
         for pattern, replacement in edits.items():
-            after = re.sub(pattern, replacement, after)
-        if after != before:
-            changed[path.name] = after
-    assert len(changed) >= len(edits), f"{edits} change {', '.join(changed) or 'nothing'} only: adapt them"
+            text, old = re.sub(pattern, replacement, text), text
+            idle -= {pattern} if text != old else set()
+        if text != before:
+            changed[path.name] = text
+    assert not idle, f"{idle} change nothing: adapt them"
     key = hashlib.sha256(repr(sorted(edits.items())).encode()).hexdigest()[:8]
     folder = KEPT / f"edited-{name}-{key}"
     folder.mkdir(parents=True, exist_ok=True)

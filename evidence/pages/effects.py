@@ -16,8 +16,8 @@ from `gearfmu/stage/effects.py`.
 
 *Cost* is the part of a step's instructions saved when the effect is off (`evidence/price/effects_cost.py`). *Off* is
 the excess of a step with the effect off over a kernel without its code. Case: pair with relief, 302 N·m at 2000 rpm,
-level fast, 5 slices; sets: `planetary54`, 600 N·m at 85 rad/s. Residual: level full with `em` against paper; tip corners at
-80 N·m; pitch errors on one tooth.
+level fast, 5 slices; sets: `planetary54`, 600 N·m at 85 rad/s. Residual: level full with `em` against paper; tip
+corners at 80 N·m; pitch errors on one tooth.
 """
 SWITCHES = """
 ## Off: meaning, switch, code, test
