@@ -65,6 +65,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.host = folder / "host"
+        self.counts: dict[tuple[Any, ...], Count] = {}
         program = Path(__file__).with_name("effects_host.c")
         subprocess.run(
             ["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"],
@@ -86,7 +87,13 @@ class Bench:
         return path if path.exists() else build_library(out=path, compiler=("cc", f"-DGK_WITHOUT={without}"))
 
     def count(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
-        """One run under callgrind. CalledProcessError when it fails."""
+        """One run under callgrind, or the count of an equal one. CalledProcessError when it fails."""
+        key = (library, model.hash, tuple(sorted(settings.items())), torque)
+        if key not in self.counts:
+            self.counts[key] = self._counted(library, model, settings, torque)
+        return self.counts[key]
+
+    def _counted(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
         blob = self.folder / f"{model.hash[:12]}.blob"
         blob.write_bytes(model.blob)
         of_set = model is self.turning

@@ -1,12 +1,12 @@
 """Reduction methods on the carrier and the ring of planetary54: the paper's Figs. 2 and 5 and what it does not show.
 
-    python -m evidence.reduction.frf_charts [carrier] [carrier_free] [ring] [growth] [cost] [points] [thickness]
+    python -m evidence.reduction.frf_charts [carrier] [carrier_free] [ring] [growth] [cost] [thickness]
                                     (all when none is named)
 
 carrier : n = 120, bore held, 24 inputs (Fig. 2). carrier_free : reduced free, as the kernel takes it.
 ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 vectors for comparison.
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
-cost    : time and memory against the number of unknowns and of inputs. points : where the Krylov method expands.
+cost    : time and memory against the number of unknowns and of inputs.
 thickness : carriers interpolated between plates of 9.6 to 14.4 mm.
 Each writes frf_<name>.csv beside this file (ring and carrier also the curves) and charts in docs/pictures, and prints
 its table. References are verified by direct complex solutions of the full model at three lines.
@@ -36,14 +36,12 @@ from evidence.reduction.methods.comparison import Comparison, Contest, Trial, co
 from evidence.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.errors import BodyError
 from gearfmu.files import write_text
-from gearfmu.reduction.basis import Basis, Growing, Size
+from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
+from gearfmu.reduction.transfer import Judging, direct, relative_error, transfer
 from gearfmu.report.frf import error_curves, write_error_chart
 from gearfmu.spec.stage import load_stage
 
@@ -52,14 +50,8 @@ PICTURES = HERE.parents[1] / "docs" / "pictures"
 FOUR = ("modal", "craig_bampton", "rubin", "krylov")
 SIZES = (24, 48, 72, 120, 168)
 GROWTH_SCALE = 0.5
-MESH_SCALES = (0.35, 0.5, 0.7, 1.0)  # of the counts of the stage file's mesh
+MESH_SCALES = (0.35, 0.5, 0.7)  # of the counts of the stage file's mesh
 RING_SCALE = 0.2
-LAYOUTS = (
-    ((0, 0.25, 0.5, 0.75, 1), (1, 1, 1, 1, 1)),
-    ((0, 0.5, 1), (2, 2, 1)),
-    ((0, 0.7), (2, 3)),
-    ((0,), (5,)),
-)
 IN_PLANE = "bolt*.ux,bolt*.uy"
 MESHING = "tooth0.ux,tooth0.uy,tooth13.ux,tooth13.uy,tooth27.ux,tooth27.uy,tooth40.ux,tooth40.uy"
 
@@ -127,24 +119,6 @@ def priced(body: FullOrder, size: int) -> list[dict[str, Any]]:
     """Rows of the four methods, alone in the process: what each costs."""
     found = judged(body, [(method, size) for method in FOUR])
     return summary(body, with_memory(body, found), verify=False)
-
-
-def points() -> None:
-    """Where the Krylov method expands: five blocks on two to five points (parts of the band's end), same size."""
-    body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
-    judging, rows = Judging.over(lines=80), []
-    full = reference(body, judging)
-    for shares, powers in LAYOUTS:
-        basis = Growing(elastic(body))
-        for share, power in zip(shares, powers, strict=True):
-            point = Expansion(body, (2 * np.pi * share * judging.frequency[-1]) ** 2)
-            for _ in range(power):
-                point.advance(basis)
-        model = oscillators(body, Basis("krylov", basis.vectors), judging.damping_ratio)
-        error = relative_error(full.matrix, transfer(model, judging, body.ground))
-        layout = {"points": " ".join(map(str, shares)), "powers": " ".join(map(str, powers)), "n": basis.size}
-        rows.append({**layout, "max_error": error.max(), "median_error": np.median(error)})
-    write(HERE / "frf_points.csv", rows)
 
 
 def thickness() -> None:
@@ -244,7 +218,7 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    measured = (carrier, carrier_free, ring, growth, cost, points, thickness)
+    measured = (carrier, carrier_free, ring, growth, cost, thickness)
     parts = {part.__name__: part for part in measured}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], help="what to measure")

@@ -372,4 +372,4 @@ def test_loaded_te_against_an_independent_program(tmp_path: Path) -> None:
         places = [round(benchmark.POSITIONS * position) for position in theirs]
         means = np.mean(list(theirs.values())), 1e6 * np.mean(ours.te[k, places])
         print(f"{torque} N·m, {len(theirs)} positions: {means[0]:.3f} and {means[1]:.3f} µm")
-        assert len(theirs) >= 8 and means[1] == pytest.approx(means[0], rel=0.03)
+        assert len(theirs) >= 4 and means[1] == pytest.approx(means[0], rel=0.03)
