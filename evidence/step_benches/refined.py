@@ -19,9 +19,9 @@ from gearfmu.report.style import panels, saved, styled
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage.build.tables import ROLLS
-from gearfmu.stage.run.dashpot import same_loss
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
+from step_benches.dashpot import same_loss
 
 H = 1.25e-6  # s, of all runs: the error of time is the same in both
 SCALE, MODES = 1.3, 2  # factors of the refined mesh (on all counts) and of the number of modes
@@ -51,7 +51,7 @@ class BodyRow:
 @dataclass(frozen=True)
 class Variant:
     """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls. Reduced
-    anew, the contact's dashpots take the constant with which they lose the same (`gearfmu.stage.run.dashpot`)."""
+    anew, the contact's dashpots take the constant with which they lose the same (`step_benches.dashpot`)."""
 
     name: str
     gears: tuple[Any, ...] | None
