@@ -6,10 +6,11 @@ PIP     = $(RUN) -m pip install --quiet
 BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
+PRICES  ?= phases steps fmu_overhead harness effects_cost levels
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
-EVIDENCE = $(RUN) evidence/ledger.py
+EVIDENCE = $(RUN) -m evidence.ledger
+TIER   ?= 1
 export JOBS
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -30,11 +31,11 @@ test: lint
 test-full: test
 	$(EVIDENCE) make --again test-full
 
-## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists
+## make bench       prices on this machine, which should be idle: the tables of evidence/price and the stages' price lists
 bench: $(STAMP)
-	$(EVIDENCE) make --again $(BENCHMARKS)
+	$(EVIDENCE) make --again $(PRICES)
 
-## make stability   the hard cases at every level and step: evidence/stability.csv and .json, docs/stability.md
+## make stability   the hard cases: table and page
 stability: $(STAMP)
 	$(EVIDENCE) make --again stability
 
@@ -46,11 +47,11 @@ study: $(STAMP)
 study-bodies: $(STAMP)
 	$(EVIDENCE) make --again study_bodies
 
-## make evidence    what is stale of all tables, pictures and pages, and only that; some by name: TARGETS="phases study"
+## make evidence    stale tables, pictures and pages of README and study; TIER=2: of validation too; TARGETS="phases study"
 evidence: $(STAMP)
-	$(EVIDENCE) make $(TARGETS)
+	$(EVIDENCE) make --tier $(TIER) $(TARGETS)
 
-## make evidence-check  lists what is stale; fails where README.md shows any of it
+## make evidence-check  lists what is stale; fails where any of it is of tier 1 (README, study)
 evidence-check: $(STAMP)
 	$(EVIDENCE) check
 

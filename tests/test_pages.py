@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pages import variables
-from pages.effects import effects_page
+from evidence.pages import variables
+from evidence.pages.effects import effects_page
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -1,7 +1,7 @@
 """Numbers that pages quote are those of the tables: a phrase with # for every number, and the cells where they stand.
 
-A cell is `column` of the rows of a table that hold the given values; `column%` is in per cent. A number agrees when
-the table rounds to it; a tolerance, where one is given, is a share of the number.
+A cell is `column` of the rows of a table that hold the given values; `column%` is in per cent, `column^` in thousands.
+A number agrees when the table rounds to it; a tolerance, where one is given, is a share of the number.
 
     python tests/test_quoted.py    writes the numbers of the tables into the pages
 """
@@ -20,8 +20,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY, SETS, BODIES = (f"evidence/study/{name}.csv" for name in ("study", "sets", "bodies"))
-WAYS, HARNESS = "evidence/set_ways.csv", "evidence/harness.csv"
-KERNEL, IN_TIME, FRF = "evidence/in_time/kernel.csv", "evidence/in_time/errors.csv", "evidence/frf_{}.csv"
+STEPS, HARNESS = "evidence/price/steps.csv", "evidence/price/harness.csv"
+KERNEL, IN_TIME, FRF = (
+    "evidence/reduction/in_time/kernel.csv",
+    "evidence/reduction/in_time/errors.csv",
+    "evidence/reduction/frf_{}.csv",
+)
 METHODS = {"modal": "modal truncation", "craig_bampton": "Craig–Bampton", "rubin": "Rubin / MacNeal"}
 METHODS |= {"krylov": "block Krylov"}
 NUMBER = r"(\d[\d.]*(?:e[+-]?\d+)?)"
@@ -57,27 +61,18 @@ def planets(level: str = "fast", h: str = "5e-06", count: str = "4", **more: str
 
 def of_pairs() -> Iterator[Quote]:
     """What accuracy costs, pairs."""
-    loaded = "A second of the loaded pair takes # s at # % error in transmission error and # % in mesh force"
-    yield Quote("README.md", loaded, ((STUDY, pair("fast", "1e-05"), "realtime_factor te_error% force_error%"),))
+    default, steps = pair("fast", "6.66667e-06"), {"stage": "fzg_c/stage_relief", "level": "fast", "h_s": "6.66667e-06"}
+    loaded = (
+        "At its default step a second of the loaded pair takes # s, # thousand instructions a step, at # % error in "
+        "transmission error and # % in mesh force"
+    )
+    cells = ((STUDY, default, "realtime_factor"), (STEPS, steps, "instructions_per_step^"))
+    yield Quote("README.md", loaded, (*cells, (STUDY, default, "te_error% force_error%")))
     slices = [(STUDY, pair("fast", "6.66667e-06") | {"slices": count}, "cpu_ratio") for count in ("1", "10")]
     yield Quote("docs/study.md", "One slice costs # of five, ten # times as much", tuple(slices))
     dear = "for # s (pair) to some # s (planetary set) of processor time a second"
-    price = ((STUDY, pair("fast", "1e-05"), "realtime_factor"), (SETS, planets(), "realtime_factor"))
+    price = ((STUDY, default, "realtime_factor"), (SETS, planets(), "realtime_factor"))
     yield Quote("README.md", dear, price, 0.15)
-    columns = "n_dyn te_error% force_error% bearing_error% realtime_factor cpu_ratio"
-    known = {"10": "1e-05", "6.67 (default)": "6.66667e-06", "5": "5e-06", "1.25": "1.25e-06"}
-    lines = [("rigid", "6.67", "6.66667e-06")] + [("fast", shown, h) for shown, h in known.items()]
-    lines += [(level, "6.67 (default)", "6.66667e-06") for level in ("standard", "full")] + [
-        ("full", "1.25", "1.25e-06")
-    ]
-    for level, shown, h in lines:
-        yield Quote(
-            "docs/study.md", f"| `{level}` | # | {shown} | # | # | # | # | #", ((STUDY, pair(level, h), columns),)
-        )
-    for level in ("full", "paper"):
-        row = {"scene": "pair_loaded", "level": level, "slices": "5", "integrator": "rk45"}
-        phrase = f"| `{level}`, `rk45` | # | # | # | # | # | # | #"
-        yield Quote("docs/study.md", phrase, ((STUDY, row, columns.replace(" ", " h_s~ ", 1)),))
     cheap = "10 µs give # and # % in # of real time"
     yield Quote("docs/study.md", cheap, ((STUDY, pair("fast", "1e-05"), "te_error% force_error% realtime_factor"),))
     light = [pair(level, "6.66667e-06", "pair_light") for level in ("fast", "standard", "full", "rigid")]
@@ -96,26 +91,10 @@ def of_pairs() -> Iterator[Quote]:
 
 def of_sets() -> Iterator[Quote]:
     """What accuracy costs, planetary sets; what a scene says of its level."""
-    columns = "te_error% force_error% pin_error% realtime_factor cpu_ratio"
-    steps = {
-        "rigid": ("5",),
-        "fast": ("10", "5", "1.25"),
-        "standard": ("5", "2.5"),
-        "full": ("5", "2.5"),
-    }
-    for level, shown in ((name, step) for name in steps for step in steps[name]):
-        row = planets(level, f"{float(shown.split()[0]) * 1e-6:g}")
-        yield Quote("docs/study.md", f"| `{level}` | {shown} | # | # | # | # | # |", ((SETS, row, columns),))
     few = "Three planets at `fast`: # and # %, # s a second. Five: # and # %, # s."
     cells = [(SETS, planets(count=count), "te_error% force_error% realtime_factor") for count in ("3", "5")]
     yield Quote("docs/study.md", few, tuple(cells))
     modes = [(SETS, planets(*of), "n_dyn") for of in (("fast",), ("full", "1.25e-06"), ("standard",))]
-    rk45 = {"level": "full", "integrator": "rk45"}
-    dg4 = [({"level": level, "h_s": h}, "cpu_ratio") for level, h in (("fast", "1e-05"), ("fast", "5e-06"))]
-    shares = [*dg4, ({"level": "full", "h_s": "5e-06"}, "cpu_ratio"), ({"level": "paper"}, "cpu_ratio")]
-    phrase = "`fast` costs # of it at 10 µs and # at 5 µs, `full` at 5 µs #, level `paper` #."
-    yield Quote("docs/study.md", phrase, tuple((WAYS, row, column) for row, column in shares))
-    yield Quote("docs/study.md", "`rk45` errs by # and # %:", ((WAYS, rk45, "te_error% force_error%"),))
     yield Quote("docs/study.md", "`fast` takes # of the # oscillators, `standard` #;", tuple(modes))
     own, both = {"against": "fast, 5 µs, 5 slices"}, "te_error% force_error%"
     slices = "*One slice* moves the ripple by # and # %, the mean transmission error by # times the ripple"
@@ -196,8 +175,8 @@ def numbers(cells: tuple[tuple[str, dict[str, str], str], ...]) -> Iterator[floa
     for table, wanted, columns in cells:
         (row,) = [row for row in rows_of(table) if wanted.items() <= row.items()]
         for column in columns.split():
-            factor = {"%": 100.0, "~": 1e6}.get(column[-1], 1.0)
-            yield factor * abs(float(row[column.rstrip("%~")]))
+            factor = {"%": 100.0, "^": 1e-3}.get(column[-1], 1.0)
+            yield factor * abs(float(row[column.rstrip("%^")]))
 
 
 def places(text: str, quote: Quote) -> list[tuple[str, ...]]:

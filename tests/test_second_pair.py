@@ -11,8 +11,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmu_probes.everything import findings
 
+from evidence.fmu_probes.everything import findings
 from gearfmu.body import reduce_bodies
 from gearfmu.fmu import export
 from gearfmu.geometry import PairGeometry

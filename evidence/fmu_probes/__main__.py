@@ -2,7 +2,7 @@
 
 import sys
 
-from fmu_probes.everything import findings
+from evidence.fmu_probes.everything import findings
 
 found = findings(sys.argv[1])
 print(*found, sep="\n")

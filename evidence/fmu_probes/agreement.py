@@ -8,7 +8,7 @@ from pathlib import Path
 from fmpy import read_model_description
 from fmpy.model_description import ScalarVariable
 
-from fmu_probes.symbols import exported_symbols
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.fmu.description import value_text
 from gearfmu.fmu.units import unit_of
 from gearfmu.kernel import Kernel, Variable

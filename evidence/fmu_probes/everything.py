@@ -9,8 +9,8 @@ from pathlib import Path
 
 import fmpy
 
-from fmu_probes.probes import CHECKS
-from fmu_probes.symbols import exported_symbols
+from evidence.fmu_probes.probes import CHECKS
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.fmu import validate
 from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 

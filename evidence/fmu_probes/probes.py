@@ -18,7 +18,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-from fmu_probes.agreement import compare
+from evidence.fmu_probes.agreement import compare
 
 OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4
 STIMULUS = {"rad": 1e-4, "rad/s": 1.0, "rad/s2": 10.0, "N.m": 1.0}

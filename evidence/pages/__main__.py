@@ -1,11 +1,11 @@
-"""Writes docs/variables.md, docs/effects.md and docs/drivetrain.md. From evidence/:  python -m pages"""
+"""Writes docs/variables.md, docs/effects.md and docs/drivetrain.md: python -m evidence.pages"""
 
 from pathlib import Path
 
+from evidence.pages import drivetrain
+from evidence.pages.effects import effects_page
+from evidence.pages.variables import variables_page
 from gearfmu.files import write_text
-from pages import drivetrain
-from pages.effects import effects_page
-from pages.variables import variables_page
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

@@ -1,4 +1,4 @@
-"""The hard cases as a program, from evidence/: python -m stability [--scene NAME]... [--out TABLE]"""
+"""The hard cases as a program: python -m evidence.stability [--scene NAME]... [--out TABLE]"""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from evidence.stability import suite
+from evidence.stability.case import CASES, LEVELS, STEPS, Case
+from evidence.stability.scenes import SCENES, what
 from gearfmu.commands.shared import progress_bar
 from gearfmu.units import to_si
-from stability import suite
-from stability.case import CASES, LEVELS, STEPS, Case
-from stability.scenes import SCENES, what
 
 
 def main(given: Sequence[str] | None = None) -> int:

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from evidence.stability.record import Inputs, Record, Run, Watched, run_times
 from gearfmu.kernel import Kernel
-from stability.record import Inputs, Record, Run, Watched, run_times
 
 STEP, LONGEST_WANDER = 2e-5, 3  # s; steps
 

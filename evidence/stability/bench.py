@@ -10,16 +10,16 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from evidence.stability.case import COMPLETED, STEPS, Case, Finding
+from evidence.stability.checks import ENERGY, deep, judged, near
+from evidence.stability.motion import Step, Turn
+from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.kernel import Kernel
 from gearfmu.spec.scene import load_scene
 from gearfmu.stage import StageModel
-from stability.case import COMPLETED, STEPS, Case, Finding
-from stability.checks import ENERGY, deep, judged, near
-from stability.motion import Step, Turn
-from stability.record import Inputs, Record, Stopped, Watched, run_times
 
 PROBE = 1e-3  # s
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stability.case import COMPLETED, Finding
-from stability.record import Record
+from evidence.stability.case import COMPLETED, Finding
+from evidence.stability.record import Record
 
 ENERGY = 1e-4  # of the energy through the ports and the largest stored one: the balance of a loaded damped run
 SOFTEST = 1.2e8  # N/m: one tooth pair in the corner of its path; 12.5 N/(mm µm) × 14 mm = 1.75e8 at the pitch point

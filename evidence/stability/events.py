@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from stability.astray import run_astray
-from stability.bench import Bench, steady
-from stability.case import Case, Finding
-from stability.checks import Expected, at_least, at_most, levels, lost, statistics
-from stability.motion import Constant, Step, Turn, UpAndDown
-from stability.record import Record
+from evidence.stability.astray import run_astray
+from evidence.stability.bench import Bench, steady
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import Expected, at_least, at_most, levels, lost, statistics
+from evidence.stability.motion import Constant, Step, Turn, UpAndDown
+from evidence.stability.record import Record
 
 Numbers = Mapping[str, float]
 BINS = 60

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from evidence.stability.bench import run_shipped
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import Expected, at_least, lost, statistics
+from evidence.stability.motion import RPM, Constant, Step
+from evidence.stability.pair import Pair
+from evidence.stability.train import Train
 from gearfmu.spec.tables.ports import ChainSpec, PortSpec
-from stability.bench import run_shipped
-from stability.case import Case, Finding
-from stability.checks import Expected, at_least, lost, statistics
-from stability.motion import RPM, Constant, Step
-from stability.pair import Pair
-from stability.train import Train
 
 LOCKINGS, PERIOD = 100, 5e-3  # number, s
 CLUTCHED = (

@@ -9,17 +9,17 @@ from functools import lru_cache
 
 import numpy as np
 
+from evidence.stability.bench import run_shipped
+from evidence.stability.case import COMPLETED, Case, Finding
+from evidence.stability.checks import CLEARANCE, Expected, at_least, at_most, near, statistics
+from evidence.stability.motion import Constant, Step, UpAndDown
+from evidence.stability.of_pairs import turns_of
+from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, PlanetSet, shares, sun_torque
+from evidence.stability.record import Record, Watched
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import ChainSpec, PortSpec
-from stability.bench import run_shipped
-from stability.case import COMPLETED, Case, Finding
-from stability.checks import CLEARANCE, Expected, at_least, at_most, near, statistics
-from stability.motion import Constant, Step, UpAndDown
-from stability.of_pairs import turns_of
-from stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, PlanetSet, shares, sun_torque
-from stability.record import Record, Watched
 
 EFFECTS = (
     "residual", "hertz", "coast_flank", "contact_damping", "tip_relief", "tip_contact", "bearings", "modal_damping",

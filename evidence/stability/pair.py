@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from evidence.stability.bench import Bench, at
+from evidence.stability.checks import CLEARANCE, SOFTEST
+from evidence.stability.motion import Step, Turn
+from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec, load_stage
@@ -16,10 +20,6 @@ from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec
 from gearfmu.spec.tables.lead import LeadSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from stability.bench import Bench, at
-from stability.checks import CLEARANCE, SOFTEST
-from stability.motion import Step, Turn
-from stability.record import Inputs, Record, Watched
 
 RELIEVED, PLAIN = "fzg_c/stage_relief", "fzg_c"
 SHAFTS = ("pinion", "wheel")

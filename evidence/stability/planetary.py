@@ -11,6 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from evidence.stability.bench import Bench, at
+from evidence.stability.checks import CLEARANCE
+from evidence.stability.motion import Step, Turn
+from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.members import member_of
@@ -19,10 +23,6 @@ from gearfmu.spec.stage import load_set
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
-from stability.bench import Bench, at
-from stability.checks import CLEARANCE
-from stability.motion import Step, Turn
-from stability.record import Inputs, Record, Watched
 
 SET = "planetary54"
 PLANETS, SHAFTS = 4, ("carrier", "sun")

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from evidence.stability.case import COMPLETED
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
-from stability.case import COMPLETED
 
 MESH = ("pairs", "force_mean", "force_max", "force_drive", "force_coast", "te", "contact", "impacts", "open_time")
 

@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from evidence.stability import events, of_pairs, of_sets
+from evidence.stability.bench import Bench
+from evidence.stability.case import Case, Finding
+from evidence.stability.checks import Expected
+from evidence.stability.motion import RPM, Constant, Step, Swinging, UpAndDown
+from evidence.stability.pair import PLAIN, Pair
+from evidence.stability.planetary import ALL_MESHES, RATIO, SPEED, TORQUE, PlanetSet
+from evidence.stability.train import Train
 from gearfmu.spec.tables.ports import PortSpec
-from stability import events, of_pairs, of_sets
-from stability.bench import Bench
-from stability.case import Case, Finding
-from stability.checks import Expected
-from stability.motion import RPM, Constant, Step, Swinging, UpAndDown
-from stability.pair import PLAIN, Pair
-from stability.planetary import ALL_MESHES, RATIO, SPEED, TORQUE, PlanetSet
-from stability.train import Train
 
 PAIR, TRAIN, SET = Pair(), Train(), PlanetSet()
 MU = 0.1

@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from evidence.stability.case import CASES, COMPLETED, LEVELS, STEPS, Case, Finding
+from evidence.stability.record import Stopped
+from evidence.stability.scenes import SCENES
 from gearfmu.errors import GearfmuError, ModelError, SimulationError
 from gearfmu.files import write_text
-from stability.case import CASES, COMPLETED, LEVELS, STEPS, Case, Finding
-from stability.record import Stopped
-from stability.scenes import SCENES
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
 GIVEN = "given"  # the step of a case whose h was named

@@ -8,13 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from evidence.stability.bench import Bench, at
+from evidence.stability.motion import Step, Turn
+from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import load_bodies
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from stability.bench import Bench, at
-from stability.motion import Step, Turn
-from stability.record import Inputs, Record, Watched
 
 TRAIN = "two_stage"
 PORT_OF = {"stage1": ("input", 0), "stage2": ("output", 1)}  # port that shares a shaft with gear A (0) or B (1)

@@ -1,6 +1,6 @@
 """The effects that a scene may call for: one table. docs/effects.md, `gearfmu effects` and the tests are made from it.
 
-What an effect costs is measured (evidence/effects_cost.py) and lies beside this file in effects_cost.csv.
+What an effect costs is measured (evidence/price/effects_cost.py) and lies beside this file in effects_cost.csv.
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pages.drivetrain import page
 from scipy.linalg import eigh
 
+from evidence.pages.drivetrain import page
 from gearfmu.cosim.drivetrain import (
     Shafts,
     build,

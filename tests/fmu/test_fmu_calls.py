@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 from fmpy.fmi2 import fmi2CallbackLoggerTYPE
-from fmu_probes.everything import exchange_functions
-from fmu_probes.probes import CHECKS, ERROR, OK, Subject
+
+from evidence.fmu_probes.everything import exchange_functions
+from evidence.fmu_probes.probes import CHECKS, ERROR, OK, Subject
 
 MODES = ("instantiated", "initialization", "step", "discarded", "terminated")
 ALLOWED = {

@@ -7,8 +7,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from fmu_probes.symbols import exported_symbols, load_commands, mach_slices
 
+from evidence.fmu_probes.symbols import exported_symbols, load_commands, mach_slices
 from gearfmu.fmu import export
 from gearfmu.kernel import library_path
 from gearfmu.kernel.build import build_library

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import read_model_description
-from fmu_probes.probes import Subject
+
+from evidence.fmu_probes.probes import Subject
 
 STEPS, H = 200, 1e-4
 NAMES = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]

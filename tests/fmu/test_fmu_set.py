@@ -9,10 +9,10 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmu_probes.everything import findings
-from fmu_probes.probes import Subject
 from small_stage import unpack
 
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export

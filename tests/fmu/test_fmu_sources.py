@@ -10,11 +10,11 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy import read_model_description
-from fmu_probes.everything import findings
-from fmu_probes.probes import Subject
 from lxml import etree
 from small_stage import unpack
 
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export
 from gearfmu.kernel.build import host_platform

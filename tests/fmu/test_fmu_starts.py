@@ -8,11 +8,11 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmu_probes.everything import findings
-from fmu_probes.probes import Subject
 from small_stage import small_model, unpack
 
 import gearfmu as gf
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu import cli
 from gearfmu.api.results import with_windup
 from gearfmu.errors import ModelError

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmu_probes.everything import findings
-from fmu_probes.probes import Subject
 from small_stage import unpack
 
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export
 from gearfmu.fmu.terminals import shafts

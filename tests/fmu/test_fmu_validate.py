@@ -9,8 +9,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from fmu_probes.everything import findings
 
+from evidence.fmu_probes.everything import findings
 from gearfmu.body import load_body
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate

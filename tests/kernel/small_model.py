@@ -12,8 +12,8 @@ from types import SimpleNamespace
 
 import numpy as np
 from exact_bars import Bar
-from step_benches.flat import FlatBody, FlatContact, flat_blob
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.spec.tables.ports import LevelSpec
 from gearfmu.stage.build.assembly import (
     MODEL_VERSION,

@@ -45,7 +45,7 @@ class Case:
 
     @property
     def local_compliance(self) -> float:
-        """Secant at 100 N (LOAD of step_benches.flat) of the line contact law of both bars, m/N:
+        """Secant at 100 N (LOAD of evidence.study.flat) of the line contact law of both bars, m/N:
         Σ local [ln(4w/b) − 1]."""
         half_width = np.sqrt(2 * 2 * self.local * 100.0)
         return 2 * self.local * (np.log(4 * 1e-3 / half_width) - 1)

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
-from step_benches.flat import FlatBody, FlatContact, flat_blob
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
 
 H, STEPS, SPEED = 5e-6, 600, 0.2
 BLOCK = FlatContact(slices=6, degrees=(0, 2), gap=1.3e-6, local=2.8e-12)
 SEED = 2
 PATH_SHARE = 0.95  # of the residual, what a dashpot is parallel to (docs/theory.md, 2.5)
-REFERENCE_LOAD = 100.0  # N over the width: LOAD of step_benches.flat
+REFERENCE_LOAD = 100.0  # N over the width: LOAD of evidence.study.flat
 
 
 def bodies(zeta: float) -> tuple[FlatBody, FlatBody]:

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 from small_model import pair_blob, with_nodes
-from step_benches.flat import FlatBody, FlatContact, flat_blob
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage.build.blob import read_blob, write_blob

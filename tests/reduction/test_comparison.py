@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reduction_methods.comparison import Contest, compare
 from small_body import small
 
+from evidence.reduction.methods.comparison import Contest, compare
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import Elastic

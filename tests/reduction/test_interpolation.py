@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from reduction_methods import METHODS
-from reduction_methods.interpolation import Sample, interpolate
 from small_body import ring_body, web_body
 
+from evidence.reduction.methods import METHODS
+from evidence.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.oscillators import oscillators

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reduction_methods import METHODS, snapshots
 from small_body import mounted, small, tiny
 
+from evidence.reduction.methods import METHODS, snapshots
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic

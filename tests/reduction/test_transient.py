@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from small_body import tiny
-from transient import Assembly, Joints, Member, Motion, Scheme, _JointSolver, integrate
 
+from evidence.reduction.in_time.transient import Assembly, Joints, Member, Motion, Scheme, _JointSolver, integrate
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic

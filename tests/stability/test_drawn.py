@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stability.checks import common
-from stability.record import Inputs, Record, Stopped, Watched, run_times
 
+from evidence.stability.checks import common
+from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import GearfmuError, SimulationError, SpecError
 from gearfmu.kernel import Kernel

@@ -5,9 +5,10 @@ planetary sets a few. All of them, at every level and step, are run by `make sta
 from __future__ import annotations
 
 import pytest
-from stability.case import Case
-from stability.scenes import SCENES
-from stability.suite import Row, Task, judge
+
+from evidence.stability.case import Case
+from evidence.stability.scenes import SCENES
+from evidence.stability.suite import Row, Task, judge
 
 LONG = (  # more than ten seconds
     "pair_ten_million_steps", "train_closing_clutch", "train_reversal", "train_torque_step", "pair_for_long_rubbing",

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stability.case import Case
-from stability.motion import Constant
-from stability.planetary import CENTRALS, MESHES, SPEED, PlanetSet, set_overlap, sun_torque
-from stability.record import Record
+
+from evidence.stability.case import Case
+from evidence.stability.motion import Constant
+from evidence.stability.planetary import CENTRALS, MESHES, SPEED, PlanetSet, set_overlap, sun_torque
+from evidence.stability.record import Record
 
 APPROACH = {"sun": (7.0e-9, 8.8e-9), "ring": (12e-9, 15.5e-9)}  # m/N under 600 N·m
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stability import checks, record, suite
-from stability.__main__ import main as program
-from stability.bench import internal_step
-from stability.case import CASES, Case, Finding
-from stability.motion import RPM, Constant, Step, Swinging, Turn, UpAndDown
-from stability.pair import Pair, overlap
-from stability.scenes import PAIR, SCENES, Scene, what
-from stability.suite import Row, Task, tasks
 
+from evidence.stability import checks, record, suite
+from evidence.stability.__main__ import main as program
+from evidence.stability.bench import internal_step
+from evidence.stability.case import CASES, Case, Finding
+from evidence.stability.motion import RPM, Constant, Step, Swinging, Turn, UpAndDown
+from evidence.stability.pair import Pair, overlap
+from evidence.stability.scenes import PAIR, SCENES, Scene, what
+from evidence.stability.suite import Row, Task, tasks
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.stage import loaded_te
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from step_benches.dashpot import own_path, same_loss
 
+from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec

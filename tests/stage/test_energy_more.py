@@ -6,8 +6,8 @@ from __future__ import annotations
 import central
 import energy_pieces
 import pytest
-from rattling.free import FreePair, Rattle, free_pair, started
 
+from evidence.energy.free import FreePair, Rattle, free_pair, started
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
 from gearfmu.spec.stage import StageSpec

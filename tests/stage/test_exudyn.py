@@ -1,4 +1,4 @@
-"""A spinning elastic gear against Exudyn's floating frame of reference (evidence/exudyn_rotor.py)."""
+"""A spinning elastic gear against Exudyn's floating frame of reference (evidence/peers/exudyn_rotor.py)."""
 
 from __future__ import annotations
 

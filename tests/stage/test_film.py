@@ -8,11 +8,11 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from rattling.free import FreePair, Rattle, energies, free_pair, started
 from scipy.integrate import solve_ivp
-from stability.planetary import ALL_MESHES, RATIO, PlanetSet, set_bodies, set_spec
-from step_benches.flat import FlatBody, FlatContact, flat_blob
 
+from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
+from evidence.stability.planetary import ALL_MESHES, RATIO, PlanetSet, set_bodies, set_spec
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rattling.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from scipy.optimize import brentq
 
 import gearfmu as gf
+from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from stability.planetary import ALL_MESHES, RATIO, SPEED, PlanetSet, set_bodies, set_spec
 
+from evidence.stability.planetary import ALL_MESHES, RATIO, SPEED, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
 from gearfmu.stage import assemble
 

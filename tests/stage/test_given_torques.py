@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from step_benches.flat import FlatBody, FlatContact, flat_blob
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec, load_stage

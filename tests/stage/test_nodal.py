@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rattling.free import Rattle, energies, free_pair, started
 
+from evidence.energy.free import Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import expand_pair

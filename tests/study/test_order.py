@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from step_benches import order
-from step_benches.flat import FlatPair, contact_frequencies, contact_rows, exact_force
 
+from evidence.study import order
+from evidence.study.flat import FlatPair, contact_frequencies, contact_rows, exact_force
 from gearfmu.spec.scene import load_scene
 from gearfmu.study.ladder import window
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from step_benches.cuts import cut_rows
-from step_benches.limits import limit_rows
-from step_benches.refined import BodyRow, body_rows, cheap, write_bodies_chart
 
+from evidence.study.cuts import cut_rows
+from evidence.study.limits import limit_rows
+from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu import cli
 from gearfmu.errors import SpecError
 from gearfmu.report.study import write_chart

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from step_benches.__main__ import main as program
-from step_benches.sets import SetRow, at_speed, ladder, with_planets
 
+from evidence.study.__main__ import main as program
+from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import load_scene

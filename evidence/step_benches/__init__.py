@@ -1,1 +1,0 @@
-"""Benches of the time step: observed orders, limits, cut frequency, refined bodies, the price list of a set."""
