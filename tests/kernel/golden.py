@@ -18,6 +18,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+sys.path.append(str(Path(__file__).parents[2]))  # evidence, which this program is not started beside
+
 from golden_models import write_models
 from golden_stages import cases
 from probes import build
