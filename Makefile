@@ -27,9 +27,9 @@ demo: $(VENV)/.base
 test: lint
 	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
-## make test-full   make test, then the slow tests; how those ended is kept in evidence/ledger.json
-test-full: test
-	$(EVIDENCE) make --again test-full
+## make test-full   the slow tests in six parts (PART=3: one of them); how each ended is kept in evidence/ledger.json
+test-full: $(STAMP)
+	$(EVIDENCE) make --again $(foreach part,$(or $(PART),1 2 3 4 5 6),test-full-$(part))
 
 ## make bench       prices on this machine, which should be idle: the tables of evidence/price and the stages' price lists
 bench: $(STAMP)

@@ -22,6 +22,14 @@ REMEDY = {
 }
 
 
+PARTS = {  # of the full tests: 1 has every scene of the hard cases, what nobody names is of the last
+    1: ("stability",),
+    2: ("relations/test_a", "relations/test_b", "relations/test_c"),
+    3: ("relations/",),
+    4: ("stage",),
+    5: ("kernel", "fmu", "cosim", "planning"),
+    6: ("",),
+}
 BUDGET = 20.0  # core-minutes of the tests that are not full; the aim is 12
 SPENT = pytest.StashKey[list[float]]()
 
@@ -31,6 +39,24 @@ reuse.share()  # before the modules of tests import what is replaced
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "needs(*names): programs or Python packages this test cannot do without")
     config.stash[SPENT] = []
+
+
+# ---- parts of the full tests -----------------------------------------------------------------------------------------
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--part", type=int, choices=PARTS, help="only the tests of one part of six")
+
+
+def part_of(path: Path) -> int:
+    """The part of a file of tests."""
+    name = path.relative_to(Path(__file__).parent).as_posix()
+    return next(part for part, heads in PARTS.items() if name.startswith(heads))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    wanted = config.option.part
+    if wanted:
+        config.hook.pytest_deselected(items=[item for item in items if part_of(item.path) != wanted])
+        items[:] = [item for item in items if part_of(item.path) == wanted]
 
 
 # ---- budget: core-minutes of this process or its workers, with all that they started ---------------------------------
