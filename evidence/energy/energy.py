@@ -32,7 +32,7 @@ from gearfmu.stage.run.trace import write_columns
 STEPS = (5e-6, 7.5e-6, 10e-6)
 SLICES = (1, 5, 10)
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
-DG4, MIX4, EM = 0, 1, 2
+DG4, EM = 0, 1
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped (10 000 steps that round states to
 # single precision: 1e-5 of a mode's energy), double with the load-dependent law
 GROWTH = 2e-5  # in one damped step: what dashpots hold outside their path balances to second order (theory, 12a)
@@ -97,7 +97,6 @@ CONTROLS = {
     "control: without η": control("T8", FREE, "no eta", 1e-3),
     "control: without η, under load": control("T8", Rattle(load=10.0), "no eta", 1e-3),
     "control: without η, jammed": control("T8", Rattle(play=-1e-6), "no eta", 1e-3),
-    "control: mix4": control("T8", FREE, "double", 1e-3, integrator=MIX4),
     "control: D 4 % wrong": control("T7", FREE, "wrong", 1e-4),
 }
 

@@ -1,83 +1,50 @@
-"""Hard cases at every level: python -m evidence.stability [--level …] [--h …] [--scene …] [--out TABLE]"""
+"""The hard cases as a program: python -m evidence.stability [--scene NAME]... [--out TABLE]"""
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import click
-
-from evidence.stability.case import LEVELS, STEPS
-from gearfmu.commands.shared import Quantity, progress_bar
-
-
-class StepSize(Quantity):
-    """ "default", "half" or "quarter" of the kernel's own step, or a step with a unit."""
-
-    name = '"default|half|quarter|<number> s"'
-
-    def __init__(self) -> None:
-        super().__init__("internal_step")
-        self.name = StepSize.name
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The word, or seconds."""
-        return value if value in STEPS else super().convert(value, param, ctx)
+from evidence.stability import suite
+from evidence.stability.case import CASES, LEVELS, STEPS, Case
+from evidence.stability.scenes import SCENES, what
+from gearfmu.commands.shared import progress_bar
+from gearfmu.units import to_si
 
 
-@click.command()
-@click.option(
-    "--level",
-    "levels",
-    multiple=True,
-    type=click.Choice(LEVELS),
-    help="Level; may repeat. All when not given.",
-)
-@click.option(
-    "--h",
-    "steps",
-    multiple=True,
-    type=StepSize(),
-    help="Internal step; may repeat. The three words when not given, at level fast alone.",
-)
-@click.option("--scene", "scenes", multiple=True, help="Scene; may repeat. All when not given.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Table (CSV), with the statistics beside it (JSON); a later call continues it.",
-)
-@click.option(
-    "--jobs",
-    type=click.IntRange(1),
-    default=os.cpu_count() or 1,
-    show_default="number of processors",
-    help="Processes.",
-)
-@click.option("--list", "listed", is_flag=True, help="Describe the scenes and run nothing.")
-def stability(
-    levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int, listed: bool
-) -> int:
-    """Run the hard cases. Exit code: the number of failures (at most 99), 0 for none."""
-    from evidence.stability import suite
-    from evidence.stability.scenes import SCENES, what
-
-    if listed:
-        click.echo("\n".join(f"{name}: {what(name)}" for name in scenes or SCENES))
+def main(given: Sequence[str] | None = None) -> int:
+    """The command line; returns the number of failures, at most 99."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", action="append", default=[], help="may repeat; all when not given")
+    parser.add_argument("--level", action="append", choices=LEVELS, help="may repeat; with or without --h instead of: "
+                        "fast at three steps, the others at the default step")  # fmt: skip
+    parser.add_argument("--h", action="append", help=f"internal step: {', '.join(STEPS)}, or '5 us'; may repeat")
+    parser.add_argument("--out", type=Path, help="table (CSV), with the statistics beside it (JSON)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--list", action="store_true", help="describe the scenes and run nothing")
+    chosen = parser.parse_args(given)
+    if chosen.list:
+        print("\n".join(f"{name}: {what(name)}" for name in chosen.scene or SCENES))
         return 0
-    wanted = suite.tasks(scenes or tuple(SCENES), levels or LEVELS, steps or tuple(STEPS))
-    wanted = wanted if levels or steps else list(filter(suite.usual, wanted))
+    cases: Sequence[Case] = CASES
+    if chosen.level or chosen.h:
+        steps = [(h, 0.0) if h in STEPS else (suite.GIVEN, to_si(h, "s")) for h in chosen.h or ["default"]]
+        cases = [Case(level, *step) for level in chosen.level or LEVELS for step in steps]
     with progress_bar("stability") as progress:
-        rows = suite.run_suite(wanted, out, jobs, progress)
-    click.echo(suite.table(rows), nl=False)
+        rows = suite.run_suite(suite.tasks(chosen.scene, cases), chosen.out, chosen.jobs, progress)
+    print(suite.table(rows), end="")
     failures = [row for row in rows if row.failed]
     for row in failures:
         said = "; ".join(row.finding.complaints) or "must run through at the default step"
-        click.echo(f"{row.scene}, {row.case.level}, h = {row.finding.h:.4g} s, {row.finding.outcome}: {said}", err=True)
-    click.echo(f"{len(rows)} cases, {len(failures)} failed", err=True)
+        print(
+            f"{row.scene}, {row.case.level}, h = {row.finding.h:.4g} s, {row.finding.outcome}: {said}", file=sys.stderr
+        )
+    print(f"{len(rows)} cases, {len(failures)} failed", file=sys.stderr)
     return min(len(failures), 99)
 
 
 if __name__ == "__main__":
-    sys.exit(stability(standalone_mode=False))
+    sys.exit(main())

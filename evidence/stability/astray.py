@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from evidence.stability.record import PAIR, Inputs, Record, Run, Watched, run
+from evidence.stability.record import Inputs, Record, Run, Watched, run_times
 from gearfmu.kernel import Kernel
 
 STEP, LONGEST_WANDER = 2e-5, 3  # s; steps
@@ -19,12 +19,12 @@ def run_astray(
     inputs: Inputs,
     wander: Callable[[np.random.Generator], Mapping[str, float]],
     times: int,
-    watched: Watched = PAIR,
+    watched: Watched,
 ) -> tuple[Record, list[str]]:
     """At every step the state is saved, the run goes on for 1 to 3 steps under inputs of `wander` and returns. The
     record of that run, and what is wrong: it must end bit for bit like the straight run."""
     straight, astray, random = fresh(), fresh(), np.random.default_rng(2)
-    calm = run(straight, inputs, times * STEP, STEP, watched)
+    calm = run_times(straight, inputs, np.arange(times + 1) * STEP, watched)
     going, started = Run(astray, times, watched), clock.process_time()
     going.set(inputs(0.0))
     astray.initialize(0.0)

@@ -20,6 +20,9 @@ class Case:
     h: float = 0.0
 
 
+CASES = (*(Case("fast", step) for step in STEPS), *(Case(level) for level in LEVELS[1:]))  # of every scene
+
+
 @dataclass(frozen=True)
 class Finding:
     """How a case went.

@@ -8,26 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from evidence.stability.case import COMPLETED, Finding
-from evidence.stability.record import Record, overlap
-from gearfmu.geometry import PairGeometry
+from evidence.stability.record import Record
 
 ENERGY = 1e-4  # of the energy through the ports and the largest stored one: the balance of a loaded damped run
 SOFTEST = 1.2e8  # N/m: one tooth pair in the corner of its path; 12.5 N/(mm µm) × 14 mm = 1.75e8 at the pitch point
 BANDS = ((200.0, 1000.0), (1000.0, 4000.0))  # Hz
 CLEARANCE = 7.5e-6  # m: twice what relief of 15 µm takes off both teeth where two pairs share, a quarter of it
-
-
-def finding(
-    record: Record,
-    pair: PairGeometry,
-    complaints: Iterable[str] = (),
-    facts: Mapping[str, float] | None = None,
-    energy: float = ENERGY,
-) -> Finding:
-    """The finding of a recorded run of a pair; complaints: the scene's own. energy: limit of the energy residual."""
-    depth = overlap(record, pair)
-    said = deep(record, depth, record["mesh.force_max"] / SOFTEST + CLEARANCE)
-    return judged(record, float(depth.max()), [*said, *complaints], facts or {}, energy)
 
 
 def judged(
@@ -102,12 +88,6 @@ def at_least(what: str, value: float, least: float) -> list[str]:
 def at_most(what: str, value: float, most: float) -> list[str]:
     """A complaint when value is larger."""
     return [] if value <= most else [f"{what} is {value:.4g}, more than {most:.4g}"]
-
-
-def mean_torque(record: Record, pair: PairGeometry) -> float:
-    """Mean moment of the mesh force about the pinion's axis, N·m."""
-    steps = np.diff(record.time)
-    return float(pair.gears[0].r_b * (record["mesh.force_mean"][1:] * steps).sum() / steps.sum())
 
 
 def levels(record: Record) -> dict[str, float]:

@@ -1,14 +1,13 @@
-"""What drives the scenes: shafts whose outer ends turn at given speeds, wound up against each other under torque."""
+"""How shafts turn and loads change in time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from evidence.stability.bench import SHAFTS, Variant, geometry, mean_te, model
-
-RPM = 3.141592653589793 / 30.0
+RPM = math.pi / 30.0
 
 
 class Motion(NamedTuple):
@@ -17,6 +16,9 @@ class Motion(NamedTuple):
     phi: float
     w: float
     a: float
+
+
+Turn = Callable[[float], Motion]
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,21 @@ class UpAndDown:
 
 
 @dataclass(frozen=True)
+class Swinging:
+    """A speed (rad/s) with a swing of `acceleration` (rad/s²) at `frequency` (Hz)."""
+
+    speed: float
+    acceleration: float
+    frequency: float
+
+    def __call__(self, time: float) -> Motion:
+        omega = 2.0 * math.pi * self.frequency
+        sine, cosine = math.sin(omega * time), math.cos(omega * time)
+        swing = self.acceleration / omega**2
+        return Motion(self.speed * time - swing * sine, self.speed - swing * omega * cosine, self.acceleration * sine)
+
+
+@dataclass(frozen=True)
 class Step:
     """From one value to another between two times, twice continuously differentiable (quintic)."""
 
@@ -63,51 +80,3 @@ class Step:
             rise * 30.0 * x**2 * (1.0 - x) ** 2 / span,
             rise * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / span**2,
         )
-
-
-def winding(variant: Variant, torque: float) -> float:
-    """Angle (rad) of the pinion's outer end against the unloaded train under a torque (N·m) on the pinion: both shafts
-    and the mean quasi-static transmission error, backlash included where the torque is negative."""
-    spec, pair = model(variant).spec, geometry(variant)
-    ratio = spec.gears[1].teeth / spec.gears[0].teeth
-    k = [spec.ports[name].k for name in SHAFTS]
-    assert k[0] is not None and k[1] is not None, "both ports are springs"
-    shafts = 1.0 / k[0] + ratio**2 / k[1]
-    return torque * shafts + mean_te(variant, torque) / pair.gears[0].r_b
-
-
-def mid_backlash(variant: Variant) -> float:
-    """Angle (rad) of the pinion that centres its teeth in the spaces of the wheel."""
-    pair = geometry(variant)
-    return -0.5 * pair.normal_backlash / pair.gears[0].r_b
-
-
-@dataclass(frozen=True)
-class Turning:
-    """Inputs of a pair with spring ports: the wheel's end turns as `motion` asks, the pinion's end too, and is wound up
-    by the steps in `windings` (rad), one after the other."""
-
-    variant: Variant
-    motion: Constant | UpAndDown
-    windings: Sequence[Step]
-
-    def __call__(self, time: float) -> Mapping[str, float]:
-        gears = model(self.variant).spec.gears
-        ratio = gears[1].teeth / gears[0].teeth
-        turn = self.motion(time)
-        step = next((step for step in self.windings if time < step.end), self.windings[-1])
-        wound = step(time)
-        return {
-            "pinion.phi": turn.phi + wound.phi,
-            "pinion.w": turn.w + wound.w,
-            "pinion.a": turn.a + wound.a,
-            "wheel.phi": -turn.phi / ratio,
-            "wheel.w": -turn.w / ratio,
-            "wheel.a": -turn.a / ratio,
-        }
-
-
-def loaded(variant: Variant, motion: Constant | UpAndDown, torque: float) -> Turning:
-    """Inputs under a mean torque (N·m on the pinion) that stays."""
-    wound = winding(variant, torque)
-    return Turning(variant, motion, (Step(0.0, 1.0, wound, wound),))

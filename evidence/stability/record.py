@@ -6,12 +6,12 @@ import ctypes
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from evidence.stability.case import COMPLETED
 from gearfmu.errors import SimulationError
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 
 MESH = ("pairs", "force_mean", "force_max", "force_drive", "force_coast", "te", "contact", "impacts", "open_time")
@@ -45,9 +45,6 @@ class Watched:
         return (*(f"{port}.tau_mean" for port in self.ports), *clutch, *(f"{port}.w" for port in self.ports))
 
 
-PAIR = Watched(("mesh",), ("pinion", "wheel"), ("pinion", "wheel"))
-NAMES = PAIR.names
-
 Inputs = Callable[[float], Mapping[str, float]]
 
 
@@ -67,7 +64,11 @@ class Record:
 
     def after(self, time: float) -> Record:
         """The samples from `time` (s) on."""
-        keep = self.time >= time
+        return self.between(time, np.inf)
+
+    def between(self, since: float, until: float) -> Record:
+        """The samples from `since` (s) to before `until` (s)."""
+        keep = (self.time >= since) & (self.time < until)
         return Record(
             self.time[keep], {k: v[keep] for k, v in self.values.items()}, self.throughput[keep], self.outcome, 0.0
         )
@@ -101,17 +102,17 @@ class Record:
 
 
 class Stopped(Exception):
-    """A run that the kernel gave up; `record` holds what came before."""
+    """A run that the kernel gave up; `record` holds what came before, `bench` is what it ran on."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Record, bench: Any = None) -> None:
         super().__init__(record.outcome)
-        self.record = record
+        self.record, self.bench = record, bench
 
 
 class Run:
     """One instance under way: `advance` steps it, `record` ends it. The loop of every scene."""
 
-    def __init__(self, kernel: Kernel, capacity: int, watched: Watched = PAIR) -> None:
+    def __init__(self, kernel: Kernel, capacity: int, watched: Watched) -> None:
         self.kernel = kernel
         self.names = [*watched.names, *(name for name in watched.optional if name in kernel.variables)]
         memory = (ctypes.c_double * len(self.names))()
@@ -149,14 +150,9 @@ class Run:
         return Record(time, values, passed, outcome, cpu_s)
 
 
-def run(kernel: Kernel, inputs: Inputs, duration: float, step: float, watched: Watched = PAIR) -> Record:
-    """From static equilibrium at t = 0 over `duration` with communication steps `step` (s). Stopped, with the samples
-    so far, when the kernel gives up."""
-    return run_times(kernel, inputs, np.arange(round(duration / step) + 1) * step, watched)
-
-
-def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray, watched: Watched = PAIR) -> Record:
-    """`run` with communication points `times` (s), the first of which is the start."""
+def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray, watched: Watched) -> Record:
+    """From static equilibrium over communication points `times` (s), the first of which is the start. Stopped, with the
+    samples so far, when the kernel gives up."""
     going, outcome, started = Run(kernel, len(times), watched), COMPLETED, clock.process_time()
     speeds = np.full((len(times), len(watched.ports)), 0.0)
     going.set(inputs(times[0]))
@@ -190,19 +186,3 @@ def _powers(made: Record, speeds: np.ndarray, inputs: Inputs, ports: Sequence[st
             torque = np.array([inputs(t)[f"{shaft}.tau"] for t in made.time[:-1]])
             total += np.abs(torque * made[f"{shaft}.w"][1:])
     return total
-
-
-def overlap(record: Record, pair: PairGeometry) -> np.ndarray:
-    """(n,) overlap of the undeformed involutes at the sampled positions of the bore nodes, m, positive where they
-    interpenetrate: −g of docs/theory eq. 4 on the drive or the coast side, whichever is larger."""
-    a, b = pair.gears
-    dx = pair.a + record["wheel.gear.x"] - record["pinion.gear.x"]
-    dy = record["wheel.gear.y"] - record["pinion.gear.y"]
-    distance, base = np.hypot(dx, dy), a.r_b + b.r_b
-    length, nominal = np.sqrt(distance**2 - base**2), np.sqrt(pair.a**2 - base**2)
-    deepest = np.full(record.time.size, -np.inf)
-    for side, backlash in ((1.0, 0.0), (-1.0, pair.normal_backlash)):
-        turn = np.arctan2(dy, dx) - side * (np.arccos(base / distance) - np.arccos(base / pair.a))
-        te = side * (a.r_b * record["pinion.gear.phi"] + b.r_b * record["wheel.gear.phi"])
-        deepest = np.maximum(deepest, te - side * turn * base - (length - nominal) - backlash)
-    return deepest

@@ -13,13 +13,13 @@ from typing import Any
 
 from matplotlib import rc_context
 
+from evidence.study.dashpot import same_loss
 from gearfmu.body import load_bodies, reduce_body
 from gearfmu.report.study import QUANTITIES
 from gearfmu.report.style import panels, saved, styled
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage.build.tables import ROLLS
-from gearfmu.stage.run.dashpot import same_loss
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
 
@@ -51,7 +51,7 @@ class BodyRow:
 @dataclass(frozen=True)
 class Variant:
     """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls. Reduced
-    anew, the contact's dashpots take the constant with which they lose the same (`gearfmu.stage.run.dashpot`)."""
+    anew, the contact's dashpots take the constant with which they lose the same (`step_benches.dashpot`)."""
 
     name: str
     gears: tuple[Any, ...] | None

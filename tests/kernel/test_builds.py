@@ -33,7 +33,7 @@ def bits(library: Path) -> str:
     """SHA-256 over states and outputs of short runs: every integrator through reversals of torque,
     dg4 with a slipping clutch."""
     digest = hashlib.sha256()
-    for integrator in range(4):
+    for integrator in range(3):
         digest.update(run(library, ("torque", "spring"), integrator, 200))
     digest.update(run(library, ("chain", "spring"), 0, 300))
     return digest.hexdigest()
@@ -41,7 +41,7 @@ def bits(library: Path) -> str:
 
 def run(library: Path, ports: tuple[str, str], integrator: int, steps: int) -> bytes:
     """Outputs and last state of a run with a swinging input; the contact opens and closes."""
-    kernel = Kernel(pair_blob(ports), {"integrator": integrator, "h": 2e-6 if integrator == 3 else 7.5e-6}, library)
+    kernel = Kernel(pair_blob(ports), {"integrator": integrator, "h": 2e-6 if integrator == 2 else 7.5e-6}, library)
     if ports[0] == "chain":
         kernel.set("pinion.w", 30.0)
         kernel.set("pinion.clutch.capacity", 120.0)

@@ -15,7 +15,7 @@ from small_model import bar_bodies, bars_blob
 from gearfmu.kernel import Kernel
 
 STEPS_PER_CELL = 5
-INTEGRATORS = {"dg4": 0, "em": 2}
+INTEGRATORS = {"dg4": 0, "em": 1}
 GAMMA = {"dg4": 1.0, "em": 0.0}
 
 

@@ -130,7 +130,7 @@ def test_mirrored_slices_as_one_row_change_nothing(slices: int, damping: float) 
     np.testing.assert_allclose(forces[1], forces[0], rtol=0, atol=1e-11 * forces[0].max())
 
 
-@pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (2, 0.0)], ids=["dg4", "em"])
+@pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (1, 0.0)], ids=["dg4", "em"])
 @pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 1e4)])
 @pytest.mark.parametrize("slices", [1, 4, 5, 6])
 def test_slices_step_by_step(

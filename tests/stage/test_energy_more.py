@@ -15,7 +15,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec
 
 FAST, FULL, EXPLICIT = 1, 3, 5
-CENTRAL = 4
+CENTRAL = 3
 
 
 @pytest.fixture(scope="module")

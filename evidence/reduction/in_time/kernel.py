@@ -33,7 +33,7 @@ from gearfmu.stage.build.nodal import mesh_penalty
 
 HERE = Path(__file__).parent
 START = Rattle(position=0.1, speed=1.0)
-PAPER, FULL, RK45, DG4, LINE = 4, 3, 3, 0, 1
+PAPER, FULL, RK45, DG4, LINE = 4, 3, 2, 0, 1
 SCHEME = Scheme(0.5e-6, 0.25e-3)
 SAMPLE = 1e-6
 

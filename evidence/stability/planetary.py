@@ -1,24 +1,22 @@
-"""The set the scenes run on: the shipped planetary set with pins out of their places, variants of it, how a run of it
-is driven, recorded and judged. Equal planets on ideal pins hide the modes of sun and carrier: no scene has them."""
+"""The bench of planetary sets: the shipped set with pins out of their places, and variants of it. Equal planets on
+ideal pins hide the modes of sun and carrier: no scene has them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from evidence.stability.bench import kernel
-from evidence.stability.case import Case, Finding
-from evidence.stability.checks import CLEARANCE, deep, judged, near
-from evidence.stability.motion import Motion, Step
-from evidence.stability.record import Inputs, Record, Stopped, Watched, run
+from evidence.stability.bench import Bench, at
+from evidence.stability.checks import CLEARANCE
+from evidence.stability.motion import Step, Turn
+from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec
 from gearfmu.spec.stage import load_set
@@ -36,9 +34,7 @@ PLACES = tuple(
     f"{body}.{axis}" for body in ("sun.gear", "ring.gear", *(f"pin.{planet}" for planet in NAMES)) for axis in "xy"
 )
 LEANS = tuple(f"bearing.carrier.{axis}" for axis in ("x", "y", "rx", "ry"))
-WATCHED = Watched(ALL_MESHES, SHAFTS, more=(*PLACES, *LEANS, "carrier.gear.phi", "sun.gear.w"))
-H = 2e-5  # s, communication step
-NOMINAL, SPEED, RATIO = 600.0, 85.0, 4.0  # N·m and rad/s of the carrier (ICSV22 2015); sun over carrier
+SPEED, RATIO = 85.0, 4.0  # rad/s of the carrier (ICSV22 2015); sun over carrier
 Pins = tuple[tuple[int, tuple[float, float]], ...]
 UNEQUAL: Pins = ((0, (0.0, 12e-6)), (1, (6e-6, 0.0)), (2, (0.0, -8e-6)))  # number of the pin, (radial, tangential), m
 DRIVEN = PortSpec(kind="spring", k=50e3, c=10.0)  # of the carrier: 0.3 of critical for the whole set
@@ -46,11 +42,10 @@ TORQUE = PortSpec(kind="torque")
 # m/N: overlap of the flanks at rest, where it is largest (one planet on a pin 50 µm off); of the thin ring
 SOFTNESS, THIN = {"sun": 8.6e-9, "ring": 23.4e-9}, 44.4e-9
 MARGIN = 1.5  # of that: inertia of planets between mesh and pin, softer flanks near their tips
-SET_ENERGY = 5e-4  # not 1e-4: pairs of the ring begin and end with its flanks, and their force with them: 0.1 to 3e-4
 
 
 @dataclass(frozen=True)
-class SetVariant:
+class PlanetSet(Bench):
     """The shipped set with changes. pins: deviations of single pins, number and (radial, tangential), m. sun, pin,
     carrier: stiffness of these bearings, N/m, None for the set's. relief: with tip relief. thin: with the ring of
     `thin_ring`. ports: of carrier and sun. ring: a port that holds the ring; without one it stands."""
@@ -64,13 +59,63 @@ class SetVariant:
     ports: tuple[PortSpec, PortSpec] = (DRIVEN, TORQUE)
     ring: PortSpec | None = None
 
+    kind = "set"
+    step, nominal, settled, limit = 2e-5, 600.0, (0.022, 0.012), 0.02
+    energy = 5e-4  # not 1e-4: pairs of the ring begin and end with its flanks, and their force with them: 0.1 to 3e-4
+
     @property
-    def watched(self) -> Watched:
-        """What is recorded of it."""
-        return replace(WATCHED, ports=SHAFTS if self.ring is None else (*SHAFTS, "ring"))
+    def watched(self) -> Watched:  # type: ignore[override]
+        """All meshes, places of central gears and planets, and how the carrier leans."""
+        ports = SHAFTS if self.ring is None else (*SHAFTS, "ring")
+        return Watched(ALL_MESHES, ports, more=(*PLACES, *LEANS, "carrier.gear.phi", "sun.gear.w"))
+
+    @property
+    def model(self) -> StageModel:
+        """Sun, planets, ring and carrier, assembled: some 100 MB."""
+        return _model(self)
+
+    def turning(self, motion: Turn, loads: Sequence[Step]) -> Inputs:
+        """The outer end of the carrier's spring turns, loads of the carrier weigh on the sun."""
+
+        def inputs(time: float) -> Mapping[str, float]:
+            return _ends(motion, time, -at(loads, time)(time).phi / RATIO)
+
+        return inputs
+
+    def dragged(self, motion: Turn, drag: float) -> tuple[PlanetSet, Inputs]:
+        """The sun is loose as it is."""
+        return self, lambda time: _ends(motion, time, -drag)
+
+    def start(self, inputs: Inputs) -> dict[str, float]:
+        """The sun starts with the speed that the carrier asks."""
+        turned = RATIO * inputs(0.0).get("carrier.w", 0.0)
+        return {"sun.w_start": turned} if self.ports[1].kind == "torque" else {}
+
+    def carried(self, record: Record, since: float, until: float) -> dict[str, float]:
+        """Moment of all sun meshes, on the carrier."""
+        return {"the sun's meshes": RATIO * sun_torque(record.between(0.0, until), since)}
+
+    def impulse(self, record: Record, drag: float, since: float) -> float:
+        """Moment of all meshes on the sun over the run, less the change of its spin."""
+        steps, first = np.diff(record.time), 1
+        force = np.sum([record[f"{mesh}.force_mean"][1:] for mesh in MESHES["sun"]], axis=0)
+        meshes = -base_radius() * float((force[first:] * steps[first:]).sum())
+        spin = set_bodies()[0].inertia[2, 2] * (record["sun.gear.w"][-1] - record["sun.gear.w"][first])
+        return float((meshes - spin) / (drag * steps[first:].sum()))
+
+    def depths(self, record: Record, backlash: float | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+        """Overlap of the undeformed involutes of every planet with sun and ring."""
+        for central, meshes in MESHES.items():
+            largest = max(record[f"{mesh}.force_max"].max() for mesh in meshes)
+            softness = THIN if self.thin and central == "ring" else SOFTNESS[central]
+            pressed = np.full(record.time.size, CLEARANCE + MARGIN * softness * largest)
+            for number, mesh in enumerate(meshes):
+                yield f"flanks of {mesh}", set_overlap(self, record, central, number, backlash), pressed
 
 
-PLAIN_SET = SetVariant()
+def _ends(motion: Turn, time: float, load: float) -> dict[str, float]:
+    turn = motion(time)
+    return {"carrier.phi": turn.phi, "carrier.w": turn.w, "carrier.a": turn.a, "sun.tau": load}
 
 
 @lru_cache(maxsize=1)
@@ -91,13 +136,12 @@ def thin_ring() -> tuple[RingSpec, ReducedBody]:
 
 
 @lru_cache(maxsize=2)
-def set_model(variant: SetVariant) -> StageModel:
-    """The assembled set of a variant, a model of some 100 MB."""
+def _model(variant: PlanetSet) -> StageModel:
     sun, planet, ring, carrier = set_bodies()
     return assemble(set_spec(variant), [sun, planet, thin_ring()[1] if variant.thin else ring, carrier])
 
 
-def set_spec(variant: SetVariant) -> PlanetarySpec:
+def set_spec(variant: PlanetSet) -> PlanetarySpec:
     """The shipped set with the changes of a variant."""
     spec = load_set(SET)
     parts: dict[str, tuple[Any, float | None]] = {
@@ -118,58 +162,11 @@ def set_spec(variant: SetVariant) -> PlanetarySpec:
     return spec.model_copy(update={**changed, "set": displaced, "ports": ports})
 
 
-def set_kernel(variant: SetVariant, case: Case, parameters: Mapping[str, float] | None = None) -> Kernel:
-    """A fresh instance at the case's level and step."""
-    return kernel(set_model(variant), case, parameters)
-
-
 @lru_cache(maxsize=1)
 def base_radius() -> float:
     """Base radius of the sun, m."""
     spec = load_set(SET)
     return member_of(spec, "sun").geometry.r_b
-
-
-@dataclass(frozen=True)
-class Carried:
-    """Inputs: the outer end of the carrier's spring turns as `motion` says, `loads` (steps of carrier torque, N·m, one
-    after the other) weigh on the sun."""
-
-    motion: object
-    loads: tuple[Step, ...]
-
-    def __call__(self, time: float) -> Mapping[str, float]:
-        turn = self.motion(time)  # type: ignore[operator]
-        assert isinstance(turn, Motion)
-        step = next((step for step in self.loads if time < step.end), self.loads[-1])
-        return {
-            "carrier.phi": turn.phi,
-            "carrier.w": turn.w,
-            "carrier.a": turn.a,
-            "sun.tau": -step(time).phi / RATIO,
-        }
-
-
-def steady(torque: float) -> tuple[Step, ...]:
-    """A carrier torque (N·m) that stays."""
-    return (Step(0.0, 1.0, torque, torque),)
-
-
-def set_run(
-    variant: SetVariant,
-    case: Case,
-    inputs: Inputs,
-    duration: float,
-    parameters: Mapping[str, float] | None = None,
-    step: float = H,
-) -> Record:
-    """A run, or what there is of it where the kernel gave up. The sun starts with the speed that the carrier asks."""
-    start = {"sun.w_start": RATIO * inputs(0.0).get("carrier.w", 0.0)} if variant.ports[1].kind == "torque" else {}
-    going = set_kernel(variant, case, start | dict(parameters or {}))
-    try:
-        return run(going, inputs, duration, step, variant.watched)
-    except Stopped as stop:
-        return stop.record
 
 
 def sun_torque(record: Record, since: float) -> float:
@@ -179,14 +176,6 @@ def sun_torque(record: Record, since: float) -> float:
     return -base_radius() * float(force)
 
 
-def carries(record: Record, torque: float, since: float, limit: float = 0.02) -> tuple[list[str], dict[str, float]]:
-    """Complaints where the sun's meshes do not carry a carrier torque (N·m) from `since` (s) on; and what they do."""
-    if record.time[-1] <= since:
-        return [], {}
-    carried = RATIO * sun_torque(record, since)
-    return near("torque on the carrier that its meshes carry", carried, torque, limit), {"carried_Nm": carried}
-
-
 def shares(record: Record, since: float, central: str = "sun") -> np.ndarray:
     """(N,) mean force of each planet's mesh over the mean of all, from `since` (s) on."""
     late = record.time > since
@@ -194,29 +183,8 @@ def shares(record: Record, since: float, central: str = "sun") -> np.ndarray:
     return np.asarray(force / force.mean())
 
 
-def set_finding(
-    variant: SetVariant,
-    record: Record,
-    complaints: Iterable[str] = (),
-    facts: Mapping[str, float] | None = None,
-    backlash: float | None = None,
-    energy: float = SET_ENERGY,
-) -> Finding:
-    """The finding of a run. backlash: m, where it is not the set's. energy: limit of the residual."""
-    deepest, said = 0.0, []
-    for central, meshes in MESHES.items():
-        largest = max(record[f"{mesh}.force_max"].max() for mesh in meshes)
-        softness = THIN if variant.thin and central == "ring" else SOFTNESS[central]
-        pressed = np.full(record.time.size, CLEARANCE + MARGIN * softness * largest)
-        for number, mesh in enumerate(meshes):
-            depth = set_overlap(variant, record, central, number, backlash)
-            said += deep(record, depth, pressed, f"flanks of {mesh}")
-            deepest = max(deepest, float(depth.max()))
-    return judged(record, deepest, [*said, *complaints], facts or {}, energy)
-
-
 def set_overlap(
-    variant: SetVariant, record: Record, central: str, number: int, backlash: float | None = None
+    variant: PlanetSet, record: Record, central: str, number: int, backlash: float | None = None
 ) -> np.ndarray:
     """(n,) overlap of the undeformed involutes of a planet and the sun or the ring, m, on the drive or the coast side,
     whichever is larger: transmission error of the engagement and, along the line of action, places of the planet and of
