@@ -17,6 +17,11 @@ from gearfmu.kernel.build import FLAGS, PORTABLE, compile_program, fmi_headers, 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "tests"
 SANITIZE = ("-O0", "-g1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+FLAVOURS = {
+    "checked float": ("-DGK_CHECK",),
+    "double": ("-DGK_DOUBLE_MODES",),
+    "checked double": ("-DGK_CHECK", "-DGK_DOUBLE_MODES"),
+}
 
 
 def once(name: str, make: Callable[[Path], object], *own: Path) -> Path:
@@ -36,34 +41,36 @@ def once(name: str, make: Callable[[Path], object], *own: Path) -> Path:
     return folder
 
 
-def objects(real: str = "float") -> Path:
-    """Folder of the kernel's objects with GK_ASSERT, where a check that fails ends the process, at -O1 and with a
-    pattern in automatic variables that nobody sets (gcc 12 and later, clang). real: "double" for modal states and rows
-    in double. Not for damaged blobs and states, whose numbers the kernel does not vouch for."""
-    return once(f"objects-{real}", lambda folder: _compile([*_checked(real), "-c", *_c_files()], folder))
+def objects(kind: str) -> Path:
+    """Folder of the kernel's objects, one of FLAVOURS, at -O1 and with a pattern in automatic variables that nobody
+    sets (gcc 12 and later, clang)."""
+    name = f"objects-{kind.replace(' ', '-')}"
+    return once(name, lambda folder: _compile([*_flags(kind), "-c", *_c_files()], folder))
 
 
 def checked_library(real: str = "float") -> Path:
-    """The kernel of `objects`."""
-    return _linked(f"checked-{real}", real, []) / "kernel.so"
+    """The kernel with GK_ASSERT, where a check that fails ends the process. Not for damaged blobs and states, whose
+    numbers the kernel does not vouch for."""
+    return _linked(f"checked-{real}", f"checked {real}", []) / "kernel.so"
 
 
 def double_library() -> Path:
-    """The kernel with modal states and rows in double, for comparison to the last digits."""
-    return checked_library("double")
+    """The kernel with modal states and rows in double, for comparison to the last digits; without GK_ASSERT, as some of
+    its models have no supports."""
+    return _linked("double", "double", []) / "kernel.so"
 
 
 def inner_library() -> Path:
     """Kernel and inner_probe.c in one library: its inner functions can be called (tests/kernel/inner.py)."""
-    return _linked("inner", "float", [ROOT / "tests" / "kernel" / "inner_probe.c"]) / "kernel.so"
+    return _linked("inner", "checked float", [ROOT / "tests" / "kernel" / "inner_probe.c"]) / "kernel.so"
 
 
 def leaky_library() -> Path:
     """The kernel with a symbol more than an FMU may export."""
-    return _linked("leaky", "float", [], "-Wl,--defsym=leaked=fmi2GetVersion") / "kernel.so"
+    return _linked("leaky", "checked float", [], "-Wl,--defsym=leaked=fmi2GetVersion") / "kernel.so"
 
 
-def edited_library(name: str, edits: Mapping[str, str], real: str = "float") -> Path:
+def edited_library(name: str, edits: Mapping[str, str], kind: str) -> Path:
     """The kernel with every match of the regular expressions in `edits` replaced; each must change something."""
     changed, idle = {}, set(edits)
     for path in _c_files():
@@ -80,7 +87,7 @@ def edited_library(name: str, edits: Mapping[str, str], real: str = "float") -> 
     for file, text in changed.items():
         with written_whole(folder / file) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    return _linked(name, real, [folder / file for file in changed], "-Wno-unused-function") / "kernel.so"
+    return _linked(name, kind, [folder / file for file in changed], "-Wno-unused-function") / "kernel.so"
 
 
 def sanitized_library() -> Path:
@@ -115,13 +122,13 @@ def fuzzer() -> Path:
     return once("fuzz", make, program) / "fuzz"
 
 
-def _linked(name: str, real: str, own: list[Path], *flags: str) -> Path:
+def _linked(name: str, kind: str, own: list[Path], *flags: str) -> Path:
     """Folder of kernel.so: `own` sources, and the objects of all others."""
 
     def make(folder: Path) -> None:
-        kept = objects(real)
+        kept = objects(kind)
         others = [kept / f"{path.stem}.o" for path in _c_files() if path.name not in {one.name for one in own}]
-        _compile([*_checked(real), "-shared", "-Wl,-Bsymbolic", *flags, *own, *others, "-o", "kernel.so"], folder)
+        _compile([*_flags(kind), "-shared", "-Wl,-Bsymbolic", *flags, *own, *others, "-o", "kernel.so"], folder)
 
     return once(name, make, *own)
 
@@ -130,11 +137,10 @@ def _c_files() -> list[Path]:
     return [path for path in sources() if path.suffix == ".c"]
 
 
-def _checked(real: str) -> list[str]:
-    """Flags of `objects`. At -O1 sqrt is libm's, which is exact."""
-    double = ["-DGK_DOUBLE_MODES"] if real == "double" else []
-    pattern = ["-ftrivial-auto-var-init=pattern"]
-    return ["-O1", PORTABLE, "-DGK_CHECK", *pattern, *double, "-fPIC", f"-I{fmi_headers()}", "-Wl,--no-as-needed"]
+def _flags(kind: str) -> list[str]:
+    """At -O1 sqrt is libm's, which is exact."""
+    common = ["-O1", PORTABLE, "-ftrivial-auto-var-init=pattern", "-fPIC", f"-I{fmi_headers()}"]
+    return [*common, *FLAVOURS[kind], "-Wl,--no-as-needed"]
 
 
 def _compile(arguments: list[str | Path], folder: Path | None = None) -> None:

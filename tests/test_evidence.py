@@ -133,7 +133,11 @@ def test_code_behind_the_model_ages_what_uses_it(current: Ledger) -> None:
     assert {"plans"} <= touched("gearfmu/planning/judge.py") and "study" not in touched("gearfmu/planning/judge.py")
     assert {"study", "study_sets", "cost"} <= touched("gearfmu/cosim/coupled.py")
     assert "energy" not in touched("gearfmu/cosim/coupled.py") and "energy" in touched("evidence/energy/energy.py")
-    assert not touched("evidence/energy/energy.py") - {"energy", "mutants", *(f"test-full-{part}" for part in range(1, 7))}
+    assert not touched("evidence/energy/energy.py") - {
+        "energy",
+        "mutants",
+        *(f"test-full-{part}" for part in range(1, 7)),
+    }
 
 
 def test_words_about_code_are_no_input(current: Ledger) -> None:

@@ -65,7 +65,7 @@ def test_bit_2_says_that_the_fallback_was_tried() -> None:
 def test_bit_4_says_that_rounds_ran_out() -> None:
     """The shipped step finds its balance in all of these; a build that may not look for it leaves steps in which
     contacts change unsolved."""
-    hasty = edited_library("hasty", {r"GK_ENERGY_LIMIT 12": "GK_ENERGY_LIMIT 0"})
+    hasty = edited_library("hasty", {r"GK_ENERGY_LIMIT 12": "GK_ENERGY_LIMIT 0"}, "checked float")
     for library, expected in ((None, 0), (hasty, ROUNDS)):
         found = [_loaded(library, speed, torque) for speed in (200.0, 400.0) for torque in (300.0, 600.0)]
         assert all(bits & ROUNDS == expected for bits in found), found

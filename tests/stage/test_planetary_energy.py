@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kernel_variants import WITHOUT_ETA, variant
 
+from evidence.energy.kernel_variants import WITHOUT_ETA, variant
 from evidence.stability.planetary import ALL_MESHES, TORQUE, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
