@@ -23,7 +23,6 @@ from gearfmu.kernel import instance
 
 SHIPPED = Path(__file__).resolve().parents[1] / "reduced_models"
 PREPARED = 6e9  # bytes of the largest setups of the kernels that are kept; a tenth of them is used
-HEAD = 1 << 20  # bytes: more than the head of gk_work, behind which there is scratch only
 MODELS = 24  # opened models, and assembled ones of the same bodies
 
 
@@ -89,11 +88,12 @@ def _assembled_once(assemble: Callable[..., object]) -> Callable[..., object]:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Memory of a prepared kernel, with the head of its work as prepared."""
+    """Memory of a prepared kernel, with its work as prepared, but for the zeros behind `head`."""
 
     setup: tuple[ctypes.Array, int]
     work: tuple[ctypes.Array, int]
     head: bytes
+    size: int
     warning: str
     model: object  # kept open
 
@@ -102,6 +102,7 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
     """gk_prepare reads the model and its parameters and fills setup and work. A kernel that is prepared as a former
     one, which is no more, takes over its memory: setup is constant since, the head of work is put back."""
     free: OrderedDict[tuple[object, ...], list[Prepared]] = OrderedDict()
+    value = instance.Kernel.get  # of the product, whatever a test puts in its place
 
     def give_back(key: tuple[object, ...], memory: Prepared) -> None:
         free.setdefault(key, []).append(memory)
@@ -116,15 +117,18 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
             kernel._setup_keep, kernel._setup = instance.aligned(len(kernel._setup_keep))
             kernel._work_keep, kernel._work = instance.aligned(len(kernel._work_keep))
             return prepare(kernel)
-        key = (id(kernel._opened), *map(kernel.get, _parameters(kernel)))
+        key = (id(kernel._opened), *(value(kernel, name) for name in _parameters(kernel)))
         if ones := free.get(key):
             memory = ones.pop()
             ctypes.memmove(memory.work[1], memory.head, len(memory.head))
+            ctypes.memset(memory.work[1] + len(memory.head), 0, memory.size - len(memory.head))
         else:
             prepare(kernel)
-            head = ctypes.string_at(kernel._work, min(HEAD, len(kernel._work_keep)))
+            size = len(kernel._work_keep) - (kernel._work - ctypes.addressof(kernel._work_keep))
+            content = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(kernel._work))
+            used = size - int(np.argmax(content[::-1] != 0)) if content.any() else 0
             setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
-            memory = Prepared(setup, work, head, kernel.warning, kernel._opened)
+            memory = Prepared(setup, work, content[:used].tobytes(), size, kernel.warning, kernel._opened)
         (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work) = memory.setup, memory.work
         kernel.warning = memory.warning
         kernel._gives_back = weakref.finalize(kernel, give_back, key, memory)

@@ -3,8 +3,8 @@ beside each hash show how far it went.
 
 Every integrator, kind of stage, effect and calculation once (golden_stages.py), in single and double build:
 
-    python tests/kernel/golden.py            what moved, by how much
-    python tests/kernel/golden.py --write    stores what this kernel gives, in a commit that says why
+    PYTHONPATH=. python tests/kernel/golden.py            what moved, by how much
+    PYTHONPATH=. python tests/kernel/golden.py --write    stores what this kernel gives, in a commit that says why
 
 The stored models of golden_stages.py are written by --write-models (golden_models.py), which changes their runs too.
 """
@@ -17,8 +17,6 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
-
-sys.path.append(str(Path(__file__).parents[2]))  # evidence, which this program is not started beside
 
 from golden_models import write_models
 from golden_stages import cases

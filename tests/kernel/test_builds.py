@@ -4,6 +4,7 @@ GK_ASSERT, of which none fails."""
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import re
 import struct
@@ -106,7 +107,7 @@ def apart(*arguments: object) -> subprocess.CompletedProcess[str]:
     """A Python program of this folder in a process of its own, which a check that fails ends."""
     here = Path(__file__).parent
     line = [sys.executable, str(here / str(arguments[0])), *map(str, arguments[1:])]
-    return subprocess.run(line, capture_output=True, text=True)
+    return subprocess.run(line, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(here.parents[1])})
 
 
 def test_no_check_fails_in_runs_of_the_pair() -> None:
