@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Browser
 from test_set_report import set_run
 
 import gearfmu as gf
+from evidence.pictures.browser import Browser
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.femesh.mesh import rotated
