@@ -6,9 +6,10 @@ import csv
 import json
 from pathlib import Path
 
-import exudyn_rotor
 import numpy as np
 import pytest
+
+from evidence.peers import exudyn_rotor
 
 ROOT = Path(__file__).resolve().parents[2]
 

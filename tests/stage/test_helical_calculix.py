@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import helical
 import numpy as np
 import pytest
 
+from evidence.peers.calculix import helical
 from evidence.peers.calculix.positions import read
 
 pytestmark = pytest.mark.full  # four reductions
