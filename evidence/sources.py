@@ -24,9 +24,11 @@ from functools import cache, cached_property
 from itertools import accumulate
 from pathlib import Path
 
+import numpy as np
+
 from evidence.pages_made import MARK
 from gearfmu.cli import VERBS
-from gearfmu.stage.build.blob import rounded_hash
+from gearfmu.stage.build.blob import read_blob
 
 KERNEL = "gearfmu/kernel/src"
 UPSTREAM = ("spec", "geometry", "fem", "femesh", "reduction", "body", "stage/build")  # from a stage file to its model
@@ -35,6 +37,22 @@ PLUMBING = ("__init__.py", "api", "errors.py", "extras.py", "files.py", "hdf5.py
 BARRIERS = tuple(f"gearfmu/{part}" for part in (*UPSTREAM, *PLUMBING))
 C_WORDS = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|/\*.*?\*/|//[^\n]*', re.DOTALL)
 PROGRAM = re.compile(r"python (?:-m ([\w.]+)|([\w/]+\.py))|\bgearfmu (\w+)")
+SMALL = 64  # numbers of an array
+
+
+def rounded_hash(blob: bytes) -> str:
+    """12 hex digits that tell models apart, whatever the processor and the number of threads that made them: of small
+    arrays five digits of every float, of large ones type, shape and norm (modes of equal frequency are any of many)."""
+    said = []
+    for name, value in read_blob(blob).items():
+        if isinstance(value, str):
+            said.append(f"{name} {value}")
+            continue
+        large = value.dtype.kind == "f" and value.size > SMALL
+        numbers = [float(np.linalg.norm(value.astype(float)))] if large else value.ravel().tolist()
+        rounded = [f"{number:.4e}" if isinstance(number, float) else number for number in numbers]
+        said.append(f"{name} {value.dtype} {value.shape} {rounded}")
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:12]
 
 
 def short(content: bytes) -> str:

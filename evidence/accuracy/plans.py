@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from evidence.study.tidy import tidy
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.kernel.build import fingerprint
@@ -30,7 +31,7 @@ from gearfmu.planning.make import Job, PlanError, make
 from gearfmu.planning.request import Request, request
 from gearfmu.planning.trials import Task, Window, run_trial
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.study.table import read_rows, tidy, write_rows
+from gearfmu.study.table import read_rows, write_rows
 from gearfmu.sweeps.runners import in_this_process
 
 LONGER, LONGEST = 3, 0.3  # windows; s

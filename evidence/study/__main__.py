@@ -14,6 +14,7 @@ from typing import Any
 from evidence.study import cuts, limits, order, refined
 from evidence.study.refined import write_bodies_chart
 from evidence.study.sets import ladder, set_study
+from evidence.study.tidy import tidy
 from gearfmu.commands.models import bodies_for_motion
 from gearfmu.commands.shared import progress_bar
 from gearfmu.report.study import write_chart
@@ -21,7 +22,7 @@ from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.ladder import window
-from gearfmu.study.table import read_rows, tidy, write_rows
+from gearfmu.study.table import read_rows, write_rows
 
 
 def table(name: str, specs: Sequence[SceneSpec], quick: bool, tell: Any) -> list[Any]:

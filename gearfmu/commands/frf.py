@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +44,6 @@ class Trial:
     help="Methods, comma-separated: those of a carrier's stage file; 'krylov:240' has a size of its own.",
 )
 @click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n, rigid modes aside.")
-@click.option("--tolerance", type=float, help="Instead of --size: the largest relative error allowed over the band.")
 @click.option(
     "--band",
     nargs=2,
@@ -144,7 +143,7 @@ def _shortfalls(trials: Sequence[Trial], entries: Sequence[tuple[str, Size]]) ->
         + ("whole blocks of one vector per input" if t.method == "krylov" else "what there is")
         + f"; a method of the same size is rubin:{t.size}"
         for t, (_, size) in zip(trials, entries, strict=True)
-        if size.count is not None and t.size < size.count
+        if t.size < size.count
     ]
 
 
@@ -176,8 +175,6 @@ def _entries(options: dict[str, Any]) -> list[tuple[str, Size]]:
     from gearfmu.reduction.basis import Size
     from gearfmu.reduction.methods import METHODS
 
-    band, tolerance = tuple(options["band"]), options["tolerance"]
-    general = Size(None if tolerance else options["size"], tolerance, band)
     entries = []
     for text in options["methods"].split(","):
         name, _, own = text.strip().partition(":")
@@ -186,7 +183,7 @@ def _entries(options: dict[str, Any]) -> list[tuple[str, Size]]:
                 f"'{text.strip()}' is no method; there are {', '.join(METHODS)}, each with ':n' behind it for a size",
                 param_hint="--methods",
             )
-        entries.append((name, replace(general, count=int(own), tolerance=None) if own else general))
+        entries.append((name, Size(int(own or options["size"]), tuple(options["band"]))))
     return entries
 
 

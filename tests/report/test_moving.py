@@ -18,11 +18,21 @@ from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.observed import gear_bodies
-from gearfmu.stage.run.touching import contacts_at, meshing_angles
+from gearfmu.stage.run.touching import contacts_at
 from gearfmu.stage.run.trace import Channel, Trace
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N
 TIME = np.linspace(0.0, 0.02, 2001)
+
+
+def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
+    """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
+    the rolls of docs/theory eq. 4 add up to L."""
+    a, b = pair.gears
+    t = -sg * pair.alpha_wt
+    roll = a.r_b * sg * (phi + sg * a.psi_b - t)
+    beta = t + math.pi + sg * (pair.length - roll) / b.r_b
+    return phi, beta - sg * b.psi_b
 
 
 def turning_pair(sign: float = 1.0) -> tuple[Trace, Any, dict[str, Any]]:

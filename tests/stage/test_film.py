@@ -19,7 +19,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FilmSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.film import REACH, film_impulse, film_resistance
+from gearfmu.stage.build.film import REACH, film_impulse
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m
@@ -33,6 +33,15 @@ def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
 
 
 # ---- a falling body: exact -------------------------------------------------------------------------------------------
+def film_resistance(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:
+    """c of f = −c ḋ (N·s/m) at a gap (m) of two flanks of relative radius of curvature and width (m), docs/theory.md
+    (8q); 0 from REACH on."""
+    if gap >= REACH:
+        return 0.0
+    ends = (gap + roughness) ** -1.5 - (REACH + roughness) ** -1.5
+    return 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5 * ends
+
+
 def falling(h: float, integrator: float, settings: Mapping[str, float], compliance: float = 0.0) -> Kernel:
     """Two free bodies that approach under LOAD."""
     none, rows = np.zeros(0), np.zeros((1, 0))

@@ -18,7 +18,6 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 
 _CASES = 8
 _SURPLUS = 2.5  # snapshots per basis vector
@@ -35,16 +34,16 @@ class Training:
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
-    """POD basis of a training run of the default kind. Raises BodyError when a tolerance cannot be met."""
-    return sized(body, size, lambda b, s: from_snapshots(b, training_run(b, default_training(b, s)), s.vectors))
+    """POD basis of a training run of the default kind."""
+    return from_snapshots(body, training_run(body, default_training(body, size)), size.count)
 
 
 def default_training(body: FullOrder, size: Size) -> Training:
-    """Lines in the band on every interface row, enough instants for `size.vectors` vectors."""
+    """Lines in the band on every interface row, enough instants for `size.count` vectors."""
     rng, rows = np.random.default_rng(4), body.rows().shape[0]
     cases = min(_CASES, rows)
     step = 1 / (_STEPS_PER_PERIOD * size.band[1])
-    steps = int(np.ceil(_SURPLUS * size.vectors / cases)) + 2 * _STEPS_PER_PERIOD
+    steps = int(np.ceil(_SURPLUS * size.count / cases)) + 2 * _STEPS_PER_PERIOD
     time = step * np.arange(1, steps + 1)
     lines = rng.uniform(max(size.band[0], 0.02 * size.band[1]), size.band[1], (1, rows, cases, 6))
     phase = rng.uniform(0, 2 * np.pi, lines.shape)

@@ -12,21 +12,16 @@ import numpy as np
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 from gearfmu.reduction.moments import input_loads, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
-    """At most one static mode per input. Raises BodyError when a tolerance cannot be met."""
-    return sized(body, size, _build)
-
-
-def _build(body: FullOrder, size: Size) -> Basis:
+    """At most one static mode per input."""
     loads = input_loads(body)
     response = static_response(body)
-    if size.vectors < loads.shape[1]:
+    if size.count < loads.shape[1]:
         compliance = loads.T @ response
-        response = response @ np.linalg.eigh(0.5 * (compliance + compliance.T))[1][:, ::-1][:, : size.vectors]
+        response = response @ np.linalg.eigh(0.5 * (compliance + compliance.T))[1][:, ::-1][:, : size.count]
     basis = Growing(elastic(body))
     basis.add(response)
     return Basis("static", np.array(basis.vectors), {"inputs": loads.shape[1]})
