@@ -7,7 +7,11 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from draw import SKIPPED, drawn, edits, files
+from copies import nearest
+from draw import ROOT, SKIPPED, drawn, edits, files
+from table import CAUGHT, EQUIVALENT, HARMLESS, HOLE, count, read
+
+LEAST = 0.85  # of the defects that change anything
 
 
 @pytest.mark.parametrize(
@@ -43,3 +47,26 @@ def test_a_seed_draws_the_same_defects_of_every_kind_in_both_languages() -> None
     c = Counter(Path(d.file).suffix == ".py" for d in first)
     assert 60 < c[True] < 140, "about half of the lines are Python"
     assert len(files()) > 200
+
+
+def test_every_defect_of_the_table_stands_in_the_sources() -> None:
+    """A survivor has a verdict with its reason; a defect that was caught names the test."""
+    for row in read():
+        lines = (ROOT / row.file).read_text(encoding="utf-8").splitlines()
+        assert nearest(lines, row.defect), row
+        assert row.verdict in (CAUGHT, EQUIVALENT, HARMLESS, HOLE, ""), row
+        if row.verdict:
+            assert (row.verdict == CAUGHT) == bool(row.caught_by) and (row.caught_by or row.why), row
+
+
+def test_the_page_states_the_count_of_the_table() -> None:
+    rows = read()
+    own, chosen = ([row for row in rows if (row.kind == "chosen") == pick] for pick in (False, True))
+    drawn_count, chosen_count = count(own), count(chosen)
+    stated = (
+        f"of {len(own)} defects drawn at random from the sources {drawn_count.judged} are judged: "
+        f"{drawn_count.caught} of {drawn_count.judged - drawn_count.equivalent} that change anything are caught; "
+        f"of {len(chosen)} chosen ones {chosen_count.judged} are judged and {chosen_count.caught} caught"
+    )
+    assert stated in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    assert drawn_count.share >= LEAST

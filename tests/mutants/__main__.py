@@ -4,6 +4,7 @@
     python tests/mutants --draw 120 --seed 43      draws defects from the sources into evidence/mutants.csv
     python tests/mutants [--jobs 2]                judges those without verdict; a row is written as it comes
     python tests/mutants --again PATTERN           judges anew those whose file or text matches
+    python tests/mutants --check                   tests that caught a defect must pass without it
 
 Golden runs and stored tables do not judge: the physics must see a defect. A survivor's verdict (equivalent, harmless,
 hole) and its reason are written into the table by hand. Exit code 1 where fewer than 85 % of the defects that change
@@ -28,6 +29,8 @@ from judges import judges, make_map
 from table import CAUGHT, Row, count, read, row_of, write
 
 LEAST = 0.85  # share that must be caught
+MOST = 14  # modules that judge one defect
+FIRST = 2  # of them run alone before the others are collected
 SECONDS = 90.0  # processor time of the tests of one defect
 
 
@@ -37,7 +40,7 @@ def draw(number: int, seed: int) -> None:
     known = {(r.file, r.before, r.after) for r in rows}
     rows += [row_of(d) for d in chosen() if (d.file, d.before, d.after) not in known]
     write(rows)
-    copy, left = Copy("draw"), number
+    copy, left = Copy("copy0"), number
     copy.build()
     for defect in drawn(seed):
         if not left:
@@ -52,17 +55,15 @@ def draw(number: int, seed: int) -> None:
 
 def judged(copy: Copy, row: Row, seconds: float) -> Row:
     """The row with the test that failed, or with its old verdict."""
-    started, tests, planned = time.monotonic(), [], 0.0
-    for judge in judges(row.file, int(row.line)):
-        tests.append(judge.module)
-        planned += judge.seconds
-        if planned > seconds:
-            break
+    started, tests = time.monotonic(), judges(row.file, int(row.line))[:MOST]
     if (copy.root / row.caught_by.split("::")[0]).is_file():
         tests.insert(0, row.caught_by.split("::")[0])
+    tests, failed = list(dict.fromkeys(tests)), ""
     with copy.planted(row.defect) as changed:
-        run = copy.run(list(dict.fromkeys(tests)), seconds) if changed and tests else None
-    failed = run.failed if run else ""
+        for some in (tests[:FIRST], tests[FIRST:]):
+            if changed and some and not failed and seconds > 0.0:
+                run = copy.run(some, seconds)
+                failed, seconds = run.failed, seconds - run.seconds
     print(
         f"{time.monotonic() - started:4.0f} s {len(tests):3} modules  {row.file}:{row.line} {row.after}  {failed}",
         flush=True,
@@ -78,7 +79,7 @@ def judge_all(wanted: Sequence[int], jobs: int, seconds: float) -> None:
     """Judges rows of the table by number, each worker in its own copy of the checkout."""
     rows, lock, free = read(), Lock(), SimpleQueue()
     for k in range(jobs):
-        copy = Copy(f"judge{k}")
+        copy = Copy(f"copy{k}")
         copy.build()
         free.put(copy)
 
@@ -95,11 +96,20 @@ def judge_all(wanted: Sequence[int], jobs: int, seconds: float) -> None:
         list(pool.map(one, wanted))
 
 
+def unsound() -> list[str]:
+    """Tests that caught a defect and fail without it too: each runs alone with what it needs on the sound checkout."""
+    tests = sorted({row.caught_by for row in read() if row.verdict == CAUGHT and "::" in row.caught_by})
+    copy = Copy("copy0")
+    copy.build()
+    return [test for test in tests if copy.run([test], SECONDS).failed]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--map", action="store_true")
     parser.add_argument("--draw", type=int, default=0)
     parser.add_argument("--seed", type=int, default=43)
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--again", default="")
     parser.add_argument("--seconds", type=float, default=SECONDS)
     parser.add_argument("--jobs", type=int, default=1)
@@ -108,6 +118,9 @@ def main() -> int:
         make_map()
     if given.draw:
         draw(given.draw, given.seed)
+    if given.check:
+        print("\n".join(wrong := unsound()) or "every test that caught a defect passes without it")
+        return int(bool(wrong))
     if given.map or given.draw:
         return 0
     rows = read()

@@ -19,7 +19,7 @@ from draw import Defect
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "build" / "mutants"
 LEFT_OUT = shutil.ignore_patterns("__pycache__", ".*_cache", ".hypothesis", ".git", ".venv", "lib")
-PATIENCE = 900.0  # s of the clock for one run of tests
+PATIENCE = 7200.0  # s of the clock for one run of tests, on a machine with other work; processor time is limited too
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,8 @@ class Copy:
             yield self._changed(path, text)
         finally:
             path.write_text(text, encoding="utf-8")
+            if path.suffix != ".py":
+                self.build()  # else the library does not belong to the sources
 
     def _changed(self, path: Path, before: str) -> bool:
         if path.suffix == ".py":

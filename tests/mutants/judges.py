@@ -5,6 +5,7 @@ The map is one file for each test module in build/mutants/map, made once and aga
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +15,14 @@ from pathlib import Path
 from copies import KEPT, ROOT, Copy
 
 MAP = KEPT / "map"
-FOLDERS = "geometry stage relations kernel fem reduction cosim spec femesh body modes report rexs study".split()
-FOLDERS += ["planning", "imports", "sweeps", "fmu"]
+FOLDERS = (
+    "geometry relations kernel spec femesh fem cosim reduction body modes planning stage report rexs study".split()
+)
+FOLDERS += ["imports", "sweeps", "fmu"]
 STORED = "test_golden", "test_quoted", "test_evidence"  # answers of our own: no judges
 OF_SOURCES = "test_c_sources", "test_said_twice", "test_builds", "test_build_without_compiler", "test_fuzz"
-SECONDS = 6.0  # processor time that a module has to show which lines it runs
+MOST = 6  # modules of the map that are heard before those that it does not know
+SECONDS = 2.0  # processor time that a module has to show which lines it runs
 
 
 @dataclass(frozen=True)
@@ -62,12 +66,21 @@ def make_map() -> None:
         print(f"{run.seconds:5.1f} s {name} {run.failed}", flush=True)
 
 
-def judges(file: str, line: int) -> list[Judge]:
-    """Modules that run a line, the best first: little time, and much of it in that file."""
+def judges(file: str, line: int) -> list[str]:
+    """Modules that run a line, the best first: little time, and much of it in that file. Modules that the map does not
+    know yet are judges where they import the file, or lie in the folder of its package."""
     known = [Judge(**json.loads(p.read_text(encoding="utf-8"))) for p in sorted(MAP.glob("*.json"))]
-    fit = [j for j in known if j.green and line in j.lines.get(file, ())]
-    fit = fit or [j for j in known if j.green and j.lines.get(file)]  # what is done at import, and tables of C
-    return sorted(fit, key=lambda j: max(j.seconds, 0.1) / j.share(file))
+    ran = [j for j in known if j.green and line in j.lines.get(file, ())]
+    fit = ran or [j for j in known if j.green and j.lines.get(file)]  # what is done at import, and tables of C
+    found = [j.module for j in sorted(fit, key=lambda j: max(j.seconds, 0.1) / j.share(file))]
+    new = [path for path in modules() if not _place(path).exists()]
+    head = {path: path.read_text(encoding="utf-8").partition("\ndef ")[0] for path in new}
+    own = rf"^(?:from|import) .*\b{Path(file).stem}\b" if file.endswith(".py") else "^from (?:inner|kinds) import"
+    word = re.compile(own, re.MULTILINE)
+    new.sort(key=lambda p: (not word.search(head[p]), p.parent.name != file.split("/")[1]))
+    unknown = [str(p.relative_to(ROOT)) for p in new if word.search(head[p]) or p.parent.name == file.split("/")[1]]
+    first = MOST if ran else 0
+    return [*found[:first], *unknown, *found[first:]]
 
 
 def _place(path: Path) -> Path:
