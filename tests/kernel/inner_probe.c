@@ -23,6 +23,24 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
     return found;
 }
 
+/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, share, gradient[12], slide[12]} */
+GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const double *pose, double reach,
+                      double *out)
+{
+    gk_place place[MAX_PAIRS];
+    gk_position position[2];
+    int rows = 0;
+    const int found = gk_flank_find(model, setup, &setup->mesh[e], pose, reach, position, place);
+    for (int i = 0; i < found; i++)
+        for (int strip = 0; strip < setup->strips; strip++, rows++, out += 3 + 2 * POSE) {
+            const gk_point *point = gk_point_of(setup, &place[i], strip);
+            out[0] = place[i].flank, out[1] = strip, out[2] = point->share;
+            memcpy(out + 3, point->gradient, sizeof point->gradient);
+            memcpy(out + 3 + POSE, point->slide, sizeof point->slide);
+        }
+    return rows;
+}
+
 /* out: {approach, slope, energy} of one slice at `force` */
 GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curvature, double force, double *out)
 {

@@ -12,7 +12,7 @@ from evidence.reduction.methods import METHODS, snapshots
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
-from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.moments import expansion_points, input_loads
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
 
@@ -142,6 +142,12 @@ def test_a_full_basis_is_the_full_model(name, ground):
     for h, f in zip(transfer(model, lines, body.ground), lines.frequency, strict=True):
         exact = direct(body, f, 0.01)
         assert np.linalg.norm(h - exact) < 1e-8 * np.linalg.norm(exact)
+
+
+def test_expansion_points_are_chebyshev_points_of_the_second_kind():
+    """Three in 0 … 100 Hz: 0, half and all of it in Ω; σ = Ω² = (2π·50)² and (2π·100)²."""
+    assert expansion_points(3, (0.0, 100.0)) == pytest.approx([0.0, 98696.044, 394784.176], rel=1e-8)
+    assert expansion_points(1, (0.0, 100.0)) == [0.0]
 
 
 def test_a_shift_on_an_eigenvalue_moves():

@@ -1,0 +1,72 @@
+"""Drawing of planted defects, and the table of those that were judged."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from copies import nearest
+from draw import ROOT, SKIPPED, drawn, edits, files
+from table import CAUGHT, EQUIVALENT, HARMLESS, HOLE, count, read
+
+LEAST = 0.85  # of the defects that change anything
+
+
+@pytest.mark.parametrize(
+    ("line", "becomes"),
+    [
+        ("a = b - c * d", {"a = b + c * d", "a = b", "a = b - c"}),
+        (
+            "x[i] = 0.5 * y[k + 1];",
+            {"x[i + 1] = 0.5 * y[k + 1];", "x[i] = 0.525 * y[k + 1];", "x[i] = 0.5 * y[k + 2];"},
+        ),
+        ("for (int i = 0; i < n; i++)", {"for (int i = 1; i < n; i++)", "for (int i = 0; i <= n; i++)"}),
+        ("    if a and b.c:", {"    if False:", "    if a:"}),
+        ("if (p && !q) return 0;", {"if (0) return 0;"}),
+        ("turn = np.cos(angle)", {"turn = np.sin(angle)"}),
+        ("p = f(a, b.c)", {"p = f(b.c, a)"}),
+        ("e += -x", {"e -= -x", "e += x"}),
+    ],
+)
+def test_a_line_offers_these_defects(line: str, becomes: set[str]) -> None:
+    offered = {line[:start] + new + line[end:] for _, start, end, new in edits(line)}
+    assert becomes <= offered and line not in offered
+
+
+@pytest.mark.parametrize("line", ["const double *row, *other;", "def f(a: int = 1) -> int:", "x = y", "value = call()"])
+def test_a_line_without_arithmetic_offers_none(line: str) -> None:
+    assert SKIPPED.match(line) or not edits(line)
+
+
+def test_a_seed_draws_the_same_defects_of_every_kind_in_both_languages() -> None:
+    first, again = (list(islice(drawn(43), 200)) for _ in range(2))
+    assert first == again != list(islice(drawn(44), 200))
+    assert {d.kind for d in first} == {"sign", "index", "constant", "comparison", "term", "swapped", "guard"}
+    c = Counter(Path(d.file).suffix == ".py" for d in first)
+    assert 60 < c[True] < 140, "about half of the lines are Python"
+    assert len(files()) > 200
+
+
+def test_every_defect_of_the_table_stands_in_the_sources() -> None:
+    """A survivor has a verdict with its reason; a defect that was caught names the test."""
+    for row in read():
+        lines = (ROOT / row.file).read_text(encoding="utf-8").splitlines()
+        assert nearest(lines, row.defect), row
+        assert row.verdict in (CAUGHT, EQUIVALENT, HARMLESS, HOLE, ""), row
+        if row.verdict:
+            assert (row.verdict == CAUGHT) == bool(row.caught_by) and (row.caught_by or row.why), row
+
+
+def test_the_page_states_the_count_of_the_table() -> None:
+    rows = read()
+    own, chosen = ([row for row in rows if (row.kind == "chosen") == pick] for pick in (False, True))
+    drawn_count, chosen_count = count(own), count(chosen)
+    stated = (
+        f"of {len(own)} defects drawn at random from the sources {drawn_count.judged} are judged: "
+        f"{drawn_count.caught} of {drawn_count.judged - drawn_count.equivalent} that change anything are caught; "
+        f"of {len(chosen)} chosen ones {chosen_count.judged} are judged and {chosen_count.caught} caught"
+    )
+    assert stated in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    assert drawn_count.share >= LEAST
