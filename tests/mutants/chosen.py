@@ -39,7 +39,7 @@ CHOSEN: dict[str, tuple[tuple[str, str], ...]] = {
         ("film->factor[i] * (u * u * u - far * far * far);", "film->factor[i] * (u * u * u + far * far * far);"),
     ),
     "gk_friction.c": (
-        ("0.5 * ratio * (s->force0[j] + s->begin[j])", "0.4 * ratio * (s->force0[j] + s->begin[j])"),
+        ("0.5 * ratio * s->force0[j]", "0.4 * ratio * s->force0[j]"),
         ("glide->limit[j] * glide->slid[j] > -glide->creep[j]", "glide->limit[j] * glide->slid[j] < -glide->creep[j]"),
     ),
     "gk_tally.c": (
