@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import warnings
+import webbrowser
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +110,27 @@ def write_report(
     except GearfmuError as error:
         tell(f"the report goes without the deformed pair: {error}")
         return write(trace, summary, Path(out))
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report that was written, at `path`."""
+
+    path: Path
+
+    def open(self) -> None:
+        """Open it in the browser."""
+        webbrowser.open(self.path.resolve().as_uri())
+
+    def _repr_html_(self) -> str:
+        """The whole page inside a notebook, which need not reach the file."""
+        text = escape(self.path.read_text(encoding="utf-8"), quote=True)
+        return f'<iframe srcdoc="{text}" style="width:100%;height:80vh;border:0"></iframe>'
+
+
+def shown(trace: Trace, folder: PathLike | None = None) -> Page:
+    """The report of a trace as a notebook shows it; `Trace.show`."""
+    return Page(write_report(trace, folder if folder is not None else tempfile.mkdtemp(prefix="gearfmu-")))
 
 
 def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike], path: PathLike) -> Path:

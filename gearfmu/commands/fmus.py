@@ -8,14 +8,14 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import progress_bar, stage_names
 
 OF_INPUT = ("torque", "speed")  # starts that are no parameters
 PORT_KINDS = ("spring", "torque", "fixed")
 
 
 @click.command()
-@click.argument("stage", required=False)
+@click.argument("stage", required=False, shell_complete=stage_names)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
 @click.option(
     "--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat."

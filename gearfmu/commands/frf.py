@@ -14,7 +14,7 @@ import click
 import numpy as np
 
 from gearfmu.commands.models import by_text
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, progress_bar, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.reduction.comparison import Contest
@@ -24,7 +24,7 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.argument("body")
 @click.option(
     "--methods",
