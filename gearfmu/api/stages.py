@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import TypedDict, cast
 
 from typing_extensions import Unpack
 
@@ -60,14 +61,15 @@ def new(name: str, like: str | None = None, folder: PathLike = ".", **numbers: U
         return new_stage(name, like or "fzg_c", folder)
     if like is not None:
         raise SpecError([Problem("", "like", like, "a copy or numbers, not both")])
-    return new_from_numbers(name, wish_of(_in_si(dict(numbers))), folder)
+    return new_from_numbers(name, wish_of(_in_si(numbers)), folder)
 
 
-def _in_si(numbers: dict[str, Any]) -> dict[str, Any]:
-    found = {key: in_si(value, _UNITS[key]) if key in _UNITS else value for key, value in numbers.items()}
-    if "bores" in found:
-        found["bores"] = tuple(in_si(bore, "m") for bore in found["bores"])
-    return found
+def _in_si(numbers: Numbers) -> dict[str, object]:
+    given = cast(Mapping[str, Quantity], numbers)
+    found: dict[str, object] = {key: in_si(value, _UNITS[key]) for key, value in given.items() if key in _UNITS}
+    if "bores" in numbers:
+        found["bores"] = tuple(in_si(bore, "m") for bore in numbers["bores"])
+    return {**given, **found}
 
 
 def effects() -> tuple[Effect, ...]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.spec.scene import SceneSpec
 
 DEMO_STEP = 20e-6  # s
 OUT = click.Path(path_type=Path, file_okay=False)
@@ -186,7 +189,7 @@ def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -
     click.echo(write(dict(zip(names, paths, strict=True)) if names else paths, out or Path("comparison.html")))
 
 
-def changed_scene(scene: str, step: float | None = None, **others: Any) -> Any:
+def changed_scene(scene: str, step: float | None = None, **others: object) -> SceneSpec:
     """The SceneSpec of SCENE with another communication step (s), torque, speed, level or stage where one is given."""
     from gearfmu.spec.scene import load_scene
 
@@ -196,12 +199,12 @@ def changed_scene(scene: str, step: float | None = None, **others: Any) -> Any:
     return spec if step is None else with_step(spec, step)
 
 
-def with_step(scene: Any, step: float) -> Any:
+def with_step(scene: SceneSpec, step: float) -> SceneSpec:
     """The SceneSpec with another communication step (s)."""
     return scene.model_copy(update={"coupling": scene.coupling.model_copy(update={"step": step})})
 
 
-def run_scene(scene: Any, out: Path, **options: Any) -> int:
+def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
     from gearfmu.api.results import recorded_deformation, stage_and_bodies
     from gearfmu.api.runs import run as run_it

@@ -51,7 +51,7 @@ class Quantity(click.ParamType):
         return number
 
 
-def level_option(command: Callable[..., Any]) -> Callable[..., Any]:
+def level_option(command: Callable[..., object]) -> Callable[..., object]:
     """--level, which means the same on every verb that computes."""
     return click.option("--level", type=click.Choice(LEVELS), help="Fidelity level, standard when not given.")(command)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from types import ModuleType
-from typing import Any
 
 from gearfmu.modes.shapes import BodyModes, Mode
 
@@ -13,7 +12,7 @@ __all__ = ["BodyModes", "Mode"]
 
 
 class _Callable(ModuleType):
-    def __call__(self, *stage: Any, **how: Any) -> Any:
+    def __call__(self, *stage: object, **how: object) -> object:
         """`gearfmu.api.stages.modes`: the verb and this package have one name."""
         return import_module("gearfmu.api.stages").modes(*stage, **how)
 

@@ -99,7 +99,7 @@ class Trace(Shown):
             panels.setdefault(label, {})[name] = part[name]
         return plot_over(("time in s", part.time), panels, figure)
 
-    def show(self, folder: str | os.PathLike[str] | None = None) -> Any:
+    def show(self, folder: str | os.PathLike[str] | None = None) -> object:
         """The report of the run: as the last line of a notebook's cell it appears there, `show().open()` opens it in
         the browser. folder : of the report's files, which stay; a temporary one when None."""
         return import_module("gearfmu.api.results").shown(self, folder)  # reports are made of traces
