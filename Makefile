@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 RUN     = $(VENV)/bin/python
 PIP     = $(RUN) -m pip install --quiet
-BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20"
+BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20" "plotly>=6"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
 PRICES  ?= phases steps fmu_overhead harness effects_cost levels
@@ -55,10 +55,12 @@ evidence: $(STAMP)
 evidence-check: $(STAMP)
 	$(EVIDENCE) check
 
-## make wheel       dist/*.whl with the linux64 and win64 kernels
+## make wheel       what a release uploads, checked: dist/*.whl with the linux64 and win64 kernels, dist/*.tar.gz
 wheel: $(STAMP)
-	$(RUN) -m pip install --quiet build
-	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --outdir dist
+	$(RUN) -m pip install --quiet build twine
+	rm -rf dist
+	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --sdist --outdir dist
+	$(RUN) -m twine check --strict dist/*
 
 ## make models      reduce all bodies of the model library again from their stage files (half an hour on two cores)
 models: $(STAMP)

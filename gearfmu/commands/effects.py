@@ -8,11 +8,13 @@ from typing import Any
 
 import click
 
+from gearfmu.commands.shared import stage_names
+
 FIELDS = ("formula", "matters", "off", "switch", "code")
 
 
 @click.command()
-@click.argument("stage", required=False)
+@click.argument("stage", required=False, shell_complete=stage_names)
 def effects(stage: str | None) -> None:
     """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs

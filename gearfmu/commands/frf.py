@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gearfmu.commands.shared import Quantity
+from gearfmu.commands.shared import Quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.reduction.basis import Size
@@ -35,7 +35,7 @@ class Trial:
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.argument("body")
 @click.option(
     "--methods",

@@ -23,8 +23,10 @@ from gearfmu.stage import assemble
 
 
 @pytest.fixture(scope="module")
-def members(native) -> dict[str, bytes]:
-    with zipfile.ZipFile(native) as archive:
+def members(model, tmp_path_factory) -> dict[str, bytes]:
+    """Of an FMU with all that is looked at."""
+    fmu = export(model, tmp_path_factory.mktemp("members") / "stage.fmu", platforms=("host",), terminals=True)
+    with zipfile.ZipFile(fmu) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
