@@ -61,7 +61,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
     help="The file terminalsAndIcons.xml, which some importers refuse: docs/howto-fmu.md.",
 )
 @click.option("--author", default="", help="Author of the model, for its description.")
-@click.option("--copyright", default="", help='Copyright of the model: "© 2026 …".')
+@click.option("--copyright", default="", help='Copyright of the model: "(c) 2026 …".')
 @click.option("--license", default="", help="Licence of the model; that of the binary lies in the FMU anyway.")
 @click.option("--sources", is_flag=True, help="Also the C sources of the binary and how to build it.")
 def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], **how: Any) -> None:
