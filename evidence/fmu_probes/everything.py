@@ -16,9 +16,10 @@ from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 
 
 def findings(path: str | Path, checks: tuple[str, ...] = tuple(CHECKS)) -> list[str]:
-    """What `validate` finds; where that is nothing, what exported symbols and the named probes show."""
-    found = [str(problem) for problem in validate(path)]
-    if found:
+    """What `validate` finds; unless its run has failed, what exported symbols and the named probes show too."""
+    problems = validate(path)
+    found = [str(problem) for problem in problems]
+    if any(problem.field.startswith("a run of") for problem in problems):
         return found
     with tempfile.TemporaryDirectory(prefix="gearfmu-probes-") as folder:
         fmpy.extract(str(path), folder)
