@@ -26,7 +26,7 @@ from chosen import chosen
 from copies import Copy
 from draw import drawn
 from judges import judges, make_map
-from table import CAUGHT, Row, count, read, row_of, write
+from table import CAUGHT, OPEN, Row, count, read, row_of, write
 
 LEAST = 0.85  # share that must be caught
 MOST = 14  # modules that judge one defect
@@ -70,9 +70,8 @@ def judged(copy: Copy, row: Row, seconds: float) -> Row:
     )
     if failed:
         return replace(row, caught_by=failed, verdict=CAUGHT, why="")
-    kept = "" if row.verdict == CAUGHT else row.verdict
-    why = row.why or ("" if tests else "no test runs this line")
-    return replace(row, caught_by="", verdict=kept, why=why)
+    kept = OPEN if row.verdict in ("", CAUGHT) else row.verdict
+    return replace(row, caught_by="", verdict=kept)
 
 
 def judge_all(wanted: Sequence[int], jobs: int, seconds: float) -> None:

@@ -11,6 +11,7 @@ from draw import ROOT, Defect
 
 TABLE = ROOT / "evidence" / "mutants.csv"
 CAUGHT, EQUIVALENT, HARMLESS, HOLE = "caught", "equivalent", "harmless", "hole"
+OPEN = "open"  # survived, and nobody has read it yet
 
 
 @dataclass(frozen=True)
