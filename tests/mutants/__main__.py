@@ -4,6 +4,7 @@
     python tests/mutants --draw 120 --seed 43      draws defects from the sources into evidence/mutants.csv
     python tests/mutants [--jobs 2]                judges those without verdict; a row is written as it comes
     python tests/mutants --again PATTERN           judges anew those whose file or text matches
+    python tests/mutants --again OPEN              judges anew what survived before, with a larger --seconds
     python tests/mutants --check                   tests that caught a defect must pass without it
 
 Golden runs and stored tables do not judge: the physics must see a defect. A survivor's verdict (equivalent, harmless,
@@ -125,7 +126,11 @@ def main() -> int:
     rows = read()
     wanted = [k for k, r in enumerate(rows) if not r.verdict]
     if given.again:
-        wanted = [k for k, r in enumerate(rows) if re.search(given.again, f"{r.file}:{r.line} {r.before} {r.after}")]
+        wanted = [
+            k
+            for k, r in enumerate(rows)
+            if re.search(given.again, f"{r.file}:{r.line} {r.before} {r.after} {r.verdict.upper()}")
+        ]
     judge_all(wanted, given.jobs, given.seconds)
     found = count(read())
     print(f"{found.caught} of {found.judged - found.equivalent} caught, {found.equivalent} equivalent")
