@@ -64,15 +64,14 @@ def _back(torque: float, first: tuple[float, float], second: tuple[float, float]
     return Step(*first, torque, -torque), Step(*second, -torque, torque)
 
 
-def _drawn() -> dict[str, Scene]:
-    there = {
-        "speed": 2000 * RPM, "loads": _back(600.0, (0.02, 0.025), (0.065, 0.07)),
-        "judged": (0.12, 0.095), "coast": 0.045,
-    }  # fmt: skip
-    planets = {"speed": SPEED, "loads": _back(600.0, (0.003, 0.008), (0.022, 0.027)), "judged": (0.042, 0.034)}
+Drawn = dict[str, tuple[Callable[..., Finding], Bench, dict[str, Any]]]
+
+
+def _slow() -> Drawn:
+    """Those that take longest."""
     idle = {"turn": IDLE, "drag": 4.4}
     short, light = (CYCLE / 188, 25 * CYCLE, (5 - 1e-6) * CYCLE), {"limit": 0.02, **idle}
-    found: dict[str, tuple[Callable[..., Finding], Bench, dict[str, Any]]] = {
+    return {
         "pair_ten_million_steps": (events.many_steps, PAIR, {
             "speed": 2000 * RPM, "period": 60 / 2000 / 16, "steps": 10_000_000, "per_period": 1, "limit": 1e-4}),
         "pair_standstill": (events.standstill, PAIR, {"duration": 10.0, "step": 1e-3}),
@@ -109,6 +108,16 @@ def _drawn() -> dict[str, Scene]:
         "set_hardly_any_load": (events.rattle, SET, {
             "turn": Constant(SPEED), "drag": 0.1, "times": (0.0, 0.05, 0.0), "limit": 0.03, "expected": SET_HARDLY}),
         "set_all_effects": (of_sets.all_effects, HELD, {"speed": 300.0}),
+    }  # fmt: skip
+
+
+def _quick() -> Drawn:
+    there = {
+        "speed": 2000 * RPM, "loads": _back(600.0, (0.02, 0.025), (0.065, 0.07)),
+        "judged": (0.12, 0.095), "coast": 0.045,
+    }  # fmt: skip
+    planets = {"speed": SPEED, "loads": _back(600.0, (0.003, 0.008), (0.022, 0.027)), "judged": (0.042, 0.034)}
+    return {
         "set_thin_ring": (events.under_load, PlanetSet(thin=True), {"speed": SPEED, "torque": 600.0}),
         "set_reversal": (events.reversal, SET, {"limit": 0.03, **planets}),
         "set_reversal_rubbing": (events.reversal, SET, {"limit": 0.06, "effects": SET_RUBBING, **planets}),
@@ -161,10 +170,9 @@ def _drawn() -> dict[str, Scene]:
         "pair_jammed": (events.jammed, PAIR, {
             "speed": 1000 * RPM, "torque": 30.0, "duration": 0.1, "interference": JAM}),
     }  # fmt: skip
-    return {name: Scene(*parts) for name, parts in found.items()}
 
 
-SCENES = _drawn()
+SCENES = {name: Scene(*parts) for name, parts in (_slow() | _quick()).items()}
 
 
 def what(name: str) -> str:
