@@ -69,9 +69,9 @@ GK_API void probe_set_gamma(gk_setup *setup, double gamma)
     for (int i = 0; i < GAMMAS; i++) setup->gamma_at[i] = gamma;
 }
 
-/* coefficient of friction of a law (1: Benedict and Kelley, 2: ISO/TR 14179-2), viscosity, roughness, sum of the rolling
- * speeds at the pitch point per speed of gear A and relative radius there, width; load per length, total force, sliding
- * speed, sum of the rolling speeds, speed of gear A */
+/* coefficient of friction; given: law (1: Benedict and Kelley, 2: ISO/TR 14179-2), viscosity, roughness, sum of the
+ * rolling speeds at the pitch point per speed of gear A and relative radius there, width; load per length, total force,
+ * sliding speed, sum of the rolling speeds, speed of gear A */
 GK_API double probe_friction(const double *given)
 {
     const gk_friction law = {.law = (gk_friction_law)(int)given[0],
