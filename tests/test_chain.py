@@ -10,10 +10,12 @@ import subprocess
 import sys
 import venv
 import zipfile
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
+from verbs import call
 
 from gearfmu.stage.run.trace import Trace
 
@@ -40,12 +42,10 @@ chain_in_fmu = true
 
 def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
     """Standard output of the verb."""
-    command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False
-    )
-    assert done.returncode == expect, done.stderr + done.stdout
-    return done.stdout
+    with chdir(cwd or Path.cwd()):
+        code, out, err = call(*arguments)
+    assert code == expect, err + out
+    return out
 
 
 def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
@@ -198,7 +198,7 @@ def test_the_wheel_is_small(wheel: Path) -> None:
 @pytest.mark.needs("ziglang", "build")
 def test_the_wheel_is_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
     """Both kernels are in it and export the same names; the Windows one is not loaded here."""
-    from gearfmu.fmu.symbols import exported_symbols
+    from evidence.fmu_probes.symbols import exported_symbols
 
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
     with zipfile.ZipFile(wheel) as archive:

@@ -35,7 +35,7 @@ static void store(gk_flow *f, int i, const gk_oscillator *o)
     if (o->a12 != 0.0) round_flow(o, a);
     f->d11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->d22[i] = a[3];
     f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
-    f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
+    f->mobility[i] = (gk_real)o->mobility;
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
     f->unit[i] = (gk_real)o->unit, f->lead[i] = (gk_real)o->lead, f->hold[i] = (gk_real)o->hold;
 }
@@ -133,7 +133,7 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, const gk_p
         f->d11[i] = there ? o.a11 - 1.0 : 0.0, f->a12[i] = o.a12, f->a21[i] = o.a21,
         f->d22[i] = there ? o.a22 - 1.0 : 0.0;
         f->b0q[i] = o.b0q, f->b0v[i] = o.b0v, f->bq[i] = o.bq, f->bv[i] = o.bv;
-        f->mobility[i] = o.mobility, f->read_q[i] = o.read_q, f->read_v[i] = o.read_v;
+        f->mobility[i] = o.mobility;
         f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
         f->unit[i] = o.unit, f->lead[i] = o.lead, f->hold[i] = o.hold;
     }
@@ -157,12 +157,8 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->h = h;
     oldest->gamma = gamma;
     oldest->timeless = 0;
-    const gk_pace pace = {h, gamma, gk_min(gk_min(mesh_mode(model, setup), MATCHED_HIGHEST), MATCHED_MOST / h),
-                          setup->integrator == MIX4};
-    oldest->curved_read = setup->integrator == MIX4;
-    oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
-    oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
-    oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
+    const gk_pace pace = {h, gamma, gk_min(gk_min(mesh_mode(model, setup), MATCHED_HIGHEST), MATCHED_MOST / h)};
+    oldest->rigid_mobility = 0.25 * h * h;
     oldest->rigid_kappa = gk_oscillator_free_kappa(&pace);
     oldest->rigid_lead = oldest->rigid_kappa - h * h / 12.0; /* as of an oscillator with ω → 0 */
     for (int g = 0; g < model->gears; g++) fill_gear(setup, &pace, oldest, g);

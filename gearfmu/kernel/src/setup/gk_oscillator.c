@@ -53,7 +53,6 @@ static gk_oscillator flow(double omega, double zeta, double h)
                            .a12 = e * sine / damped,
                            .a21 = -e * omega * omega / damped * sine,
                            .a22 = e * (cosine - ratio * sine),
-                           .read_q = 1.0,
                            .inverse_s2 = 1.0,
                            .unit = 1.0};
 }
@@ -106,7 +105,6 @@ static gk_oscillator trapezoidal(double omega, double zeta, double h)
                            .bq = bq,
                            .bv = bv,
                            .mobility = bq,
-                           .read_q = 1.0,
                            .inverse_s2 = 1.0,
                            .unit = 1.0};
 }
@@ -129,28 +127,10 @@ static gk_oscillator partly_at_once(const gk_pace *pace, double omega, double ze
     return o;
 }
 
-/* mix4: force linear in the step, gap at q − (h²/12) q̈ (the scheme before dg4, for comparison) */
-static gk_oscillator linear_force(double omega, double zeta, double h)
-{
-    gk_oscillator o = flow(omega, zeta, h);
-    double omega2 = omega * omega, twelfth = h * h / 12.0, loss = 2.0 * zeta * omega;
-    double q0 = -loss / (h * omega2 * omega2),
-           v0 = 1.0 / (h * omega2); /* particular solution of the ramp at its start */
-    o.bq = q0 + 1.0 / omega2 - o.a11 * q0 - o.a12 * v0;
-    o.bv = v0 - o.a21 * q0 - o.a22 * v0;
-    o.b0q = (1.0 - o.a11) / omega2 - o.bq;
-    o.b0v = o.a12 - o.bv;
-    o.read_q = 1.0 + omega2 * twelfth;
-    o.read_v = loss * twelfth;
-    o.mobility = o.read_q * o.bq + o.read_v * o.bv - twelfth;
-    return o;
-}
-
 gk_oscillator gk_oscillator_of(const gk_pace *pace, double omega, double zeta)
 {
     GK_ASSERT(pace && pace->h > 0.0 && omega > 0.0 && zeta >= 0.0);
     const int slow = omega * pace->h < exponential_below(pace->gamma, omega);
-    if (pace->linear_force) return slow ? linear_force(omega, zeta, pace->h) : trapezoidal(omega, zeta, pace->h);
     return slow ? exponential(pace, omega, zeta) : partly_at_once(pace, omega, zeta);
 }
 
