@@ -117,11 +117,11 @@ GK_API void probe_runout(const gk_model *model, const gk_setup *setup, double *p
     gk_runout_follow(turn, motion);
 }
 
-/* pace (4): h, γ, matched Ω, 1 for a force linear in the step; out: flow (4), bq, bv, κ, weight of the energy, unit, lead
- * and hold of the speed, κ of a free mass */
+/* pace (3): h, γ, matched Ω; out: flow (4), bq, bv, κ, weight of the energy, unit, lead and hold of the speed, κ of a
+ * free mass */
 GK_API void probe_oscillator(const double *pace, double omega, double zeta, double *out)
 {
-    const gk_pace of = {pace[0], pace[1], pace[2], pace[3] != 0.0};
+    const gk_pace of = {pace[0], pace[1], pace[2]};
     const gk_oscillator o = gk_oscillator_of(&of, omega, zeta);
     const double all[] = {o.a11,   o.a12,        o.a21,  o.a22,  o.bq,   o.bv,
                           o.kappa, o.inverse_s2, o.unit, o.lead, o.hold, gk_oscillator_free_kappa(&of)};

@@ -51,7 +51,7 @@ class Oscillators:
     library: ctypes.CDLL
 
     def step(self, omega: float, zeta: float, gamma: float = 1.0, matched: float = MATCHED, h: float = H) -> Step:
-        pace, out = (ctypes.c_double * 4)(h, gamma, matched, 0.0), (ctypes.c_double * 12)()
+        pace, out = (ctypes.c_double * 3)(h, gamma, matched), (ctypes.c_double * 12)()
         self.library.probe_oscillator(pace, ctypes.c_double(omega), ctypes.c_double(zeta), out)
         value = [mp.mpf(x) for x in out]
         return Step(h, mp.matrix([value[:2], value[2:4]]), mp.matrix(value[4:6]), *value[6:])
