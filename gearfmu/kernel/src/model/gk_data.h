@@ -57,7 +57,6 @@ typedef struct gk_meshing { /* an engagement */
         pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;
     int32_t apart, pairs;
-    int32_t adopted, unused; /* gaps in memory are those at the end of the step: another setup made it */
     gk_memory memory[MAX_PAIRS];
 } gk_meshing;
 

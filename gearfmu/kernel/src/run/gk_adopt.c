@@ -1,8 +1,8 @@
 /* A run that goes on with another setup: the physical motion of the old state, expressed in the oscillators that are
  * dynamic now. An oscillator that was compliance had the displacement f/ω² of its modal force f, and its speed is taken
- * as zero; one that becomes compliance is left out, for the residual holds its static part. Contacts keep forces and
- * gaps; where another number of strips is in use they begin as new ones do, which disturbs as much as half a step
- * without contact. What contacts owed the energy balance is forgotten. */
+ * as zero; one that becomes compliance is left out, for the residual holds its static part. Contacts keep forces, gaps
+ * and the energy that they owe; where another number of strips is in use they begin as new ones do, which disturbs as
+ * much as half a step without contact. */
 #include "run/gk_run.h"
 #include <stddef.h>
 
@@ -23,19 +23,6 @@ static int allowed(const gk_setup *old, const gk_data *from, const gk_setup *set
            !gk_scheme_of(setup->integrator)->is_explicit && old->base.set == setup->base.set;
 }
 
-/* gaps at the end of the step instead of what the old compliance made of them */
-static void take_contacts(const passage *c, int e)
-{
-    const gk_system *s = &c->work->engaged[e].system;
-    gk_meshing *meshing = &GK_OF(c->data, meshing)[e];
-    meshing->energy_error = 0.0;
-    meshing->adopted = 1;
-    if (c->old->strips != c->setup->strips) meshing->pairs = 0;
-    for (int p = 0, i = 0; p < meshing->pairs; p++)
-        for (int strip = 0; strip < c->old->strips; strip++, i++)
-            meshing->memory[p].gap[strip] = gk_solve_end_gap(s, i);
-}
-
 /* all that does not depend on the setup; the energy balance begins anew */
 static void take_head(const passage *c)
 {
@@ -50,7 +37,8 @@ static void take_head(const passage *c)
     c->data->table_h = c->data->rk_h = 0.0;
     c->data->steps = 0;
     c->data->energy = (gk_energy){0};
-    for (int e = 0; e < c->model->engagements; e++) take_contacts(c, e);
+    for (int e = 0; e < c->model->engagements && c->old->strips != c->setup->strips; e++)
+        GK_OF(c->data, meshing)[e].pairs = 0;
 }
 
 /* rigid rotations: what the scheme adds to displacement and speed is taken off */
