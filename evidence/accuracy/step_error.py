@@ -1,19 +1,21 @@
 """Error of the time step: every level against itself at 0.625 µs, from a common state.
 
-    python evidence/step_error.py [SCENE …] [--levels fast standard] [--h 5 7.5 10 12.5 15] [--effects friction film]
+    python -m evidence.accuracy.step_error [SCENE …] [--levels fast standard] [--h 5 7.5 10] [--effects friction film]
 
 A run makes 1.2 ms with the step of the reference, then goes on with the step under test; samples at the end of every
 step over the next 8.4 ms. Error: rms of the difference over rms of the ripple, of the lines up to 10 kHz under a Hann
-window, in per cent: transmission error, mesh forces, forces of bearings and pins. A row a scene, level and step:
-scene,level,h_us,te,force,support,gamma,unsolved. Instructions of a step: evidence/step_cost.py.
+window, in per cent: transmission error, mesh forces, forces of bearings and pins. Without arguments the rows of TABLE,
+written to step_error.csv beside this file. Instructions of a step: evidence/price/step_cost.py.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -28,7 +30,7 @@ HIGHEST = 10e3  # Hz
 LEVELS = {"fast": 1.0, "standard": 2.0}
 EFFECTS = {
     "friction": {"effect.friction": 1.0},
-    "film": {"effect.squeeze_film": 1.0},
+    "film": {"effect.film": 1.0},
     "still": {"effect.gyroscopic": 0.0},
 }
 SUPPORT = re.compile(r"(bearing|pin)\.\w+\.f[xy]$")
@@ -115,34 +117,56 @@ def error(reference: np.ndarray, found: np.ndarray, h: float) -> float:
     return float(100 * np.linalg.norm(lines(found) - lines(reference)) / np.linalg.norm(lines(reference)))
 
 
-def rows(name: str, level: str, steps: list[float], effects: dict[str, float]) -> Iterator[str]:
+COLUMNS = ("scene", "level", "effect", "h_us", "te", "force", "support", "gamma", "unsolved")
+FILE = Path(__file__).with_suffix(".csv")
+TABLE = (  # scene, level, effects other than by default, steps in µs
+    ("pair", "fast", (), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", (), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", ("friction",), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", ("film",), (5.0, 10.0)),
+    ("helical", "fast", (), (5.0, 10.0)),
+    ("helical", "fast", ("friction",), (5.0, 10.0)),
+    ("train", "fast", (), (5.0, 12.5)),
+    ("set", "fast", (), (5.0, 10.0, 12.5)),
+    ("set", "fast", ("friction",), (5.0, 10.0)),
+    ("set", "fast", ("still",), (12.5,)),
+    ("set", "standard", (), (10.0, 12.5)),
+    ("helical_set", "fast", (), (5.0, 10.0)),
+)
+
+
+def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) -> Iterator[list[str]]:
+    """A row of COLUMNS a step (µs)."""
     scene = SCENES[name]
     model = scene.model()
-    parameters = {"level": LEVELS[level]} | effects
+    parameters = {"level": LEVELS[level]} | {key: value for effect in effects for key, value in EFFECTS[effect].items()}
     reference, _, _ = run(model, scene, parameters, REFERENCE)
     for h in steps:
-        found, said, unsolved = run(model, scene, parameters, h)
-        every = round(h / REFERENCE)
-        errors = [error(reference[kind][::every][: len(found[kind])], found[kind], h) for kind in found]
+        found, said, unsolved = run(model, scene, parameters, 1e-6 * h)
+        every = round(1e-6 * h / REFERENCE)
+        errors = [error(reference[kind][::every][: len(found[kind])], found[kind], 1e-6 * h) for kind in found]
         lowered = re.search(r"gamma lowered to ([\d.]+\d)", said)
-        yield ",".join(
-            [name, level, f"{1e6 * h:g}", *(f"{e:.3g}" for e in errors), lowered[1] if lowered else "1", f"{unsolved}"]
-        )
+        gamma = lowered[1] if lowered else "1"
+        yield [name, level, "+".join(effects), f"{h:g}", *(f"{e:.3g}" for e in errors), gamma, f"{unsolved}"]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=list(SCENES))
+    parser.add_argument("scenes", nargs="*", choices=[[], *SCENES])
     parser.add_argument("--levels", nargs="+", default=["fast"], choices=LEVELS)
     parser.add_argument("--h", nargs="+", type=float, default=[5.0, 7.5, 10.0, 12.5, 15.0], help="µs, of 0.625 µs")
     parser.add_argument("--effects", nargs="+", default=[], choices=EFFECTS)
     chosen = parser.parse_args()
-    effects = {key: value for name in chosen.effects for key, value in EFFECTS[name].items()}
-    print("scene,level,h_us,te,force,support,gamma,unsolved")
-    for name in chosen.scenes:
-        for level in chosen.levels:
-            for row in rows(name, level, [1e-6 * h for h in chosen.h], effects):
-                print(row, flush=True)
+    own = [(name, level, chosen.effects, chosen.h) for name in chosen.scenes for level in chosen.levels]
+    found = [list(COLUMNS)]
+    print(",".join(COLUMNS))
+    for name, level, effects, steps in own or TABLE:
+        for row in rows(name, level, effects, steps):
+            print(",".join(row), flush=True)
+            found.append(row)
+    if not own:
+        with FILE.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(found)
 
 
 if __name__ == "__main__":
