@@ -265,6 +265,15 @@ static int rubs_away(const gk_island *island, double defect)
     return 1;
 }
 
+/* Is what no scalar balances the energy that friction holds, as where it reverses under a light load? Steps to come make
+ * that good. */
+static int friction_owes(const gk_island *island, double defect)
+{
+    double rubbing = 0.0;
+    for (int m = 0; m < island->count; m++) rubbing += island->member[m]->rubs ? island->member[m]->rubbing : 0.0;
+    return fabs(defect) < 2.0 * fabs(rubbing);
+}
+
 /* a step that cannot be balanced with films goes without them */
 static int dry(const gk_island *island)
 {
@@ -321,6 +330,6 @@ void gk_balance_solve(const gk_island *island)
         own.defect = 0.0;
     }
     leave(island, &b);
-    if (open_balance(&own, steady))
+    if (open_balance(&own, steady) && !(rubs && friction_owes(island, own.defect)))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }
