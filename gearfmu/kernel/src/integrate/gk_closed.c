@@ -1,9 +1,9 @@
 /* Is a step stable where contacts stay closed? With the contacts of an island closed at a roll position, C the
  * compliance that a force of alternating sign meets, outside the paths of the dashpots all of it, in them what these
  * let move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m), and K what the oscillators take off it within the step (negative where they
- * yield at once), it is up to μ′ = 1, the largest eigenvalue of C⁻¹K: μC − K is positive for μ > μ′ (docs/theory.md, 3.5).
- * Friction cλ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide. Contacts that
- * stick follow the gaps: C less C_nt C_tt⁻¹ C_tn, and C − K likewise. */
+ * yield at once), it is up to μ′ = 1, the largest eigenvalue of C⁻¹K: μC − K is positive for μ > μ′ (docs/theory.md,
+ * 3.5). Friction cλ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide.
+ * Contacts that stick follow the gaps: C less C_nt C_tt⁻¹ C_tn, and C − K likewise. */
 #include "base/gk_dense.h"
 #include "integrate/gk_closed.h"
 #include "problem/gk_engage.h"
@@ -115,8 +115,8 @@ static int factorise_along(const gk_system *s, const double *yields, double *T)
     return gk_cholesky(T, s->contacts);
 }
 
-/* Forms the problem of engagement e where the rotors stand (work->spin), unloaded, all places near contact; 0 when there
- * is none */
+/* Forms the problem of engagement e where the rotors stand (work->spin), unloaded, all places near contact; 0 when
+ * there is none */
 static int form(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                 const gk_coefficients *k, int e)
 {

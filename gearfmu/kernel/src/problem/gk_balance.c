@@ -265,8 +265,8 @@ static int rubs_away(const gk_island *island, double defect)
     return 1;
 }
 
-/* Is what no scalar balances the energy that friction holds, as where it reverses under a light load? Steps to come make
- * that good. */
+/* Is the defect that no scalar balances of the energy that friction holds, as where it reverses under a light load? The
+ * next steps make that good. */
 static int friction_owes(const gk_island *island, double defect)
 {
     double rubbing = 0.0;

@@ -1,5 +1,5 @@
-/* Coefficients of all oscillators and spins for one internal step h and γ (gk_oscillator.c), in the type of their states,
- * and the mesh mode at which they are exact. */
+/* Coefficients of all oscillators and spins for one internal step h and γ (gk_oscillator.c), in the type of their
+ * states, and the mesh mode at which they are exact. */
 #include "problem/gk_work.h"
 #include "setup/gk_oscillator.h"
 

@@ -1,10 +1,10 @@
-/* One oscillator q̈ + 2ζωq̇ + ω²q = f in a step of length h whose force is ½(f_n + f_{n+1}) (docs/theory.md, 3.1, eq. 9).
+/* One oscillator q̈ + 2ζωq̇ + ω²q = f in a step of length h whose force is ½(f_n + f_{n+1}) (docs/theory.md, 3.1, (9)).
  * A constant force in the step, half by either end, is an impulse h f at every end of a step. The state is ρ times the
- * exact response to these impulses, at the middle of an impulse, and κ = (a static value too large by it). With
- * a = ½ωh, b = ½Ωh, the residue ρ = sinc(a + b) sinc(a − b) sinc a/(cos a sinc² b) makes the response exact at rest and
- * at Ω; ρ₀ makes it exact at rest with κ = 0, and γ < ½ goes from one to the other. Oscillators that are too fast for
- * the step yield in part at once (share θ: κ = −θ/ω²); the rest is trapezoidal, with a step of its own that makes the
- * sum exact at rest and at Ω. γ < 1 first raises θ, then makes fewer of them exponential, then weakens the correction. */
+ * exact response to these impulses, at the middle of an impulse; κ is the excess of its static value. With a = ½ωh,
+ * b = ½Ωh, the residue ρ = sinc(a + b) sinc(a − b) sinc a/(cos a sinc² b) makes the response exact at rest and at Ω; ρ₀
+ * makes it exact at rest with κ = 0, and γ < ½ goes from one to the other. Oscillators that are too fast for the step
+ * yield in part at once (share θ: κ = −θ/ω²); the rest is trapezoidal, with a step of its own that makes the sum exact
+ * at rest and at Ω. γ < 1 first raises θ, then makes fewer of them exponential, then weakens the correction. */
 #include "setup/gk_oscillator.h"
 #include "base/gk_check.h"
 #include "base/gk_lanes.h"
