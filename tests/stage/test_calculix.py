@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sections
 
 from evidence.peers.calculix import positions, rigid_bores, section, solid, sun_planet
 from gearfmu.geometry import PairGeometry
@@ -110,7 +111,7 @@ def test_meshes_are_whole_and_bore_weights_are_areas(pair: PairGeometry) -> None
     corners = plane.nodes[plane.quads[:, [0, 4, 1, 5, 2, 6, 3, 7]]]
     x, y = corners[..., 0], corners[..., 1]
     area = 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    assert area.min() > 0 and area.sum() == pytest.approx(gear.z * gear.sector_area, rel=2e-3)
+    assert area.min() > 0 and area.sum() == pytest.approx(gear.z * sections.section(gear)[0], rel=2e-3)
     edges = np.sort(np.stack([plane.quads[:, :4], np.roll(plane.quads[:, :4], -1, axis=1)], axis=-1), axis=-1)
     _, shared = np.unique(edges.reshape(-1, 2), axis=0, return_counts=True)
     assert shared.max() == 2 and (shared == 1).sum() > len(plane.bore)
