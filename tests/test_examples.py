@@ -31,6 +31,14 @@ def test_drive_with_fmpy(tmp_path: Path) -> None:
     assert 50 < te < 200
 
 
+def test_stage_in_ssp(tmp_path: Path) -> None:
+    """As the FMU alone: torque over base radius, and 24/16 of the torque at the held wheel."""
+    te, force, torque = numbers(example("stage_in_ssp.py", tmp_path, cwd=tmp_path).splitlines()[-1])
+    assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
+    assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
+    assert 50 < te < 200
+
+
 def test_loaded_te(tmp_path: Path) -> None:
     """Tip relief of 15 µm removes material: more mean transmission error at the same load."""
     plain, relieved = example("loaded_te.py", tmp_path, cwd=tmp_path).splitlines()

@@ -29,7 +29,7 @@ DASHPOT = 0.25  # root mean square: what is quasi-static moves without it; found
 DRAWN_DASHPOT = 0.5  # drawn stages but for carriers, which move quasi-statically on soft bearings; found up to 0.34
 MOMENTUM = 0.02  # root mean square: trapezoids of forces; modal damping holds bodies a little
 ENERGY = 1e-3  # of what passed through the ports, in fractions of a pitch; found up to 3e-4
-WORK, DRAWN_WORK = 1e-6, 6e-6  # of the same; found up to 3e-6 in drawn sets
+WORK, DRAWN_WORK = 1e-6, 6e-6  # of the same; found up to 3e-6 in drawn sets, 3.6e-6 in one with friction
 DEAR = [pytest.param(name, marks=pytest.mark.full) if name == "helical_set" else name for name in KINDS]
 START = 30  # steps in which friction, unknown at rest, sets in
 STEP = 2e-6  # s, of communication: short enough to differentiate outputs
@@ -164,7 +164,8 @@ def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | 
 
 
 # ---- energy ---------------------------------------------------------------------------------------------------------
-def keeps_its_energy(kind: Kind, allowed: float = WORK, **parameters: float) -> None:
+def keeps_its_energy(kind: Kind, allowed: float = WORK, **parameters: float) -> float:
+    """What friction and film took, over the energy that passed the ports."""
     model, inputs = kind.model().driven_by_springs(), loaded(kind)
     set_up = {"level": float(level_number(model, "fast"))}
     step = kind.step
@@ -180,6 +181,7 @@ def keeps_its_energy(kind: Kind, allowed: float = WORK, **parameters: float) -> 
     assert np.abs(left).max() < ENERGY * through, np.abs(left).max() / through
     known = sum(out[name] for name in out if name.endswith((".friction_loss", ".film_loss")))
     assert (np.diff(lost) > -1e-9 * through).all() and (np.diff(lost - known) > -1e-6 * through).all()
+    return float(np.max(known)) / through
 
 
 @pytest.mark.parametrize("name", DEAR)
@@ -187,9 +189,13 @@ def test_power_of_the_ports_is_what_is_stored_and_lost(name: str) -> None:
     keeps_its_energy(KINDS[name])
 
 
-@pytest.mark.parametrize("effect", ["friction", "film"])
-def test_power_of_the_ports_is_what_is_stored_and_lost_with_oil(effect: str) -> None:
-    keeps_its_energy(KINDS["helical"], **{f"effect.{effect}": 1.0})
+@pytest.mark.parametrize(("name", "effect"), [("helical", "friction"), ("helical", "film"), ("set", "friction")])
+def test_power_of_the_ports_is_what_is_stored_and_lost_with_oil(name: str, effect: str) -> None:
+    meshes = KINDS[name].stage.engagements
+    law = {f"{mesh.name}.friction_coefficient": 0.05 for mesh in meshes} if len(meshes) > 1 else {}
+    taken = keeps_its_energy(KINDS[name], DRAWN_WORK if law else WORK, **{f"effect.{effect}": 1.0, **law})
+    print(f"{name}, {effect}: {taken:.1e} of what passed the ports")
+    assert effect == "film" or 1e-3 < taken < 2e-2
 
 
 @pytest.mark.full

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_packed import unpacked
 
 from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report.moving import FRAMES, View, moving_view
-from gearfmu.report.packed import Pack, unpacked
+from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
 from gearfmu.spec.forms.expand import as_general
