@@ -61,6 +61,7 @@ def test_frequencies_of_one_sector_are_those_of_the_whole_ring() -> None:
     assert np.allclose(modes.frequency, (np.sqrt(squared) / (2 * np.pi))[: len(modes.frequency)], rtol=1e-8)
 
 
+@pytest.mark.full
 def test_static_tables_are_those_of_the_whole_ring() -> None:
     made, full = coarse(BETA), whole(BETA)
     statics = static_tables(made, [])
