@@ -265,13 +265,14 @@ static int rubs_away(const gk_island *island, double defect)
     return 1;
 }
 
-/* Is the defect that no scalar balances of the energy that friction holds, as where it reverses under a light load? The
- * next steps make that good. */
+/* Is the defect that no scalar balances what friction leaves of the energy that it holds, as where it reverses under a
+ * light load? The next steps make that good. */
 static int friction_owes(const gk_island *island, double defect)
 {
+    static const double ELSE = 0.1; /* least share of another cause that is told */
     double rubbing = 0.0;
     for (int m = 0; m < island->count; m++) rubbing += island->member[m]->rubs ? island->member[m]->rubbing : 0.0;
-    return fabs(defect) < 2.0 * fabs(rubbing);
+    return fabs(defect - rubbing) < ELSE * fabs(rubbing);
 }
 
 /* a step that cannot be balanced with films goes without them */
