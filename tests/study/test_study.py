@@ -189,7 +189,8 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
     rows = limit_rows(scene, ("fast",), (12, 6, 4, 1))
     kinds = [row.kind for row in rows]
     assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
-    assert [row.gamma_lowered for row in rows] == [False, False, True, True, True]
+    lowered = [row.gamma_lowered for row in rows]
+    assert lowered == sorted(lowered) and not lowered[0] and lowered[-1]
     assert rows[2].gamma > rows[3].gamma and rows[3].te_error > rows[0].te_error
 
 

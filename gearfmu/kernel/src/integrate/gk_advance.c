@@ -17,18 +17,19 @@
 static const gk_real STILL = 1e-15f;
 static const double GROUND_STILL = 1e-140, UNTURNED = 1e-12;
 
-/* half a step of the dashpots of the supports: speeds contract along them; what that takes */
-static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, double *v)
+/* Half a step of the dashpots of the supports: speeds contract along them to those at rest under f; what that takes */
+static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const double *f,
+                            double *v)
 {
     const int n = setup->base.n;
     double taken = 0.0;
     for (int d = 0; d < model->supports; d++) {
         const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
         const gk_span span = setup->base.damper_span[d];
-        const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_span(span, e, v) : 0.0;
-        if (speed == 0.0) continue;
-        gk_axpy_span(span, -decay * speed, pulls, v);
-        taken += k->ground.loss[d] * speed * speed;
+        if (!(k->ground.decay[d] > 0.0)) continue;
+        const double held = gk_dot_span(span, k->ground.holds + d * n, f), speed = gk_dot_span(span, e, v) - held;
+        gk_axpy_span(span, -k->ground.decay[d] * speed, pulls, v);
+        taken += speed * (k->ground.loss[d] * speed + k->ground.gain[d] * held);
     }
     return taken;
 }
@@ -80,7 +81,7 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
     const gk_ground_flow *w = &k->ground;
     double *v = work->ground_start;
     memcpy(v, x + n, (size_t)n * sizeof *v);
-    const double taken = damp_supports(model, setup, k, v);
+    const double taken = damp_supports(model, setup, k, f, v);
     gk_frame_turn(setup, k, data, 0, v);
     work->pressed = gk_frame_press(model, setup, k, data, v);
     const gk_quad *x4 = SEEN_QUADS(x), *v4 = SEEN_QUADS(v), *f4 = SEEN_QUADS(f);
@@ -211,7 +212,7 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
     const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
     data->energy.work += work->pressed + gk_frame_press(model, setup, k, data, v);
     gk_frame_turn(setup, k, data, 1, v);
-    return taken + damp_supports(model, setup, k, v);
+    return taken + damp_supports(model, setup, k, v + n, v);
 }
 
 static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,

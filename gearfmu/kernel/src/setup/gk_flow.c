@@ -87,7 +87,7 @@ static void fill_gear(const gk_setup *setup, const gk_pace *pace, gk_coefficient
 }
 
 /* what half a step leaves of the speed along every dashpot of the supports, an exact contraction of the invariant's
- * speeds (docs/theory.md, 3.4): v ← v − (s²e/n)(1 − e^(−dh/2))(e·v), n = Σ s²e², d = c n */
+ * speeds to those at rest (docs/theory.md, 3.4): v ← v − (s²e/n)(1 − e^(−dh/2)) e·(v − M f), n = Σ s²e², d = c n */
 static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
     const gk_base *base = &setup->base;
@@ -98,9 +98,12 @@ static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coeffi
         for (int i = 0; i < base->n; i++)
             if (base->omega[i] > 0.0) mass += e[i] * e[i] / f->inverse_s2[i];
         f->decay[d] = 1.0 - gk_exp(-0.5 * model->ground[base->set].damper[d] * mass * k->h);
-        f->loss[d] = mass > 0.0 ? 0.5 * f->decay[d] * (2.0 - f->decay[d]) / mass : 0.0;
-        for (int i = 0; i < base->n; i++)
+        f->gain[d] = mass > 0.0 ? f->decay[d] / mass : 0.0;
+        f->loss[d] = 0.5 * f->gain[d] * (2.0 - f->decay[d]);
+        for (int i = 0; i < base->n; i++) {
             f->pulls[d * base->n + i] = base->omega[i] > 0.0 && mass > 0.0 ? e[i] / (f->inverse_s2[i] * mass) : 0.0;
+            f->holds[d * base->n + i] = e[i] * f->hold[i];
+        }
     }
 }
 

@@ -191,6 +191,7 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     double **array[] = FLOW_ARRAYS(f);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
+    f->holds = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
     f->turns = doubles(b, turning);
     f->turned = doubles(b, turning);

@@ -177,7 +177,9 @@ typedef struct gk_ground_flow { /* the same of the ground group */
     double *pulls;          /* (supports, n) s²e/n of a dashpot */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
+    double *holds;          /* (supports, n) e times `hold` */
+    double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
+    double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
 
 typedef struct gk_coefficients {
