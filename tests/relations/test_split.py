@@ -23,7 +23,7 @@ H, INNER = 24e-6, 4e-6  # s: communication step, internal step
 BEFORE, AFTER = 12, 8  # communication steps; the load halves two steps before the cut
 WINDOWED = ("_mean", "_max", "_next", "_power", ".a")  # of a communication or internal step, not of a time
 QUICK = ("pair", "internal", "helical", "set")
-KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 2e-3  # of the family of an output
+KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 3e-3  # of the family of an output
 PROCESS = """
 import sys
 from pathlib import Path
