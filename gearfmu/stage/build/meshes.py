@@ -15,7 +15,7 @@ from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
 
 EXTERNAL, INTERNAL = 1, -1
-H_MAX = 7.5e-6  # s: largest default step
+LONGEST = {"pair": 7.5e-6, "helical": 5e-6, "several": 12.5e-6}  # s: default steps (docs/decisions/kernel.md)
 SAME_ANGLE = 1e-9  # rad
 
 
@@ -110,12 +110,20 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
             "name": stage.name,
             "rotor_names": "|".join(stage.rotors),
             "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
-            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
+            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, longest_step(stage), min(periods)]),
             "engaged": np.array(engaged, np.int32),
             "engagement": np.array(numbers),
             "direction": np.array(directions),
         }
     )
+
+
+def longest_step(stage: Stage) -> float:
+    """Longest default step (s), by its error: several engagements share what a single one hits alone, and contact lines
+    of a helical pair end and begin at tip edges all the time."""
+    if len(stage.engagements) > 1:
+        return LONGEST["several"]
+    return LONGEST["helical" if mesh_shape(stage, stage.engagements[0]).gears[0].beta_b else "pair"]
 
 
 def _frame_section(stage: Stage) -> dict[str, Any]:
