@@ -90,7 +90,7 @@ def test_a_drawn_stage_at_rest_is_held_by_its_supports_and_ports(seed: int) -> N
 
 # ---- ports ----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("h", [2.5e-6, 10e-6, *(pytest.param(h, marks=pytest.mark.full) for h in (1.25e-6, 5e-6))])
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", DEAR)
 def test_the_speed_of_a_port_is_the_rate_of_its_angle(name: str, h: float) -> None:
     """A port that is given its torque, sampled every step: what its speed sums up to is how far it turns, although the
     bore's oscillators keep speeds of their own kind."""
