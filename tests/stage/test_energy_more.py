@@ -38,8 +38,8 @@ def changes_of_h(free: FreePair, steps: tuple[float, float], h: float = 7.5e-6) 
 
 
 def test_changes_of_h_cost_little(pair_free: FreePair) -> None:
-    """Communication steps of 50 and 60 µs in turn, 900 changes: rounding without them. Speeds stay, so that the energy of
-    the step goes up and down by what it is apart from that of the motion: 2.2e-2 measured, at half of h 2.8e-3."""
+    """Communication steps of 50 and 60 µs in turn, 900 changes: rounding without them. Speeds stay, so that the energy
+    of the step goes up and down by what it is apart from that of the motion: 2.2e-2 measured, at half of h 2.8e-3."""
     assert changes_of_h(pair_free, (50e-6, 50e-6)) < 1e-5
     coarse, fine = (changes_of_h(pair_free, (50e-6, 60e-6), h) for h in (7.5e-6, 3.75e-6))
     assert coarse < 4e-2 and fine < 0.3 * coarse

@@ -174,10 +174,10 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *unit, *lead, *hold;
-    double *pulls;          /* (supports, n) s²e/n of a dashpot */
-    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
-    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double *holds;          /* (supports, n) e times `hold` */
+    double *pulls;              /* (supports, n) s²e/n of a dashpot */
+    double *turns, *turned;     /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;           /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
+    double *holds;              /* (supports, n) e times `hold` */
     double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
     double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
