@@ -122,7 +122,7 @@ struct gk_model {
     gk_blob blob;
     const char *name;
     const char *guid; /* of an FMU with this model */
-    int starts; /* parameters whose start is not the table's */
+    int starts;       /* parameters whose start is not the table's */
     const int32_t *start_reference;
     const double *start_value;
     int slices, rotors, gears, engagements, ports, supports, functions, rolls, sets, chains;
