@@ -101,7 +101,7 @@ def test_lines_integrate_and_stay_outside() -> None:
 
 
 def test_a_measured_table_is_read_as_it_comes(tmp_path: Path) -> None:
-    """As measuring programs write: names in capitals, units in parentheses or below, other channels, a running clock."""
+    """As measuring programs write: names in capitals, units in parentheses or below, a running clock."""
     plain = read_profile(written(tmp_path, "time_[s],torque_[N*m],speed_[rpm]\n0,1,600\n0.5,2,900\n"))
     for text in (
         "Time (s);Torque (N*m);Oil (degC);Speed (1/min)\n12,5;1;80,5;600\n13;2;81;900\n",
