@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -199,12 +199,12 @@ def torque_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
     return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}
 
 
-def start_speeds(scene: SceneSpec, stage: Stage, input_port: str) -> dict[str, float]:
-    """Speed (rad/s) of every torque port at the start: that of the input, and what is geared to it by its teeth; others
-    begin at rest."""
+def start_speeds(scene: SceneSpec, stage: Stage, input_port: str, loaded: Collection[str] = ()) -> dict[str, float]:
+    """Speed (rad/s) of every torque port, those `loaded` among them, at the start: that of the input, and what is
+    geared to it by its teeth; others begin at rest."""
     turning = turns(stage, input_port)
     return {
         name: scene.start.pinion_speed * float(turning.get(stage.rotor_of(port.body), 0))
         for name, port in stage.ports.items()
-        if port.kind == "torque"
+        if port.kind == "torque" or name in loaded
     }
