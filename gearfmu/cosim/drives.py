@@ -15,6 +15,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.turning import Shafts, require_driven, shafts_of, with_ports
 from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.scenes.parts import Drivetrain
 from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 from gearfmu.spec.tables.ports import PortSpec
 
@@ -26,7 +27,7 @@ def drive_of(scene: SceneSpec, stage: Stage) -> Drive:
     if scene.shaft_loads is not None:
         return _loads(scene, stage, shafts, scene.shaft_loads)
     if scene.drivetrain is not None:
-        return _parts(scene, stage)
+        return _parts(scene, stage, scene.drivetrain)
     require_driven(stage, (shafts.input, shafts.output), "a scene")
     if scene.passenger_car is not None:
         return car_drive(scene, scene.passenger_car, shafts)
@@ -62,22 +63,20 @@ def _loads(scene: SceneSpec, stage: Stage, shafts: Shafts, loads: dict[str, Shaf
     def start() -> dict[str, float]:
         return {f"{name}.w_start": speed for name, speed in start_speeds(scene, stage, shafts.input, loads).items()}
 
-    return Drive(torque_ports(scene, stage), loads, start, frequencies=_frequencies(loads))
+    return Drive(torque_ports(scene.name, loads, stage), loads, start, frequencies=_frequencies(loads))
 
 
-def _parts(scene: SceneSpec, stage: Stage) -> Drive:
+def _parts(scene: SceneSpec, stage: Stage, parts: Drivetrain) -> Drive:
     """A drivetrain of the scene's own parts."""
-    parts = scene.drivetrain
-    assert parts is not None
 
     def start() -> dict[str, float]:
-        speeds = start_speeds_of(scene, stage)
+        speeds = start_speeds_of(scene, parts, stage)
         free = [name for name, port in stage.ports.items() if port.kind == "torque" and name not in parts.ports]
         return {f"{name}.w_start": speeds.get(f"stage.{stage.rotor_of(stage.ports[name].body)}", 0.0) for name in free}
 
     return Drive(
-        part_ports(scene, stage),
-        lambda rest: part_network(parts, start_of(scene, stage, rest)),
+        part_ports(scene.name, parts, stage),
+        lambda rest: part_network(parts, start_of(scene, parts, stage, rest)),
         start,
         watched=tuple(parts.clutches),
         frequencies=_frequencies(parts.torques),

@@ -12,21 +12,19 @@ from gearfmu.cosim.start import Start
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import undriven
-from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scenes.parts import GROUND, Drivetrain
 from gearfmu.spec.tables.ports import PortSpec
 
 
-def part_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
+def part_ports(file: str, parts: Drivetrain, stage: Stage) -> dict[str, PortSpec]:
     """The stage's ports that parts hang on, as spring ports. SpecError with every one that the stage does not have,
     every shaft without stiffness or damping, and every spring port of the stage that nothing hangs on."""
-    assert scene.drivetrain is not None
-    problems = list(_port_problems(scene.name, scene.drivetrain, stage))
-    problems += undriven(stage, scene.drivetrain.ports, "nothing drives it: write [drivetrain.ports.{name}]")
+    problems = list(_port_problems(file, parts, stage))
+    problems += undriven(stage, parts.ports, "nothing drives it: write [drivetrain.ports.{name}]")
     if problems:
         raise SpecError(problems)
     found = {}
-    for name, shaft in scene.drivetrain.ports.items():
+    for name, shaft in parts.ports.items():
         own = stage.ports[name]
         k, c = (a if a is not None else b for a, b in ((shaft.stiffness, own.k), (shaft.damping, own.c)))
         found[name] = PortSpec(kind="spring", k=k, c=c)

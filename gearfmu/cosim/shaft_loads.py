@@ -185,18 +185,15 @@ class TorqueMaster:
         return np.array([getattr(law, what)(*when, w) for law, w in laws])
 
 
-def torque_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
+def torque_ports(file: str, loads: Collection[str], stage: Stage) -> dict[str, PortSpec]:
     """The stage's loaded ports as torque ports. SpecError with every load of a port that the stage does not have, and
     every spring port that nothing would drive."""
-    assert scene.shaft_loads is not None
     remedy = f"the stage has no such port; it has {', '.join(stage.ports)}"
-    problems = [
-        Problem(scene.name, f"shaft_loads.{name}", "", remedy) for name in scene.shaft_loads if name not in stage.ports
-    ]
-    problems += undriven(stage, scene.shaft_loads, "nothing drives it: write [shaft_loads.{name}]")
+    problems = [Problem(file, f"shaft_loads.{name}", "", remedy) for name in loads if name not in stage.ports]
+    problems += undriven(stage, loads, "nothing drives it: write [shaft_loads.{name}]")
     if problems:
         raise SpecError(problems)
-    return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}
+    return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in loads}
 
 
 def start_speeds(scene: SceneSpec, stage: Stage, input_port: str, loaded: Collection[str] = ()) -> dict[str, float]:

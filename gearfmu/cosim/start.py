@@ -54,12 +54,10 @@ class _Joints:
         return [*self.meshes, *self.ports.values(), *self.shafts.values()]
 
 
-def start_of(scene: SceneSpec, stage: Stage, rest: Rest) -> Start:
+def start_of(scene: SceneSpec, parts: Drivetrain, stage: Stage, rest: Rest) -> Start:
     """The start of a scene's own parts. rest: angles (rad) of the ports' bores under torques (N·m) on them, by port.
     SpecError: `start_speeds_of`."""
-    parts = scene.drivetrain
-    assert parts is not None
-    joints, speed = _joints(parts, stage), start_speeds_of(scene, stage)
+    joints, speed = _joints(parts, stage), start_speeds_of(scene, parts, stage)
     torque = _torques(parts, joints, speed)
     on_ports = {name: torque[name] for name in parts.ports}
     loaded = any(abs(value) > SMALL for value in on_ports.values())
@@ -68,12 +66,10 @@ def start_of(scene: SceneSpec, stage: Stage, rest: Rest) -> Start:
     return Start({name: speed[name] for name in parts.inertias}, angle, ground, on_ports)
 
 
-def start_speeds_of(scene: SceneSpec, stage: Stage) -> dict[str, float]:
+def start_speeds_of(scene: SceneSpec, parts: Drivetrain, stage: Stage) -> dict[str, float]:
     """Speeds (rad/s) of inertias, and of the stage's rotors as `stage.<name>`, from the input's speed and the given
     ones through shafts and meshes. SpecError with every inertia whose speed nothing decides, or where given speeds
     contradict each other."""
-    parts = scene.drivetrain
-    assert parts is not None
     given: dict[str, float] = {_rotor(stage, next(iter(stage.ports))): scene.start.pinion_speed}
     given |= {name: part.speed for name, part in parts.inertias.items() if part.speed is not None}
     equations = [(_exact(row), Fraction(0)) for row in _joints(parts, stage).rows]
