@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from gearfmu import fmu
-from gearfmu.cosim.drives import drive_of
 from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.masters import Wiring, master
+from gearfmu.cosim.masters import Cut, master
 from gearfmu.cosim.ports import KEYS
+from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.recorder import DRIVE, Recorder
-from gearfmu.cosim.scene_run import stage_model
+from gearfmu.cosim.scene_run import drive_of, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import load_scene
 
@@ -90,9 +90,9 @@ def measure(source: Source, recorded: str) -> dict[str, object]:
     drive = drive_of(scene, source.model.stage)
     stage = source.unit({"level": "rigid", "slices": 1} | drive.start())
     timed = Clocked(stage)
-    cut = drive.cut(timed, lambda torques: {}, None, Wiring())
-    chosen = master("gs_mean", cut)
-    recorder = Recorder(timed, cut.drive, RECORDED[recorded], STEPS, drive.silent)
+    unit = PyUnit(drive.partner(lambda torques: {}))
+    chosen = master("gs_mean", Cut(timed, unit, tuple(drive.ports), drive.signals))
+    recorder = Recorder(timed, unit, RECORDED[recorded], STEPS, drive.silent)
     chosen.begin(0.0)
     whole, inside, outside = run(chosen, recorder, timed)
     empty = loop(empty_call(stage))

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.network import Network
-from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads
 from gearfmu.cosim.signals import Signal
-from gearfmu.cosim.start import Rest
-from gearfmu.cosim.units import Unit
+from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 from gearfmu.spec.tables.ports import PortSpec
 
 Loads = Mapping[str, ShaftLoad]
+Rest = Callable[[Mapping[str, float]], Mapping[str, float]]  # torques (N·m) on ports → bores (rad) at rest
+
+
+def frequencies_of(loads: Loads) -> tuple[float, ...]:
+    """Hz, of the alternating torques among `loads`."""
+    return tuple(load.alternating.frequency for load in loads.values() if load.alternating is not None)
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class Drive:
     torque ports of these names; it is given the function that finds the stage's angles at rest. start : start values
     of the stage's parameters, SI; SpecError where they cannot be found. signals : inputs of the stage that are known
     beforehand. silent : patterns of stage outputs without meaning. watched : names of clutches outside the stage, which
-    split a run into parts. frequencies : Hz, of alternating torques.
+    split a run into parts. frequencies : Hz, of alternating torques. with_shafts : the scene with the stiffness and
+    damping of other ports, where its start follows from them; None where it does not.
     """
 
     ports: Mapping[str, PortSpec]
@@ -37,11 +40,4 @@ class Drive:
     silent: tuple[str, ...] = ()
     watched: tuple[str, ...] = ()
     frequencies: tuple[float, ...] = ()
-
-    def cut(self, stage: Unit, rest: Rest, micro_step: float | None, wiring: Wiring) -> Cut | Loaded:
-        """The stage joined with it. micro_step: s, of the network; None: the communication step."""
-        if callable(self.partner):
-            unit = PyUnit(self.partner(rest), micro_step)
-            return Cut(stage, unit, tuple(self.ports), self.signals, wiring)
-        speeds = {name.removesuffix(".w_start"): speed for name, speed in self.start().items()}
-        return Loaded(stage, ShaftLoads(self.partner), speeds)
+    with_shafts: Callable[[Mapping[str, PortSpec]], SceneSpec] | None = None

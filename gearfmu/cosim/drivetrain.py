@@ -7,7 +7,7 @@ are those of the output shaft: of a single pair, negative while the pinion turns
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
@@ -53,7 +53,14 @@ def rig_drive(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Drive:
         shafts.input: PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping),
         shafts.output: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
     }
-    return Drive(ports, lambda rest: _rig(scene, rig, shafts))
+
+    def with_shafts(own: Mapping[str, PortSpec]) -> SceneSpec:
+        ends = {"pinion_shaft": own[shafts.input], "wheel_shaft": own[shafts.output]}
+        numbers = {f"{end}_stiffness": port.k for end, port in ends.items()}
+        numbers |= {f"{end}_damping": port.c for end, port in ends.items()}
+        return scene.model_copy(update={"test_rig": rig.model_copy(update=numbers)})
+
+    return Drive(ports, lambda rest: _rig(scene, rig, shafts), with_shafts=with_shafts)
 
 
 def _clutch_chain(car: PassengerCar) -> PortSpec:

@@ -6,12 +6,13 @@ scene's, the run takes the FMU's, at its start too, and says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from gearfmu.cosim.drives import in_drivetrain, with_shafts
+from gearfmu.cosim.drive import Drive
 from gearfmu.errors import Problem, SpecError
 from gearfmu.fmu.opened import OpenedFmu
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
@@ -41,18 +42,22 @@ def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
     return scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": opened.model.name})})
 
 
-def fitted(scene: SceneSpec, opened: OpenedFmu) -> tuple[SceneSpec, tuple[str, ...]]:
-    """The scene with the FMU's shafts, and in words what is other there than the scene says. SpecError with every port
-    that does not fit, and every gear that the scene records and the FMU does not show."""
+def fitted(
+    scene: SceneSpec, opened: OpenedFmu, drive_of: Callable[[SceneSpec, Stage], Drive]
+) -> tuple[SceneSpec, tuple[str, ...]]:
+    """The scene with the FMU's shafts, and in words what is other there than the scene says. drive_of : of
+    `scene_run`. SpecError with every port that does not fit, and every gear that the scene records and the FMU does not
+    show."""
     export = f"export it with `gearfmu export {opened.model.name} --scene SCENE`"
     problems = list(_recording(scene, opened, export))
     own: Mapping[str, PortSpec] = opened.model.spec.ports
     try:
-        wanted: Mapping[str, PortSpec] = in_drivetrain(scene, opened.model.spec).ports
+        drive = drive_of(scene, opened.model.stage)
     except SpecError as error:
         remedy = f"stage {opened.model.name} does not fit scene {scene.name}: choose another scene or FMU"
         ports = Problem(str(opened.path), "ports", ", ".join(own), remedy)
         raise SpecError([ports, *error.problems, *problems]) from error
+    wanted = {**own, **drive.ports}
     problems += [found for name in own for found in _misfits(scene, opened, name, wanted[name], export)]
     if problems:
         raise SpecError(problems)
@@ -60,7 +65,7 @@ def fitted(scene: SceneSpec, opened: OpenedFmu) -> tuple[SceneSpec, tuple[str, .
     if not remarks:
         return scene, ()
     head = f"{opened.path} keeps its own shafts, which are not those of scene {scene.name} ({export})"
-    return with_shafts(scene, opened.model.shafts, own), (f"{head}: {'; '.join(remarks)}",)
+    return drive.with_shafts(own) if drive.with_shafts else scene, (f"{head}: {'; '.join(remarks)}",)
 
 
 def _usual(scene: SceneSpec) -> Any:

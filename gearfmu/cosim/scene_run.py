@@ -15,18 +15,24 @@ from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drive import Drive
-from gearfmu.cosim.drives import drive_of, in_drivetrain
+from gearfmu.cosim.drivetrain import car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Wiring
-from gearfmu.cosim.shaft_loads import Loaded
+from gearfmu.cosim.parts import parts_drive
+from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
 from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.turning import require_driven, shafts_of, with_ports
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -69,7 +75,7 @@ class Staged:
         file that is no FMU of ours, SpecError with everything that does not fit the scene."""
         opened = read_fmu(path)
         scene = of_scene(scene, opened, spec)
-        scene, remarks = fitted(scene, opened)
+        scene, remarks = fitted(scene, opened, drive_of)
         return cls(scene, opened.model, opened.path, remarks)
 
 
@@ -136,6 +142,27 @@ def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
     return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
+def drive_of(scene: SceneSpec, stage: Stage) -> Drive:
+    """The drive of a scene on this stage: the only place that asks which table it has. SpecError where it leaves a
+    spring port alone, or has something for a port that the stage does not have."""
+    shafts = shafts_of(stage)
+    if scene.shaft_loads is not None:
+        return loads_drive(scene, scene.shaft_loads, stage, shafts.input)
+    if scene.drivetrain is not None:
+        return parts_drive(scene, scene.drivetrain, stage)
+    require_driven(stage, (shafts.input, shafts.output), "a scene")
+    if scene.passenger_car is not None:
+        return car_drive(scene, scene.passenger_car, shafts)
+    assert scene.test_rig is not None, "a scene has one of the four"
+    return rig_drive(scene, scene.test_rig, shafts)
+
+
+def in_drivetrain(scene: SceneSpec, spec: Form) -> Form:
+    """The stage with the ports that the scene's drive needs. SpecError: `drive_of`."""
+    changed: Form = with_ports(spec, dict(drive_of(scene, as_general(spec)).ports))
+    return changed
+
+
 @contextmanager
 def stage_source(staged: Staged, unit: str, out_dir: str | Path | None) -> Iterator[Source]:
     """Where the stage of a run comes from. unit: "kernel", or "fmu": the one that was given, else exported into out_dir
@@ -195,7 +222,13 @@ def _coupled(
     """The cut and how it is stepped. of: the stage and its model; how: progress, wiring, frames."""
     (stage, model), (progress, wiring, frames), coupling = of, how, scene.coupling
     parameters = _parameters(scene, drive)
-    cut = drive.cut(stage, lambda torques: _rest(model, parameters, torques), coupling.micro_step or None, wiring)
+    cut: Cut | Loaded
+    if callable(drive.partner):
+        network = drive.partner(lambda torques: _rest(model, parameters, torques))
+        cut = Cut(stage, PyUnit(network, coupling.micro_step or None), tuple(drive.ports), drive.signals, wiring)
+    else:
+        speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
+        cut = Loaded(stage, ShaftLoads(drive.partner), speeds)
     return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, drive.silent, frames)
 
 

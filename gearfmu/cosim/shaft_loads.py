@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.cosim.drive import Drive, Loads, frequencies_of
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import CouplingError, Problem, SpecError
@@ -183,6 +184,15 @@ class TorqueMaster:
     def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
         laws = zip(self.cut.drive.laws.values(), speeds.tolist(), strict=True)
         return np.array([getattr(law, what)(*when, w) for law, w in laws])
+
+
+def loads_drive(scene: SceneSpec, loads: Loads, stage: Stage, input_port: str) -> Drive:
+    """Torques as functions of time and speed on a stage. SpecError: `torque_ports`."""
+
+    def start() -> dict[str, float]:
+        return {f"{name}.w_start": speed for name, speed in start_speeds(scene, stage, input_port, loads).items()}
+
+    return Drive(torque_ports(scene.name, loads, stage), loads, start, frequencies=frequencies_of(loads))
 
 
 def torque_ports(file: str, loads: Collection[str], stage: Stage) -> dict[str, PortSpec]:

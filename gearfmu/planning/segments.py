@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.cosim.drives import drive_of
-from gearfmu.cosim.scene_run import coupled_run
+from gearfmu.cosim.scene_run import coupled_run, drive_of
 from gearfmu.cosim.source import Source
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Window, pilot_choice

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from gearfmu.cosim.drives import drive_of
+from gearfmu.cosim.scene_run import drive_of
 from gearfmu.errors import GearfmuError
 from gearfmu.modes.linear import linearised
 from gearfmu.planning.choice import Choice

@@ -18,9 +18,8 @@ import numpy as np
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Result
-from gearfmu.cosim.drives import in_drivetrain
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
-from gearfmu.cosim.scene_run import run_once
+from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.kernel import Kernel
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage

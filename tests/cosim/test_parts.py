@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from gearfmu.cosim.network import Driven
-from gearfmu.cosim.parts import part_network, part_ports
+from gearfmu.cosim.parts import Rest, Start, part_network, part_ports, start_of, start_speeds_of
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.start import Rest, Start, start_of, start_speeds_of
 from gearfmu.errors import SpecError
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from analytic_stage import Plant
 
-from gearfmu.cosim.drives import drive_of
 from gearfmu.cosim.network import Clutch, Inertia, Network, Spring
 from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.scene_run import drive_of
 from gearfmu.cosim.signals import Ramp
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import load_scene

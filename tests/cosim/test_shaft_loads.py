@@ -12,9 +12,8 @@ from scipy.linalg import expm
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Plan, Result, run_coupled
-from gearfmu.cosim.drives import in_drivetrain
 from gearfmu.cosim.masters import master
-from gearfmu.cosim.scene_run import run_once
+from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.source import Source
 from gearfmu.cosim.units import Variable

@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 
 from gearfmu.body import load_bodies
-from gearfmu.cosim.drives import in_drivetrain
+from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.errors import GearfmuError
 from gearfmu.hdf5 import seal
 from gearfmu.scenes import __file__ as scenes
