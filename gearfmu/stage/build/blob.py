@@ -10,7 +10,6 @@ import hashlib
 import json
 import struct
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -74,13 +73,13 @@ def blob_hash(blob: bytes) -> str:
     return blob[8:HASHED_FROM].hex()
 
 
-def with_guid(sections: Sections) -> dict[str, Any]:
+def with_guid(sections: Sections) -> dict[str, np.ndarray | str]:
     """The sections with the GUID that follows from "made_of", the kinds of the ports and the starts."""
     parts = [np.asarray(sections.get(name, ())).tolist() for name in OF_FMU]
     return {**sections, "guid": origin(sections["made_of"], *parts)} if "made_of" in sections else dict(sections)
 
 
-def origin(*what: Any) -> str:
+def origin(*what: object) -> str:
     """SHA-256 (64 hex digits) of tables of text, integers and floats, which a model was made from: the same on every
     machine, where the model's own numbers differ by the rounding of its linear algebra."""
     return hashlib.sha256(json.dumps(what, allow_nan=False).encode()).hexdigest()

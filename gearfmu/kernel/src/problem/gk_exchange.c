@@ -176,8 +176,8 @@ static void yield_halves(const pushes *p, half_rows rows, const gk_flow *flow, i
     for (int k = 0; k < 2; k++) out[first + k] = mobility[first + k] * sum_x[k] - kappa[first + k] * sum_y[k];
 }
 
-/* Adds to `sum` how far forces of contacts, x in the step and y at once, displace the gear group of a side, in its axes.
- * x NULL: there are none in the step, and only what yields moves. */
+/* Adds to `sum` how far forces of contacts, x in the step and y at once, displace the gear group of a side, in its
+ * axes. x NULL: there are none in the step, and only what yields moves. */
 void gk_exchange_displace(const gk_rows *rows, int which, const gk_flow *flow, const double *x, const double *y,
                           gk_real *sum)
 {

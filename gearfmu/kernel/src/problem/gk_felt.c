@@ -1,6 +1,6 @@
-/* Gears whose flanks feel the ground group by patterns (setup/gk_patterns.c), as planets do their carrier: in a step with
- * tables a row is its gradient by rigid motion, ports and shares of the patterns. Forces are summed by patterns; what
- * they move is read by the same numbers. Gears that meet feel each other once a round. */
+/* Gears whose flanks feel the ground group by patterns (setup/gk_patterns.c), as planets do their carrier: in a step
+ * with tables a row is its gradient by rigid motion, ports and shares of the patterns. Forces are summed by patterns;
+ * what they move is read by the same numbers. Gears that meet feel each other once a round. */
 #include "problem/gk_felt.h"
 #include "problem/gk_rows.h"
 

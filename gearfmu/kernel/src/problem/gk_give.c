@@ -1,5 +1,5 @@
-/* What engagements of an island do to each other: forces go to spins, ground group, bores and modes of shared gears, and
- * each engagement reads what all others have displaced: the sum less what is its own. */
+/* What engagements of an island do to each other: forces go to spins, ground group, bores and modes of shared gears,
+ * and each engagement reads what all others have displaced: the sum less what is its own. */
 #include "problem/gk_give.h"
 #include "problem/gk_exchange.h"
 #include "problem/gk_felt.h"

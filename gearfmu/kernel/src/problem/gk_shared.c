@@ -42,7 +42,7 @@ static void add_block(const gk_shared *s, int second, const double *block, const
     }
 }
 
-/* Adds what the forces of the other engagements do to the contacts of this one; forces of joints are 0 in the blocks. */
+/* Adds what forces of other engagements do to the contacts of this one; forces of joints are 0 in the blocks. */
 void gk_shared_read(const gk_setup *setup, const gk_work *work, int e, double *read)
 {
     for (int p = 0; p < work->shareds; p++) {

@@ -1,8 +1,8 @@
 /* Flanks of a gear that reads many ground oscillators, as a planet those of its carrier, feel them in few patterns: the
  * rows of its tables are combinations of far fewer than there are oscillators. They are found by Gram and Schmidt, the
- * row that is told worst first, each oscillator weighed by what it yields in a short step. The rows of the tables become
- * those combinations to the last bit, so that whoever reads them has the same model. Rigid motion and the angles of
- * ports are patterns of their own, in front. */
+ * row that is told worst first, each oscillator weighed by what it yields in a short step. The rows of the tables
+ * become those combinations to the last bit, so that whoever reads them has the same model. Rigid motion and the angles
+ * of ports are patterns of their own, in front. */
 #include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 
@@ -12,7 +12,7 @@ enum { WORTH = 2 * MOST_PATTERNS }; /* least oscillators of a gear */
 
 static int same(gk_span a, int from, int width) { return a.from == from && a.width == width; }
 
-/* has the gear engagements whose rows on its oscillators are its own, and does it meet other gears on all or on none? */
+/* has the gear engagements whose rows on its oscillators are its own, and meets it other gears on all or on none? */
 static int suits(const gk_model *model, const gk_setup *setup, int g)
 {
     const gk_base *base = &setup->base;
