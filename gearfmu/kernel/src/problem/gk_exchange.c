@@ -206,34 +206,34 @@ typedef struct quad_rows { /* on the ground group; width: of a row */
     int width;
 } quad_rows;
 
-/* adds Σ rows·x, and with out_y Σ rows·y, over `quads` of the ground group from `first` on */
-GK_INLINE void push_quads(const pushes *p, quad_rows rows, int first, gk_quad *out_x, gk_quad *out_y, const int quads)
+/* adds Σ rows·x, and where `both` Σ rows·y, over `quads` of the ground group from `first` on */
+GK_INLINE void push_quads(const pushes *p, quad_rows rows, int first, gk_quad *out_x, gk_quad *out_y, const int quads,
+                          const int both)
 {
-    gk_quad sum_x[4], sum_y[4] = {{0}};
-    for (int k = 0; k < quads; k++) sum_x[k] = out_x[k];
-    for (int k = 0; k < quads && out_y; k++) sum_y[k] = out_y[k];
+    gk_quad sum_x[4], sum_y[4];
+    for (int k = 0; k < quads; k++) sum_x[k] = out_x[first + k];
+    for (int k = 0; both && k < quads; k++) sum_y[k] = out_y[first + k];
     for (int r = 0; r < p->count; r++) {
         const gk_quad *row = rows.at + (size_t)p->row[r] * rows.width + first;
         const double x = p->x[r], y = p->y[r];
-        for (int k = 0; k < quads; k++) {
-            sum_x[k] += x * row[k];
-            if (out_y) sum_y[k] += y * row[k];
-        }
+        for (int k = 0; k < quads; k++) sum_x[k] += x * row[k];
+        for (int k = 0; both && k < quads; k++) sum_y[k] += y * row[k];
     }
-    for (int k = 0; k < quads; k++) out_x[k] = sum_x[k];
-    for (int k = 0; k < quads && out_y; k++) out_y[k] = sum_y[k];
+    for (int k = 0; k < quads; k++) out_x[first + k] = sum_x[k];
+    for (int k = 0; both && k < quads; k++) out_y[first + k] = sum_y[k];
 }
 
-/* adds the forces x, and with out_y y, of rows to those on the ground group: of either side */
-GK_INLINE void ground_forces(const gk_rows *of, const pushes *p, double *const out_x[2], double *const out_y[2])
+/* adds the forces x, and where `both` y, of rows to those on the ground group: of either side */
+GK_INLINE void ground_forces(const gk_rows *of, const pushes *p, double *const out_x[2], double *const out_y[2],
+                             const int both)
 {
     const quad_rows rows = {(const gk_quad *)of->ground, of->engaged->local / 4};
     for (int w = 0, first = 0; w < 2; w++) {
-        gk_quad *x = (gk_quad *)out_x[w] - first, *y = out_y ? (gk_quad *)out_y[w] - first : NULL;
+        gk_quad *x = (gk_quad *)out_x[w] - first, *y = (gk_quad *)out_y[w] - first;
         const int end = first + of->engaged->wide[w] / 4;
-        for (; first + 3 <= end; first += 3) push_quads(p, rows, first, x + first, y ? y + first : NULL, 3);
-        for (; first + 2 <= end; first += 2) push_quads(p, rows, first, x + first, y ? y + first : NULL, 2);
-        for (; first < end; first++) push_quads(p, rows, first, x + first, y ? y + first : NULL, 1);
+        for (; first + 3 <= end; first += 3) push_quads(p, rows, first, x, y, 3, both);
+        for (; first + 2 <= end; first += 2) push_quads(p, rows, first, x, y, 2, both);
+        for (; first < end; first++) push_quads(p, rows, first, x, y, 1, both);
     }
 }
 
@@ -244,7 +244,7 @@ void gk_exchange_push_once(const gk_rows *rows, const double *x, double *out)
     double *const to[2] = {out, out + rows->engaged->wide[0]};
     pushes p;
     list_pushes(x, x, rows->count, &p);
-    if (rows->engaged->local && p.count) ground_forces(rows, &p, to, NULL);
+    if (rows->engaged->local && p.count) ground_forces(rows, &p, to, to, 0);
 }
 
 /* adds the forces x and y of rows to those on the engagement's own part of the ground group */
@@ -255,7 +255,7 @@ void gk_exchange_push_local(const gk_rows *rows, const double *x, const double *
     double *const to_x[2] = {out_x, out_x + first}, *const to_y[2] = {out_y, out_y + first};
     pushes p;
     list_pushes(x, y, rows->count, &p);
-    if (rows->engaged->local && p.count) ground_forces(rows, &p, to_x, to_y);
+    if (rows->engaged->local && p.count) ground_forces(rows, &p, to_x, to_y, 1);
 }
 
 /* adds the forces x and y of rows to those on ground group and gear groups */
@@ -271,7 +271,7 @@ static void scatter(const gk_rows *rows, const double *x, const double *y)
         to_z[w] = patterns ? work->pushed_z[g] : work->ground_force + from;
         to_next[w] = patterns ? work->pushed_next[g] : work->ground_next + from;
     }
-    if (mesh->local) ground_forces(rows, &p, to_z, to_next);
+    if (mesh->local) ground_forces(rows, &p, to_z, to_next, 1);
     while (p.count && p.row[p.count - 1] >= rows->engaged->system.contacts) p.count--;
     for (int w = 0; w < 2; w++) {
         const int g = mesh->side[w].gear;
@@ -290,11 +290,12 @@ void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *
         const size_t size = (size_t)GK_LANES(setup, g) * sizeof(gk_real);
         memset(work->force[g], 0, size);
         memset(work->next[g], 0, size);
+        if (!setup->base.patterns[g]) continue;
+        memset(work->pushed_z[g], 0, sizeof work->pushed_z[g]);
+        memset(work->pushed_next[g], 0, sizeof work->pushed_next[g]);
     }
     memset(work->ground_force, 0, width);
     memset(work->ground_next, 0, width);
-    memset(work->pushed_z, 0, sizeof work->pushed_z);
-    memset(work->pushed_next, 0, sizeof work->pushed_next);
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
         const gk_rows gaps = gk_rows_of_gaps(setup, work, e);
