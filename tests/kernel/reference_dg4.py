@@ -147,19 +147,21 @@ def _last(flags: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Dashpots:
-    """Where each dashpot stands, (m,) int: acts 0 or 1 · clip: η_d linear 0, at its limit ±(λ₀ + λ₁) ±1 · hold: f_d
-    linear 0, at its limit ±λ₁ ±1. And what follows: η_d = by λ₁ + fixed, f_d = late_by λ₁ + late_fixed."""
+    """Where each dashpot stands, (m,) int: acts 0 or 1 · clip: η_d linear 0, at its limit ±part (λ₀ + λ₁) ±1 · hold: f_d
+    linear 0, at its limit ±λ₁ ±1 · part (m,): what that limit is. And what follows: η_d = by λ₁ + fixed, f_d = late_by λ₁ + late_fixed."""
 
     acts: np.ndarray
     clip: np.ndarray
     hold: np.ndarray
+    part: np.ndarray
     by: np.ndarray
     fixed: np.ndarray
     late_by: np.ndarray
     late_fixed: np.ndarray
 
     def stand_as(self, other: Dashpots) -> bool:
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in ("acts", "clip", "hold"))
+        stands = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in ("acts", "clip", "hold"))
+        return stands and np.allclose(self.clip * self.part, other.clip * other.part, rtol=0.0, atol=1e-12)
 
 
 @dataclass(frozen=True)
@@ -260,25 +262,40 @@ class Reference:
         between them."""
         was = (state.force > 0) | self.problem.bilateral
         nowhere = np.zeros(len(gap), int)
-        dashpots = self._dashpots(state, was.astype(int), nowhere, nowhere)
+        dashpots = self._dashpots(state, was.astype(int), nowhere, nowhere, np.ones(len(gap)))
         for i in range(200):
             lagged = (1 + slow) * self.d + self.d @ dashpots.by + self.a @ dashpots.late_by
             shifted = gap + self.d @ (dashpots.fixed - slow * state.force) + self.a @ dashpots.late_fixed
             force, active = solve_lcp(lagged + self.c, shifted, self.problem.bilateral, start)
-            found = self._stand(state, force, was | active)
+            left = np.maximum(0.0, shifted + (lagged + self.c) @ force)
+            found = self._stand(state, force, was | active, left)
             if found.stand_as(dashpots):
                 return Solved(force, active, dashpots, shifted, lagged)
             dashpots, start = self._towards(state, dashpots, found, last=i > ROUNDS), active
         raise AssertionError("where the dashpots stand was not found")
 
-    def _stand(self, state: State, force: np.ndarray, closed: np.ndarray) -> Dashpots:
-        """The dashpots as λ₁ and `closed` (m,), contacts closed at either end, place them. η_d at most doubles or
-        cancels λ₀ + λ₁, f_d at most doubles or cancels λ₁: a contact lets go without force."""
-        acts = (closed & (self.problem.dashpot > 0)).astype(int)
-        linear = self._dashpots(state, acts, 0 * acts, 0 * acts)
-        clip = self._beyond(linear.by @ force + linear.fixed, state.force + force)
-        clipped = self._dashpots(state, acts, clip, 0 * acts)
-        return self._dashpots(state, acts, clip, self._beyond(clipped.late_by @ force + clipped.late_fixed, force))
+    def _touching(self, state: State, force: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """(m,): part of the step in which a contact touches that is open at one end of it; left (m,): distance at the
+        end. Even motion: its own deflection at the closed end, over that and the distance at the open one."""
+        own = np.diag(self.c) * (state.force + force)
+        apart = np.where(state.force > 0, left, state.gap)
+        return np.where(own > 0, own / np.where(own > 0, own + apart, 1.0), 1.0)
+
+    def _stand(self, state: State, force: np.ndarray, closed: np.ndarray, left: np.ndarray) -> Dashpots:
+        """The dashpots as λ₁ and `closed` (m,), contacts closed at either end, place them; left (m,): distance at the
+        end. η_d at most doubles or cancels λ₀ + λ₁, f_d at most doubles or cancels λ₁: a contact lets go without force.
+        The dashpot of a contact that closes or opens, by even motion, is at its limit until that exceeds c·speed."""
+        acts, sums = (closed & (self.problem.dashpot > 0)).astype(int), state.force + force
+        one = np.ones_like(force)
+        linear = self._dashpots(state, acts, 0 * acts, 0 * acts, one)
+        free = linear.by @ force + linear.fixed
+        passes = (acts > 0) & ~self.problem.bilateral & ((state.force > 0) != (force > 0)) & (sums > 0)
+        share, most = np.abs(free) / np.where(passes, sums, 1.0), self._touching(state, force, left)
+        part = np.where(passes, np.where(share < 2 * most, share * (1 - share / (4 * most)), most), 1.0)
+        clip = np.where(passes, np.where(free < 0, -1, 1), self._beyond(free, sums))
+        clipped = self._dashpots(state, acts, clip, 0 * acts, part)
+        late = clipped.late_by @ force + clipped.late_fixed
+        return self._dashpots(state, acts, clip, self._beyond(late, force), part)
 
     def _towards(self, state: State, old: Dashpots, new: Dashpots, last: bool) -> Dashpots:
         """From one limit to the other by way of what lies between; where `last`, only the last that moves."""
@@ -286,24 +303,26 @@ class Reference:
         moved = _last(moved) if last else moved
         pairs = ((old.acts, new.acts), (old.clip, new.clip), (old.hold, new.hold))
         nearer = [(here, np.where(here * there == -1, 0, there)) for here, there in pairs]
-        return self._dashpots(state, *(np.where(moved, there, here) for here, there in nearer))
+        return self._dashpots(state, *(np.where(moved, there, here) for here, there in nearer), new.part)
 
     def _beyond(self, wished: np.ndarray, limit: np.ndarray) -> np.ndarray:
         """(m,): the sign of what is beyond ± limit, else 0. Bilateral rows have no limit."""
         return np.where((np.abs(wished) > limit) & ~self.problem.bilateral, np.sign(wished), 0).astype(int)
 
-    def _dashpots(self, state: State, acts: np.ndarray, clip: np.ndarray, hold: np.ndarray) -> Dashpots:
+    def _dashpots(
+        self, state: State, acts: np.ndarray, clip: np.ndarray, hold: np.ndarray, part: np.ndarray
+    ) -> Dashpots:
         """η_d = (2c/h) Δ(path λ) and f_d with a memory where the last step had one too (10a), or their limits."""
         p, one = self.problem, np.eye(len(acts))
         rate = (2 * acts * p.dashpot / self.scheme.h)[:, None] * p.path
-        by = np.where(clip[:, None] == 0, rate, clip[:, None] * one)
-        fixed = np.where(clip == 0, -rate @ state.force, clip * state.force)
+        by = np.where(clip[:, None] == 0, rate, (clip * part)[:, None] * one)
+        fixed = np.where(clip == 0, -rate @ state.force, clip * part * state.force)
         acted = (state.dash != 0.0) & ((state.force > 0) | p.bilateral)
         beta = np.where(acted, 0.25 * (3 + MEMORY), 0.5)
         tail = np.where(acted, -0.25 * (1 - MEMORY) * state.dash - MEMORY * state.late, 0.0)
         late_by = np.where(hold[:, None] == 0, beta[:, None] * by, hold[:, None] * one)
         late_fixed = np.where((hold == 0) & (acts > 0), beta * fixed + tail, 0.0)
-        return Dashpots(acts, clip, hold, by, fixed, late_by, late_fixed)
+        return Dashpots(acts, clip, hold, part, by, fixed, late_by, late_fixed)
 
     def _conserve(self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray) -> tuple[Solved, np.ndarray]:
         """The solution and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""

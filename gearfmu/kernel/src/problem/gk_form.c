@@ -73,6 +73,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     s->stride = (s->n + 3) / 4 * 4;
     for (int i = s->n; i < s->n + 4 && i < MAX_STRIDE; i++)
         s->g[i] = s->force0[i] = s->damper0[i] = s->end0[i] = s->damping[i] = s->width[i] = s->per_width[i] = 0.0;
+    for (int i = 0; i < s->stride; i++) s->part[i] = 1.0;
     gk_clear(s->jump, s->stride / 4);
 }
 

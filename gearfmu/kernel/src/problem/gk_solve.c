@@ -3,7 +3,7 @@
  *   closed contact, bilateral row, sticking clutch:  gap + deflection = 0;   open contact: λ = 0 and gap + deflection ≥
  * 0;   slipping clutch: z = ±bound gap = g + D z + lag,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction +
  * η_d dashpot of a row closed at either end: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to
- * |λ0 + λ1| (no pull)
+ * |λ0 + λ1| (no pull), of a contact that closes or opens to what it may do while it touches
  *
  * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last
  * one (block principal pivoting, Júdice & Pires 1994). */
@@ -12,8 +12,10 @@
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40, DASHPOT_ROUNDS = 8 };
 #ifdef GK_DOUBLE_MODES
 static const double SOLVED = 1e-11;
+static const double PART_KNOWN = 1e-12; /* of λ0 + λ1: damper of a contact that closes or opens */
 #else
-static const double SOLVED = 1e-7; /* of the last move: what is left after it is some hundredths of that */
+static const double SOLVED = 1e-7;     /* of the last move: what is left after it is some hundredths of that */
+static const double PART_KNOWN = 1e-3; /* of λ0 + λ1: damper of a contact that closes or opens */
 #endif
 
 static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
@@ -74,7 +76,8 @@ void gk_solve_status(gk_system *s)
         const gk_bits clips = {clip[0], clip[1], clip[2], clip[3]}, holds = {hold[0], hold[1], hold[2], hold[3]};
         const gk_bits acts = clips != 2, lasts = acts & (holds == 0), linear = clips == 0;
         const gk_quad gain = GK_CHOOSE(linear, ((gk_quad *)s->damping)[q], GK_ALL(0.0));
-        const gk_quad pull = GK_CHOOSE(acts, __builtin_convertvector(clips, gk_quad), GK_ALL(0.0));
+        const gk_quad pull = GK_CHOOSE(acts, __builtin_convertvector(clips, gk_quad) * ((gk_quad *)s->part)[q],
+                                       GK_ALL(0.0));
         const gk_quad rest = GK_CHOOSE(lasts, ((gk_quad *)s->tail)[q], GK_ALL(0.0));
         ((gk_quad *)s->on)[q] = (gk_quad){active[0], active[1], active[2], active[3]};
         ((gk_quad *)s->gain)[q] = gain;
@@ -250,6 +253,24 @@ static int beyond(double x, double limit) { return x > limit ? 1 : x < -limit ? 
 /* from one limit to the other by way of what lies between */
 static signed char towards(int old, int new) { return (signed char)(old * new == -1 ? 0 : new); }
 
+/* The part of the step in which a contact touches that is open at one end of it, by even motion: its own deflection
+ * when closed, over that and the distance when open. The scalar of the step's energy gives its mean force that part. */
+static double touching(const gk_system *s, int i)
+{
+    const int closed = s->active[i];
+    const double own = closed ? gk_solve_own(s, i) : s->apart[i];
+    const double left = closed ? s->apart[i] : gk_max(0.0, gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i));
+    return own > 0.0 ? own / (own + left) : 1.0;
+}
+
+/* |η_d| of such a contact per λ0 + λ1. By even motion its damper is at its limit, the force, until that has grown to
+ * c·speed: free − free²/(4 most), at most `most`. */
+static double passing(const gk_system *s, int i, double free)
+{
+    const double most = touching(s, i), share = fabs(free) / (s->force0[i] + s->force[i]);
+    return share < 2.0 * most ? share * (1.0 - 0.25 * share / most) : most;
+}
+
 /* Where the dashpots of contacts that are closed at either end stand: they never pull, so η_d is limited by ±(λ0 + λ1)
  * and f_d by ±λ1; a contact lets go without force */
 static int limit_dashpots(gk_system *s)
@@ -257,14 +278,18 @@ static int limit_dashpots(gk_system *s)
     int changed = 0;
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2, hold = 0;
+        double part = 1.0;
         if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
             const double free = s->damping[i] * (s->approach[i] - s->approach0[i]), limit = s->force0[i] + s->force[i];
-            clip = towards(s->clip[i], beyond(free, limit));
-            hold = s->active[i] ? towards(s->hold[i],
-                                          beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i]))
-                                : 1;
+            const int passes = !(s->active[i] && s->force0[i] > 0.0) && limit > 0.0;
+            if (passes) part = passing(s, i, free);
+            clip = passes ? (free < 0.0 ? -1 : 1) : towards(s->clip[i], beyond(free, limit));
+            const double mean = gk_clamp(free, -part * limit, part * limit);
+            hold = s->active[i] ? towards(s->hold[i], beyond(s->beta[i] * mean + s->tail[i], s->force[i])) : 1;
+            changed |= fabs(part - s->part[i]) > PART_KNOWN;
         }
         changed |= clip != s->clip[i] || hold != s->hold[i];
+        s->part[i] = part;
         s->clip[i] = clip;
         s->hold[i] = hold;
     }
