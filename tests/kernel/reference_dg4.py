@@ -276,8 +276,10 @@ class Reference:
 
     def _touching(self, state: State, force: np.ndarray, left: np.ndarray) -> np.ndarray:
         """(m,): part of the step in which a contact touches that is open at one end of it; left (m,): distance at the
-        end. Even motion: its own deflection at the closed end, over that and the distance at the open one."""
-        own = np.diag(self.c) * (state.force + force)
+        end. Even motion: what it deflects when closed, by those that close or open with it, over that and the distance
+        when open."""
+        closes, opens = (state.force == 0) & (force > 0), (state.force > 0) & (force == 0)
+        own = np.where(opens, self.c @ (opens * state.force), self.c @ (closes * force))
         apart = np.where(state.force > 0, left, state.gap)
         return np.where(own > 0, own / np.where(own > 0, own + apart, 1.0), 1.0)
 

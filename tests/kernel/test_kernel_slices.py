@@ -139,8 +139,9 @@ def test_slices_step_by_step(
     two, block = bodies(zeta), replace(BLOCK, slices=slices, damping=damping)
     got = kernel_run(two, block, integrator, double_library)
     expected = reference_forces(reference_problem(two, block), two, gamma)
-    np.testing.assert_allclose(got[:, 0], expected[:, 0], rtol=0, atol=1e-11 * expected[:, 0].max())  # measured: 6e-15
-    np.testing.assert_allclose(got[:, 1], expected[:, 1], rtol=1e-11)
+    close = 1e-9 if damping else 1e-11  # a contact that closes: its damper and α in turns; measured: 1.3e-10, 6e-15
+    np.testing.assert_allclose(got[:, 0], expected[:, 0], rtol=0, atol=close * expected[:, 0].max())
+    np.testing.assert_allclose(got[:, 1], expected[:, 1], rtol=close)
     loss = np.diff(got[:, 2])
     growth = {0.0: 1e-12, 2e3: 1e-4, 1e4: 2e-4}[damping]  # dashpots balance to second order; measured: 5.5e-5, 1.1e-4
     assert loss.min() >= -growth * got[0, 1]

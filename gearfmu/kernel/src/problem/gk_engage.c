@@ -108,7 +108,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         s->recalled[i] = memory >= 0;
         s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
                               : s->g0[i] + GK_OF(data, meshing)[e].memory[memory].gap[i % GK_STRIPS(s)];
-        s->apart[i] = s->force0[i] > 0.0 ? gk_solve_own(s, i) : gk_max(0.0, s->g0[i] + gk_solve_quasi_static(s, i));
+        s->apart[i] = s->g0[i] + gk_solve_quasi_static(s, i);
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }

@@ -9,11 +9,13 @@
  * one (block principal pivoting, Júdice & Pires 1994). */
 #include "problem/gk_system.h"
 
-enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40, DASHPOT_ROUNDS = 8 };
+enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40 };
 #ifdef GK_DOUBLE_MODES
+enum { DASHPOT_ROUNDS = 24 };
 static const double SOLVED = 1e-11;
 static const double PART_KNOWN = 1e-12; /* of λ0 + λ1: damper of a contact that closes or opens */
 #else
+enum { DASHPOT_ROUNDS = 8 };
 static const double SOLVED = 1e-7;     /* of the last move: what is left after it is some hundredths of that */
 static const double PART_KNOWN = 1e-3; /* of λ0 + λ1: damper of a contact that closes or opens */
 #endif
@@ -253,14 +255,30 @@ static int beyond(double x, double limit) { return x > limit ? 1 : x < -limit ? 
 /* from one limit to the other by way of what lies between */
 static signed char towards(int old, int new) { return (signed char)(old * new == -1 ? 0 : new); }
 
-/* The part of the step in which a contact touches that is open at one end of it, by even motion: its own deflection
- * when closed, over that and the distance when open. The scalar of the step's energy gives its mean force that part. */
+/* does a contact close (1) or open (−1) in the step? */
+static int passes(const gk_system *s, int i) { return (s->active[i] != 0) - (s->force0[i] > 0.0); }
+
+/* what a contact deflects, when closed, by those that close or open with it */
+static double deflected_by_these(const gk_system *s, int i)
+{
+    const int way = passes(s, i);
+    const double *force = way > 0 ? s->force : s->force0;
+    double sum = way > 0 ? s->delta[i] : s->approach0[i];
+    for (int j = 0; j < s->contacts; j++) {
+        const int at = j * s->stride + i;
+        if (way < 0) sum -= s->P[at] * force[j];
+        if (passes(s, j) == way) sum += (s->A[at] + s->P[at]) * force[j];
+    }
+    return sum;
+}
+
+/* The part of the step in which such a contact touches, by even motion: its deflection when closed, over that and the
+ * distance when open. The scalar of the step's energy gives its mean force that part. */
 static double touching(const gk_system *s, int i)
 {
-    const int closed = s->active[i];
-    const double own = closed ? gk_solve_own(s, i) : s->apart[i];
-    const double left = closed ? s->apart[i] : gk_max(0.0, gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i));
-    return own > 0.0 ? own / (own + left) : 1.0;
+    const double own = deflected_by_these(s, i),
+                 left = passes(s, i) > 0 ? s->apart[i] : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+    return own > 0.0 ? own / (own + gk_max(0.0, left)) : 1.0;
 }
 
 /* |η_d| of such a contact per λ0 + λ1. By even motion its damper is at its limit, the force, until that has grown to
@@ -281,9 +299,9 @@ static int limit_dashpots(gk_system *s)
         double part = 1.0;
         if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
             const double free = s->damping[i] * (s->approach[i] - s->approach0[i]), limit = s->force0[i] + s->force[i];
-            const int passes = !(s->active[i] && s->force0[i] > 0.0) && limit > 0.0;
-            if (passes) part = passing(s, i, free);
-            clip = passes ? (free < 0.0 ? -1 : 1) : towards(s->clip[i], beyond(free, limit));
+            const int turns = passes(s, i) && limit > 0.0;
+            if (turns) part = passing(s, i, free);
+            clip = turns ? (free < 0.0 ? -1 : 1) : towards(s->clip[i], beyond(free, limit));
             const double mean = gk_clamp(free, -part * limit, part * limit);
             hold = s->active[i] ? towards(s->hold[i], beyond(s->beta[i] * mean + s->tail[i], s->force[i])) : 1;
             changed |= fabs(part - s->part[i]) > PART_KNOWN;

@@ -52,7 +52,7 @@ typedef struct gk_system {
                                                    the end: 0 linear, ±1 at its limit ±λ1 */
     double beta[MAX_STRIDE],
         tail[MAX_STRIDE];     /* of a damper that acts: f_d = β η_d + what the last step leaves of it */
-    double apart[MAX_STRIDE]; /* at the start of the step: distance left of an open contact, else its own deflection */
+    double apart[MAX_STRIDE]; /* distance left at the start of the step */
     double part[MAX_STRIDE];  /* of λ0 + λ1 that η_d is where it is limited: 1 where a contact is closed at both ends */
     double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
         held[MAX_STRIDE];    /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
@@ -193,13 +193,6 @@ static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
     return s->Al[i] + s->approach[i] + s->beyond[i];
-}
-/* what a contact deflects by its own force */
-static inline double gk_solve_own(const gk_system *s, int i)
-{
-    GK_ASSERT(gk_is_row(s, i));
-    const int at = i * s->stride + i;
-    return (s->A[at] + s->P[at]) * s->force[i] + s->delta[i];
 }
 /* gk_tangent.c */
 GK_HOT void gk_tangent_factorise(gk_system *s);
