@@ -147,8 +147,9 @@ def _last(flags: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Dashpots:
-    """Where each dashpot stands, (m,) int: acts 0 or 1 · clip: η_d linear 0, at its limit ±part (λ₀ + λ₁) ±1 · hold: f_d
-    linear 0, at its limit ±λ₁ ±1 · part (m,): what that limit is. And what follows: η_d = by λ₁ + fixed, f_d = late_by λ₁ + late_fixed."""
+    """Where each dashpot stands, (m,) int: acts 0 or 1 · clip: η_d linear 0, at its limit ±part (λ₀ + λ₁) ±1 · hold:
+    f_d linear 0, at its limit ±λ₁ ±1 · part (m,): what that limit is. And what follows: η_d = by λ₁ + fixed, f_d =
+    late_by λ₁ + late_fixed."""
 
     acts: np.ndarray
     clip: np.ndarray
