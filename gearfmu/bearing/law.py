@@ -11,6 +11,7 @@ clearance s_r,
 
     ρ = A cos α − ½ s_r + x c + y s,    ζ = A sin α + z + R (θx s − θy c),    δ = (√(ρ² + ζ²) − A)₊,    u = ⅖ c_P δ^5/2
 
+with ζ₊ for ζ in an angular contact bearing, which has a shoulder on one side only.
 Rollers: `rollers.py`. The mean over positions of the cage is a potential too: `Rolling.spread`.
 """
 
@@ -112,6 +113,8 @@ class Balls:
         along = np.stack([null, null, null + 1, self.radius * s, -self.radius * c], axis=1)
         rho = self.distance * math.cos(self.contact_angle) - self.clearance / 2 + across @ d
         zeta = self.distance * math.sin(self.contact_angle) + push + along @ d
+        if self.contact_angle > 0.0:  # no shoulder on the other side
+            along, zeta = np.where(zeta[:, None] > 0.0, along, 0.0), np.maximum(zeta, 0.0)
         length = np.hypot(rho, zeta)
         delta = np.maximum(length - self.distance, 0.0)
         slope = (rho[:, None] * across + zeta[:, None] * along) / length[:, None]
