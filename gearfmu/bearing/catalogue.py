@@ -3,7 +3,7 @@
 Deep groove: D_w = 0.3 (D − d), D_pw = ½ (d + D), and as many balls as fill 186° of the circle when the bearing is put
 together (Conrad assembly). Angular contact and cylindrical roller bearings are filled through a shoulder and hold more.
 On four common deep groove bearings the number of balls is exact, stiffness within 1 %, tilting stiffness within 5 %
-(docs/theory.md, 12).
+(docs/theory.md, 10).
 """
 
 from __future__ import annotations
