@@ -86,6 +86,14 @@ static void section_of(const gk_posed *q, const gk_tooth_flanks *f, const double
     }
 }
 
+/* what tilts of both gears may close of a gap */
+static double tilting(const gk_posed *q)
+{
+    double angle = 0.0;
+    for (int c = RXA; c <= RYA; c++) angle += fabs(q->pose[c]) + fabs(q->pose[SPACE + c]) + fabs(q->e->tilt[c - RXA]);
+    return q->e->width * angle;
+}
+
 /* Every strip by itself, by its part that carries; 0 when none comes within `search_distance`. Strips of spur teeth
  * with the same deviations have one section. */
 static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance,
@@ -103,6 +111,7 @@ static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2]
         take_deviations(q, place, i, f);
         if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
             section_of(q, f, roll, &part, &plane, &t);
+        if (!i && spur && plane.gap - q->mesh->protrusion - tilting(q) > search_distance) return 0;
         *p = plane, depth[0] = f->depth[0], depth[1] = f->depth[1];
         lean(q, s->sg, &t, part.middle, p);
         if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, part.middle, p);

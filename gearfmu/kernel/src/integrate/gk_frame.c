@@ -19,10 +19,14 @@ static void turn_pair(const gk_setup *setup, const gk_ground_flow *f, double hal
     const double *x = f->turns + 2 * i * n, *y = x + n, *to_x = f->turned + 2 * i * n, *to_y = to_x + n;
     const gk_span span = setup->base.turn_span[i];
     const double a = half * f->products[3 * i], b = half * f->products[3 * i + 1], c = half * f->products[3 * i + 2];
-    const double p = gk_dot_span(span, x, v), q = gk_dot_span(span, y, v);
+    const int from = span.from / 4, to = from + span.width / 4;
+    gk_quad px = {0}, py = {0}, *speed = (gk_quad *)v;
+    for (int k = from; k < to; k++) px += ((const gk_quad *)x)[k] * speed[k], py += ((const gk_quad *)y)[k] * speed[k];
+    const double p = (px[0] + px[2]) + (px[1] + px[3]), q = (py[0] + py[2]) + (py[1] + py[3]);
     const double scale = 2.0 * half / (1.0 + a * b - c * c);
-    gk_axpy_span(span, -scale * ((1.0 - c) * p + a * q), to_y, v);
-    gk_axpy_span(span, scale * ((1.0 + c) * q - b * p), to_x, v);
+    const double by_y = -scale * ((1.0 - c) * p + a * q), by_x = scale * ((1.0 + c) * q - b * p);
+    for (int k = from; k < to; k++)
+        speed[k] = (speed[k] + by_y * ((const gk_quad *)to_y)[k]) + by_x * ((const gk_quad *)to_x)[k];
 }
 
 /* half a step of all pairs on the speeds of the ground group; back: in the other order */

@@ -44,7 +44,7 @@ static int press(gk_equilibrium *r)
             if (!gk_engage(r->model, &r->setup, work, r->data, &how, e)) return 0;
             gk_memory_recall(&r->setup, work, r->data, e, &work->engaged[e].system);
         }
-    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0};
+    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0, 0, 0};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
     return 1;
@@ -178,7 +178,7 @@ static void set_compliance(gk_equilibrium *r)
     r->k.timeless = 0;
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &r->setup.modal[g];
-        r->k.flow[g].yields = m->pairs;
+        r->k.flow[g].yields = r->k.flow[g].softest = m->pairs;
         for (int i = 0; i < m->n; i++)
             r->k.flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
         for (int i = 0; i < r->soft[g]; i++) r->k.flow[g].kappa[r->lane[g][i]] = 0;

@@ -104,7 +104,7 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
                             const gk_coefficients *k)
 {
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, k, i, 0, 0, 1.0};
+        gk_coupled coupled = {model, setup, work, k, i, 0, 0, GK_FIRST_RATE, 0, 0};
         const gk_island island = gk_couple_island(&coupled);
         if (island.count > 1) gk_couple_recall(&coupled);
         gk_balance_solve(&island);
@@ -136,8 +136,8 @@ static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_wor
     express(model, setup, work, data, k);
     const double damped = gk_advance_predict(model, setup, work, data, k);
     if (!passable(model, work, data)) return GK_DIVERGED;
-    work->by_patterns = work->table_h > 0.0 && h == work->table_h && gamma == work->table_gamma;
-    if (work->by_patterns) gk_felt_see(model, setup, work);
+    work->by_tables = work->table_h > 0.0 && h == work->table_h && gamma == work->table_gamma;
+    if (work->by_tables) gk_felt_see(model, setup, work);
     GK_LAP(work, PHASE_PREDICT);
     const gk_search how = {.k = k};
     for (int e = 0; e < model->engagements; e++) {
@@ -168,6 +168,6 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
                         double gamma)
 {
     const gk_outcome outcome = step_once(model, setup, work, data, h, gamma);
-    work->by_patterns = 0;
+    work->by_tables = 0;
     return outcome;
 }

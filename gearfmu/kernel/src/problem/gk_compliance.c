@@ -205,15 +205,16 @@ static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
         s->P[i * s->stride + i] = setup->joint[s->port_of[i]][s->joint_of[i]].compliance;
 }
 
-/* D, A and P of the contacts and of the joints' residual; from the tables of the step, or for any step from the rows */
-void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables)
+/* D, A and P of the contacts and of the joints' residual; from the tables of the step, or for any step from the rows;
+ * or what is not dynamic of them alone */
+void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, gk_compliance_of what)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
     GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
     gk_engaged *engaged = &work->engaged[e];
-    between_contacts(setup, engaged, e, tables);
+    between_contacts(setup, engaged, e, what == BY_TABLES);
     take_paths(setup, engaged, e); /* entry by entry: long before quads of the same rows are read again */
-    for (int w = 0; w < 2 && !tables; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);
+    for (int w = 0; w < 2 && what == BY_ROWS; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);
     if (GK_ON(setup, residual)) joint_residual(setup, engaged, e);
 }
 

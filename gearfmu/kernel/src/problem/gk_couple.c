@@ -1,52 +1,69 @@
-/* Engagements of one island (gk_islands.c). Each has a problem of its own, solved with the others' forces as they are.
- * Their effect on its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and
- * scattered, never through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at
- * γ = 1: three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
-#include "problem/gk_give.h"
-#include "problem/gk_felt.h"
-#include "problem/gk_shared.h"
+/* Engagements of one island (gk_islands.c). Each has a problem of its own, solved with what the others do as it is: all
+ * at once, then a pass over the rows of the island tells what their new forces do (gk_pass.c). Block Jacobi: in M = D +
+ * C′ a rigid coordinate enters with h²/12 at γ = 1, so that a pass leaves some thousandths of the error. Where a step
+ * is so long that they hold each other more than themselves, they take turns, with a pass after each (Gauss–Seidel).
+ * An engagement's own matrices may be of some steps ago: rows read what forces really do, its own included, and what
+ * its matrices know of that it does not take twice. */
+#include "problem/gk_pass.h"
+#include "problem/gk_far.h"
 
-enum { SWEEPS = 40, SETTLED = 20 }; /* from then on dashpots stand: they may go on limiting each other in turns */
+/* SETTLED: from then on dashpots stand: they may go on limiting each other. TURNS: passes that tell whether one after
+ * the other is better. */
+enum { PASSES = 40, SETTLED = 20, TURNS = 6 };
+static const double SLOW = 0.4; /* rate of change from which they take turns */
 #ifdef GK_DOUBLE_MODES
-static const double TOLERANCE = 1e-11;
+static const double TOLERANCE = 1e-11, AT_REST_TOLERANCE = 1e-11, FRICTION_TOLERANCE = 1e-11;
 #else
-static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
+static const double TOLERANCE = 3e-7;          /* of the largest gap and deflection */
+static const double AT_REST_TOLERANCE = 2e-8;  /* of statics */
+static const double FRICTION_TOLERANCE = 1e-7; /* of the largest normal force */
 #endif
+static const double SOON = 1e-4;        /* from here on the next pass may be the last, and reads what stores energy */
 static const double NEGLIGIBLE = 1e-12; /* m, rad: of a gap and deflection that are none */
 
-/* Takes all that the others do; returns how much that has changed, against the largest gap and deflection: of contacts
- * where there are any, else of joints. A joint's gap may be the angle of a port, which grows as it turns. */
+/* Takes what a pass has read, less what the engagement's own matrices say. Returns how much that has changed, against
+ * the largest gap and deflection: of contacts where there are any, else of joints. A joint's gap may be the angle of a
+ * port, which grows as it turns. */
 static double take_whole(const gk_coupled *c, int e)
 {
-    gk_system *s = &c->work->engaged[e].system;
+    gk_engaged *engaged = &c->work->engaged[e];
+    gk_system *s = &engaged->system;
     const int judged = s->contacts ? s->contacts : s->n;
-    double read[MAX_STRIDE], change = 0.0, scale = NEGLIGIBLE;
-    gk_take(c, e, 0, read);
+    double own[MAX_STRIDE] = {0}, along[MAX_STRIDE], change = 0.0, scale = NEGLIGIBLE;
+    const int rubs = GK_ON(c->setup, friction);
+    if (rubs) {
+        gk_solve_times(s, engaged->glide->D, s->z, own);
+        gk_glide_own(engaged->glide, s, &engaged->forces, own, along);
+        for (int i = 0; i < s->contacts; i++) engaged->glide->others[i] = engaged->glide->moved_along[i] - along[i];
+    }
     for (int i = 0; i < s->n; i++) {
+        const double others = engaged->moved[WHOLE][i] - ((rubs ? own[i] : s->Dz[i]) + s->lag[i] + s->Al[i]);
         if (i < judged) {
-            change = gk_max(change, fabs(read[i] - s->outer[i] - s->beyond[i]));
+            change = gk_max(change, fabs(others - s->outer[i] - s->beyond[i]));
             scale = gk_max(scale, fabs(s->Dz[i]) + fabs(s->Al[i]) + (s->contacts ? fabs(s->g[i]) : 0.0));
         }
-        s->outer[i] = read[i] - s->beyond[i];
+        s->outer[i] = others - s->beyond[i];
     }
     return change / scale;
 }
 
 /* tells the deflection at once from the rest of what was taken */
-static void part_at_once(const gk_coupled *c, gk_effect of)
+static void part_at_once(gk_engaged *engaged)
 {
-    gk_give_all(c, of);
-    for (int e = 0; e < c->model->engagements; e++) {
-        gk_system *s = &c->work->engaged[e].system;
-        double read[MAX_STRIDE];
-        if (!gk_is_within(c, e)) continue;
-        gk_take(c, e, 1, read);
-        for (int i = 0; i < s->n; i++) {
-            const double beyond = s->kind[i] == ROW_CLUTCH ? 0.0 : read[i];
-            s->outer[i] += s->beyond[i] - beyond;
-            s->beyond[i] = beyond;
-        }
+    gk_system *s = &engaged->system;
+    double own[MAX_STRIDE];
+    gk_solve_times(s, s->A, engaged->forces.of[AT_ONCE], own);
+    for (int i = 0; i < s->n; i++) {
+        const double beyond = s->kind[i] == ROW_CLUTCH ? 0.0 : engaged->moved[YIELDED][i] - own[i];
+        s->outer[i] += s->beyond[i] - beyond;
+        s->beyond[i] = beyond;
     }
+}
+
+static void part_all(const gk_coupled *c)
+{
+    for (int e = 0; e < c->model->engagements; e++)
+        if (gk_is_within(c, e)) part_at_once(&c->work->engaged[e]);
 }
 
 /* contacts and friction of an engagement once; returns how much friction has changed. Where it is at its limits is
@@ -72,7 +89,7 @@ static int hardly_rubs(const gk_coupled *c)
         if (GK_ON(c->setup, friction)) moved = gk_max(moved, c->work->engaged[e].glide->moved);
         for (int i = 0; i < s->contacts; i++) largest = gk_max(largest, fabs(s->force[i]));
     }
-    return moved < TOLERANCE * largest;
+    return moved < FRICTION_TOLERANCE * largest;
 }
 
 /* an engagement that is alone: normal forces and friction in turns */
@@ -81,35 +98,60 @@ static void rub(const gk_island *island)
     gk_coupled *c = island->context;
     const int e = (int)c->alone;
     double change = INFINITY;
-    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) change = solve_own(c, e, round);
+    for (int round = 0; round < PASSES && !(change < FRICTION_TOLERANCE); round++) change = solve_own(c, e, round);
     island->member[0]->dashpots_stand = 0;
-    if (!(change < TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
+    if (!(change < FRICTION_TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
 }
 
-/* sweeps until what engagements do to each other no longer changes */
+static void read_all(gk_coupled *c, int at_once)
+{
+    gk_pass_forces(c, PRESENT);
+    gk_pass(c, 1, at_once);
+    if (at_once) part_all(c);
+}
+
+/* Solves all engagements, each with the others as they were, or one after the other. Returns how much friction has
+ * changed; gaps: how much what they take of each other has. */
+static double solve_each(gk_coupled *c, int round, int in_turn, double *gaps)
+{
+    double change = 0.0;
+    *gaps = 0.0;
+    for (int e = 0; e < c->model->engagements; e++) {
+        if (!gk_is_within(c, e)) continue;
+        if (in_turn) read_all(c, 0);
+        *gaps = gk_max(*gaps, take_whole(c, e));
+        change = gk_max(change, solve_own(c, e, round));
+    }
+    return change;
+}
+
+/* passes until what engagements do to each other no longer changes; the last move is too small for another */
 static void sweep(const gk_island *island)
 {
     gk_coupled *c = island->context;
+    const int first = !c->known; /* what they do to each other is not known yet: its change says nothing */
+    const double enough = c->sweeps ? AT_REST_TOLERANCE : TOLERANCE;
     double change = INFINITY, next = INFINITY, gaps = INFINITY;
-    gk_give_all(c, WHOLE);
-    for (int round = 0; round < (c->sweeps ? c->sweeps : SWEEPS) && !(next < TOLERANCE); round++) {
+    int parted = 0, in_turn = 0;
+    for (int round = 0; round < (c->sweeps ? c->sweeps : PASSES) && !(next < enough); round++) {
         const double last = change;
-        change = gaps = 0.0;
-        for (int e = 0; e < c->model->engagements; e++) {
-            if (!gk_is_within(c, e)) continue;
-            gaps = gk_max(gaps, take_whole(c, e));
-            if (GK_ON(c->setup, friction)) gk_take_along(c, e, c->work->engaged[e].glide->others);
-            change = gk_max(change, solve_own(c, e, round));
-            gk_give(c, e, WHOLE);
-        }
-        if (c->work->by_patterns) gk_felt_others(c, 0);
+        parted = !in_turn && (next < SOON || (!first && !round));
+        if (!c->read && !in_turn) read_all(c, parted);
+        c->read = 0;
+        change = gk_max(solve_each(c, round, in_turn, &gaps), 0.0);
         change = gk_max(change, gaps);
-        if (round) c->rate = gk_min(1.0, change / last);
-        next = change * c->rate; /* what another sweep would find */
+        if (round > first) c->rate = gk_clamp(change / last, 1e-3, 1.0);
+        next = round || !first ? change * c->rate : INFINITY; /* what another pass would find */
+        in_turn |= round >= TURNS && c->rate > SLOW;
     }
+    c->known = 1;
     for (int m = 0; m < island->count; m++) island->member[m]->dashpots_stand = 0;
-    part_at_once(c, AT_ONCE);
-    if (!(next < TOLERANCE) && !(gaps < TOLERANCE && hardly_rubs(c))) island->member[0]->limit_reached = 1;
+    if (!parted) {
+        gk_pass_forces(c, PRESENT);
+        gk_pass(c, 0, 1);
+        part_all(c);
+    }
+    if (!(next < enough) && !(gaps < enough && hardly_rubs(c))) island->member[0]->limit_reached = 1;
 }
 
 gk_island gk_couple_island(gk_coupled *c)
@@ -118,7 +160,8 @@ gk_island gk_couple_island(gk_coupled *c)
     gk_island island = {.context = c};
     for (int e = 0; e < c->model->engagements; e++)
         if (gk_is_within(c, e)) island.member[island.count++] = &c->work->engaged[e].system, c->alone = e;
-    if (island.count > 1) gk_shared_form(c->model, c->setup, c->work, c->island);
+    if (island.count > 1) gk_far_list(c);
+    for (int m = 0; m < island.count; m++) island.member[m]->coupled = island.count > 1;
     island.sweep = island.count > 1 ? sweep : GK_ON(c->setup, friction) ? rub : NULL;
     return island;
 }
@@ -126,17 +169,27 @@ gk_island gk_couple_island(gk_coupled *c)
 /* what others deflect along the profile at the start of the step */
 static void recall_along(const gk_coupled *c)
 {
-    gk_give_all(c, WHOLE_START);
-    for (int e = 0; e < c->model->engagements; e++)
-        if (gk_is_within(c, e)) gk_take_along(c, e, c->work->engaged[e].glide->others_start);
+    gk_pass_forces(c, ALONG_START);
+    gk_pass(c, 1, 0);
+    for (int e = 0; e < c->model->engagements; e++) {
+        double gaps[MAX_STRIDE] = {0}, along[MAX_STRIDE];
+        const gk_engaged *engaged = &c->work->engaged[e];
+        if (!gk_is_within(c, e)) continue;
+        gk_glide_own(engaged->glide, &engaged->system, &engaged->forces, gaps, along);
+        for (int i = 0; i < engaged->system.contacts; i++)
+            engaged->glide->others_start[i] = engaged->glide->moved_along[i] - along[i];
+    }
 }
 
-/* the start of the step: under λ0 the others deflect too */
+/* The start of the step: under λ0 the others deflect too. Reads what the first guess does with it. */
 void gk_couple_recall(gk_coupled *c)
 {
     GK_ASSERT(c->island >= 0 && c->island < c->setup->islands);
     if (GK_ON(c->setup, friction)) recall_along(c);
-    part_at_once(c, AT_START);
+    gk_pass_forces(c, FROM_START);
+    gk_pass(c, 1, 1);
+    part_all(c);
+    c->read = 1;
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;
         if (!gk_is_within(c, e)) continue;

@@ -70,22 +70,6 @@ void gk_exchange_read(const gk_rows *rows, const gk_real *const y[], const doubl
         gk_exchange_read_modes(rows, w, y[rows->setup->mesh[rows->engaged->index].side[w].gear], read);
 }
 
-/* adds what contacts read of displacements y of the gear group of a side, in its axes: all, or those that yield */
-void gk_exchange_feel(const gk_rows *rows, int which, const gk_real *y, const gk_flow *flow, int at_once, double *read)
-{
-    GK_ASSERT(which == 0 || which == 1);
-    const gk_engaged *engaged = rows->engaged;
-    const int g = rows->setup->mesh[engaged->index].side[which].gear, n = GK_LANES(rows->setup, g);
-    const int width = 2 * n / LANES, yields = 2 * flow->yields / LANES;
-    gk_real *turned = rows->work->turned;
-    const gk_half *here = (const gk_half *)turned, *basis = (const gk_half *)rows->basis[which];
-    if (!n || (at_once && !yields)) return;
-    gk_turn_back(&rows->setup->modal[g], engaged->position[which].tooth, y, turned);
-    if (!at_once) gk_multiply_rows(here, basis, engaged->system.contacts, width, width, read);
-    for (int from = 0; from < width && at_once; from += width / 2)
-        gk_multiply_rows(here + from, basis + from, engaged->system.contacts, width, yields, read);
-}
-
 /* ---- pushing ----------------------------------------------------------------------------------------------------- */
 typedef struct pushes { /* rows whose forces are not zero */
     int count, row[MAX_ROWS];
@@ -149,58 +133,6 @@ void gk_exchange_push_modes(const gk_rows *rows, int which, const double *x, con
     push_basis(rows, which, &p, out_x, out_y);
 }
 
-/* −mobility·Σ rows·x over `halves` of a gear group from `first` on */
-GK_INLINE void move_halves(const pushes *p, half_rows rows, const gk_flow *flow, int first, gk_half *out,
-                           const int halves)
-{
-    const gk_half *mobility = (const gk_half *)flow->mobility;
-    gk_half sum[4] = {{0}};
-    for (int r = 0; r < p->count; r++) {
-        const gk_half *row = rows.at + (size_t)p->row[r] * rows.width + first;
-        const gk_real x = (gk_real)p->x[r];
-        for (int k = 0; k < halves; k++) sum[k] -= x * row[k];
-    }
-    for (int k = 0; k < halves; k++) out[first + k] = mobility[first + k] * sum[k];
-}
-
-/* −mobility·Σ rows·x + κ·Σ rows·y over two halves */
-static void yield_halves(const pushes *p, half_rows rows, const gk_flow *flow, int first, gk_half *out)
-{
-    const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
-    gk_half sum_x[2] = {{0}}, sum_y[2] = {{0}};
-    for (int r = 0; r < p->count; r++) {
-        const gk_half *row = rows.at + (size_t)p->row[r] * rows.width + first;
-        const gk_real x = (gk_real)p->x[r], y = (gk_real)p->y[r];
-        for (int k = 0; k < 2; k++) sum_x[k] -= x * row[k], sum_y[k] -= y * row[k];
-    }
-    for (int k = 0; k < 2; k++) out[first + k] = mobility[first + k] * sum_x[k] - kappa[first + k] * sum_y[k];
-}
-
-/* Adds to `sum` how far forces of contacts, x in the step and y at once, displace the gear group of a side, in its
- * axes. x NULL: there are none in the step, and only what yields moves. */
-void gk_exchange_displace(const gk_rows *rows, int which, const gk_flow *flow, const double *x, const double *y,
-                          gk_real *sum)
-{
-    GK_ASSERT(which == 0 || which == 1);
-    const int g = rows->setup->mesh[rows->engaged->index].side[which].gear, n = GK_LANES(rows->setup, g);
-    const gk_modal *m = &rows->setup->modal[g];
-    const int width = 2 * n / LANES, half = width / 2, yields = 2 * flow->yields / LANES;
-    const half_rows basis = {(const gk_half *)rows->basis[which], width};
-    gk_half *moved = (gk_half *)rows->work->turned;
-    pushes p;
-    if (!n || (!x && !yields)) return;
-    list_pushes(x ? x : y, y, rows->engaged->system.contacts, &p);
-    if (!x) memset(p.x, 0, (size_t)p.count * sizeof *p.x);
-    if (!p.count) return;
-    for (int from = 0; from < width; from += half) {
-        int k = from;
-        for (; k < from + yields; k += 2) yield_halves(&p, basis, flow, k, moved);
-        for (; k + 4 <= from + half && x; k += 4) move_halves(&p, basis, flow, k, moved, 4);
-        for (; k < from + half && x; k += 2) move_halves(&p, basis, flow, k, moved, 2);
-    }
-    gk_turn_add(m, rows->engaged->position[which].tooth, x ? m->pairs : flow->yields, rows->work->turned, sum);
-}
-
 typedef struct quad_rows { /* on the ground group; width: of a row */
     const gk_quad *at;
     int width;
@@ -237,27 +169,6 @@ GK_INLINE void ground_forces(const gk_rows *of, const pushes *p, double *const o
     }
 }
 
-/* adds the forces x of rows to those on the engagement's own part of the ground group */
-void gk_exchange_push_once(const gk_rows *rows, const double *x, double *out)
-{
-    GK_ASSERT(x && out);
-    double *const to[2] = {out, out + rows->engaged->wide[0]};
-    pushes p;
-    list_pushes(x, x, rows->count, &p);
-    if (rows->engaged->local && p.count) ground_forces(rows, &p, to, to, 0);
-}
-
-/* adds the forces x and y of rows to those on the engagement's own part of the ground group */
-void gk_exchange_push_local(const gk_rows *rows, const double *x, const double *y, double *out_x, double *out_y)
-{
-    GK_ASSERT(x && y);
-    const int first = rows->engaged->wide[0];
-    double *const to_x[2] = {out_x, out_x + first}, *const to_y[2] = {out_y, out_y + first};
-    pushes p;
-    list_pushes(x, y, rows->count, &p);
-    if (rows->engaged->local && p.count) ground_forces(rows, &p, to_x, to_y, 1);
-}
-
 /* adds the forces x and y of rows to those on ground group and gear groups */
 static void scatter(const gk_rows *rows, const double *x, const double *y)
 {
@@ -268,8 +179,8 @@ static void scatter(const gk_rows *rows, const double *x, const double *y)
     double *to_z[2], *to_next[2];
     for (int w = 0; w < 2; w++) {
         const int g = mesh->side[w].gear, from = mesh->part[w].from, patterns = rows->engaged->by_patterns[w];
-        to_z[w] = patterns ? work->pushed_z[g] : work->ground_force + from;
-        to_next[w] = patterns ? work->pushed_next[g] : work->ground_next + from;
+        to_z[w] = patterns ? work->scatter_pattern[0][g] : work->ground_force + from;
+        to_next[w] = patterns ? work->scatter_pattern[1][g] : work->ground_next + from;
     }
     if (mesh->local) ground_forces(rows, &p, to_z, to_next, 1);
     while (p.count && p.row[p.count - 1] >= rows->engaged->system.contacts) p.count--;
@@ -291,8 +202,8 @@ void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *
         memset(work->force[g], 0, size);
         memset(work->next[g], 0, size);
         if (!setup->base.patterns[g]) continue;
-        memset(work->pushed_z[g], 0, sizeof work->pushed_z[g]);
-        memset(work->pushed_next[g], 0, sizeof work->pushed_next[g]);
+        memset(work->scatter_pattern[0][g], 0, sizeof work->scatter_pattern[0][g]);
+        memset(work->scatter_pattern[1][g], 0, sizeof work->scatter_pattern[1][g]);
     }
     memset(work->ground_force, 0, width);
     memset(work->ground_next, 0, width);
@@ -304,7 +215,7 @@ void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *
         const gk_rows sliding = gk_rows_of_sliding(setup, work, e);
         scatter(&sliding, engaged->glide->step, engaged->glide->last);
     }
-    if (work->by_patterns) gk_felt_scatter(model, setup, work);
+    if (work->by_tables) gk_felt_scatter(model, setup, work);
 }
 
 /* ---- bores ------------------------------------------------------------------------------------------------------- */
@@ -317,7 +228,10 @@ void gk_exchange_push_bores(const gk_setup *setup, const gk_engaged *engaged, co
         if (gk_rows_at_bore(setup, s, i)) sum->moment[s->port_of[i]] += x[i];
     for (int w = 0; w < 2; w++) {
         const int port = setup->mesh[engaged->index].side[w].port_of;
-        for (int i = 0; i < s->contacts && port >= 0; i++) sum->turned[port] -= engaged->bore[w][i] * x[i];
+        if (port < 0) continue;
+        const int whole = s->contacts / 4;
+        sum->turned[port] -= gk_dot_quads(engaged->bore[w], x, whole);
+        for (int i = 4 * whole; i < s->contacts; i++) sum->turned[port] -= engaged->bore[w][i] * x[i];
     }
 }
 

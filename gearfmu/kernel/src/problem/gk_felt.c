@@ -26,10 +26,11 @@ void gk_felt_plan(const gk_setup *setup, const gk_work *work, gk_engaged *engage
     const gk_mesh *mesh = &setup->mesh[engaged->index];
     engaged->local = 0;
     for (int w = 0; w < 2; w++) {
-        const int patterns = work->by_patterns ? patterns_of(setup, engaged->index, w) : 0;
+        const int patterns = work->by_tables ? patterns_of(setup, engaged->index, w) : 0;
         engaged->by_patterns[w] = patterns > 0;
         engaged->local += engaged->wide[w] = patterns ? patterns : mesh->part[w].width;
     }
+    engaged->halves = gk_halves(engaged->wide[0]) + gk_halves(engaged->wide[1]);
 }
 
 /* Fills the rows of contacts and joints on the patterns of a side */
@@ -83,64 +84,48 @@ static between between_of(const gk_setup *setup, const gk_work *work, int to, in
     return (between){work->between[to][from], setup->base.patterns[from], setup->base.patterns[to]};
 }
 
-static void add_between(between b, const gk_felt *forces, int at_once, gk_real *y)
+static void add_between(between b, const gk_real *x, int kind, gk_real *y)
 {
-    for (int kind = at_once; kind < 2; kind++) {
-        const gk_real *x = kind ? forces->yielded : forces->moved, *m = b.matrix + (size_t)(kind * b.rows * b.columns);
-        switch (2 * b.columns / LANES) {
-        case 4: add_columns(m, x, b.rows, b.columns, y, 4); break;
-        case 5: add_columns(m, x, b.rows, b.columns, y, 5); break;
-        default: add_columns(m, x, b.rows, b.columns, y, 2 * b.columns / LANES);
+    const gk_real *m = b.matrix + (size_t)(kind * b.rows * b.columns);
+    switch (2 * b.columns / LANES) {
+    case 4: add_columns(m, x, b.rows, b.columns, y, 4); break;
+    case 5: add_columns(m, x, b.rows, b.columns, y, 5); break;
+    default: add_columns(m, x, b.rows, b.columns, y, 2 * b.columns / LANES);
+    }
+}
+
+/* what forces on the patterns of all gears do to those of each: in the step, at once */
+void gk_felt_move(const gk_coupled *c, int whole, int at_once)
+{
+    const gk_base *base = &c->setup->base;
+    gk_work *work = c->work;
+    for (int to = 0; to < c->model->gears; to++) {
+        gk_real *moved[MOVES] = {work->move_pattern[WHOLE][to], work->move_pattern[YIELDED][to]};
+        for (int t = 0; t < MOVES; t++) memset(moved[t], 0, (size_t)base->patterns[to] * sizeof(gk_real));
+        for (int from = 0; from < c->model->gears; from++) {
+            const between b = between_of(c->setup, work, to, from);
+            if (!base->patterns[to] || !gk_patterns_meet(base, to, from)) continue;
+            if (whole) add_between(b, work->push_pattern[STEP][from], 0, moved[WHOLE]);
+            if (whole) add_between(b, work->push_pattern[ONCE][from], 1, moved[WHOLE]);
+            if (at_once) add_between(b, work->push_pattern[AT_ONCE][from], 1, moved[YIELDED]);
         }
     }
 }
 
-static void gather(gk_real *sum, gk_real *before, const gk_real *now, int n)
+/* adds forces on the patterns of a gear to those on its oscillators, `wide` quads of these from `first` on */
+GK_INLINE void scatter_quads(const gk_base *base, int g, const double (*by)[MAX_GEARS][MOST_PATTERNS], int first,
+                             gk_quad *const to[2], const int wide)
 {
-    gk_half *s = (gk_half *)sum, *b = (gk_half *)before;
-    for (int k = 0; k < 2 * n / LANES; k++) s[k] += ((const gk_half *)now)[k] - b[k], b[k] = ((const gk_half *)now)[k];
-}
-
-/* forces of an engagement on the patterns of a side */
-void gk_felt_give(const gk_coupled *c, int e, int w, const double *moved, const double *yielded)
-{
-    const int g = c->setup->mesh[e].side[w].gear, n = patterns_of(c->setup, e, w);
-    gk_felt now, *given = &c->work->engaged[e].pattern[w], *sum = &c->work->sum_patterns[g];
-    for (int i = 0; i < n; i += 4) {
-        *(gk_four *)(now.moved + i) = __builtin_convertvector(*(const gk_quad *)(moved + i), gk_four);
-        *(gk_four *)(now.yielded + i) = __builtin_convertvector(*(const gk_quad *)(yielded + i), gk_four);
+    gk_quad sum[2][4];
+    for (int t = 0; t < 2; t++)
+        for (int q = 0; q < wide; q++) sum[t][q] = to[t][first + q];
+    for (int i = 0; i < base->patterns[g]; i++) {
+        const gk_quad *pattern = (const gk_quad *)(base->pattern[g] + i * base->width[g]) + first;
+        for (int t = 0; t < 2; t++)
+            for (int q = 0; q < wide; q++) sum[t][q] += by[t][g][i] * pattern[q];
     }
-    gather(sum->moved, given->moved, now.moved, n);
-    gather(sum->yielded, given->yielded, now.yielded, n);
-}
-
-/* what the forces on all other gears do to the patterns of each */
-void gk_felt_others(const gk_coupled *c, int at_once)
-{
-    const gk_base *base = &c->setup->base;
-    for (int to = 0; to < c->model->gears; to++) {
-        memset(c->work->by_others[to], 0, (size_t)base->patterns[to] * sizeof(gk_real));
-        for (int from = 0; from < c->model->gears; from++)
-            if (from != to && gk_patterns_meet(base, to, from))
-                add_between(between_of(c->setup, c->work, to, from), &c->work->sum_patterns[from], at_once,
-                            c->work->by_others[to]);
-    }
-}
-
-/* what others displace of the patterns of a side; at_once: their forces in the step are 0 */
-void gk_felt_take(const gk_setup *setup, const gk_work *work, int e, int w, int at_once, double *others)
-{
-    const int g = setup->mesh[e].side[w].gear, n = setup->base.patterns[g];
-    const gk_felt *own = &work->engaged[e].pattern[w], *sum = &work->sum_patterns[g];
-    gk_felt rest = {{0}, {0}};
-    gk_real felt[MOST_PATTERNS];
-    for (int i = 0; i < n; i += LANES / 2) {
-        *(gk_half *)(rest.moved + i) = *(const gk_half *)(sum->moved + i) - *(const gk_half *)(own->moved + i);
-        *(gk_half *)(rest.yielded + i) = *(const gk_half *)(sum->yielded + i) - *(const gk_half *)(own->yielded + i);
-        *(gk_half *)(felt + i) = *(const gk_half *)(work->by_others[g] + i);
-    }
-    add_between(between_of(setup, work, g, g), &rest, at_once, felt);
-    for (int i = 0; i < n; i += 4) *(gk_quad *)(others + i) = GK_WIDENED(*(const gk_four *)(felt + i));
+    for (int t = 0; t < 2; t++)
+        for (int q = 0; q < wide; q++) to[t][first + q] = sum[t][q];
 }
 
 /* forces that were pushed on patterns act on the oscillators */
@@ -148,14 +133,12 @@ void gk_felt_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
 {
     const gk_base *base = &setup->base;
     for (int g = 0; g < model->gears; g++) {
-        const int quads = base->width[g] / 4;
-        gk_quad *z = (gk_quad *)(work->ground_force + base->from[g]),
-                *next = (gk_quad *)(work->ground_next + base->from[g]);
-        for (int i = 0; i < base->patterns[g]; i++) {
-            const gk_quad *pattern = (const gk_quad *)(base->pattern[g] + i * base->width[g]);
-            const double x = work->pushed_z[g][i], y = work->pushed_next[g][i];
-            if (x == 0.0 && y == 0.0) continue;
-            for (int q = 0; q < quads; q++) z[q] += x * pattern[q], next[q] += y * pattern[q];
-        }
+        const int from = base->from[g], quads = base->patterns[g] ? base->width[g] / 4 : 0;
+        gk_quad *const to[2] = {(gk_quad *)(work->ground_force + from), (gk_quad *)(work->ground_next + from)};
+        const double (
+            *by)[MAX_GEARS][MOST_PATTERNS] = (const double (*)[MAX_GEARS][MOST_PATTERNS])work->scatter_pattern;
+        int q = 0;
+        for (; q + 4 <= quads; q += 4) scatter_quads(base, g, by, q, to, 4);
+        for (; q < quads; q++) scatter_quads(base, g, by, q, to, 1);
     }
 }

@@ -10,8 +10,6 @@
 GK_HOT void gk_felt_see(const gk_model *model, const gk_setup *setup, gk_work *work);
 GK_HOT void gk_felt_plan(const gk_setup *setup, const gk_work *work, gk_engaged *engaged);
 GK_HOT void gk_felt_rows(const gk_setup *setup, gk_work *work, int e, int w);
-GK_HOT void gk_felt_give(const gk_coupled *c, int e, int w, const double *moved, const double *yielded);
-GK_HOT void gk_felt_others(const gk_coupled *c, int at_once);
-GK_HOT void gk_felt_take(const gk_setup *setup, const gk_work *work, int e, int w, int at_once, double *others);
+GK_HOT void gk_felt_move(const gk_coupled *c, int whole, int at_once);
 GK_HOT void gk_felt_scatter(const gk_model *model, const gk_setup *setup, gk_work *work);
 #endif

@@ -4,7 +4,10 @@
  * measure outward: a contact row is −(flank row). */
 #include "problem/gk_work.h"
 #include "problem/gk_exchange.h"
+#include "problem/gk_far.h"
 #include "problem/gk_rows.h"
+
+enum { KEPT_STEPS = 8 }; /* steps for which an engagement of an island keeps D and K */
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work,
@@ -136,6 +139,45 @@ void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *c
     }
 }
 
+/* ---- engagements of an island ------------------------------------------------------------------------------------ */
+/* what is not dynamic of an engagement's own compliance: in A, and kept */
+static void form_rest(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e)
+{
+    gk_engaged *engaged = &work->engaged[e];
+    gk_system *s = &engaged->system;
+    gk_compliance_form(setup, k, work, e, NOT_DYNAMIC);
+    gk_compliance_mirror(s);
+    memcpy(engaged->rest, s->A, (size_t)(s->n * s->stride) * sizeof *s->A);
+}
+
+/* Takes D and K as they were some steps ago, if teeth are the same: rows read what oscillators really do (gk_pass.c),
+ * so that these matrices only tell how far a move goes. */
+static int recall_own(gk_engaged *engaged)
+{
+    gk_system *s = &engaged->system;
+    gk_kept *kept = &engaged->kept;
+    int same = kept->n == s->n && kept->places == engaged->places && kept->age < KEPT_STEPS;
+    for (int p = 0; p < engaged->places && same; p++)
+        same = kept->key[p].flank == engaged->place[p].key.flank && kept->key[p].tooth == engaged->place[p].key.tooth;
+    if (!same) return 0;
+    kept->age++;
+    memcpy(s->D, kept->D, (size_t)(s->n * s->stride) * sizeof *s->D);
+    for (int q = 0; q < s->n * s->stride / 4; q++) ((gk_quad *)s->A)[q] -= ((gk_quad *)kept->K)[q];
+    return 1;
+}
+
+static void keep_own(gk_engaged *engaged)
+{
+    const gk_system *s = &engaged->system;
+    gk_kept *kept = &engaged->kept;
+    kept->n = s->n, kept->places = engaged->places, kept->age = 1;
+    for (int p = 0; p < engaged->places; p++) kept->key[p] = engaged->place[p].key;
+    memcpy(kept->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
+    for (int q = 0; q < s->n * s->stride / 4; q++)
+        ((gk_quad *)kept->K)[q] = ((const gk_quad *)engaged->rest)[q] - ((const gk_quad *)s->A)[q];
+}
+
+/* ---- the problem ------------------------------------------------------------------------------------------------- */
 /* Forms the problem of engagement e at its places for the step k: D, A and the paths of the rows' own dampers, P and
  * 1/k; C′ = A + P. The local law is in neither (it depends on the force). */
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
@@ -159,10 +201,14 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     gk_far_form(setup, work, e);
     gk_rows_form_ground(setup, work, e);
     gk_rows_form_bores(setup, work, e);
-    gk_compliance_form(setup, k, work, e, tables);
     memset(s->outer, 0, (size_t)s->stride * sizeof(double));
     memset(s->beyond, 0, (size_t)s->stride * sizeof(double));
     gaps(model, setup, k->h, work, e);
+    const int coupled = setup->mesh[e].coupled;
+    if (coupled) form_rest(setup, k, work, e);
+    if (coupled && work->by_tables && recall_own(engaged)) return;
+    gk_compliance_form(setup, k, work, e, tables ? BY_TABLES : BY_ROWS);
     gk_ground_add(model, setup, k, work, e, tables);
     gk_compliance_mirror(s);
+    if (coupled && work->by_tables) keep_own(engaged);
 }

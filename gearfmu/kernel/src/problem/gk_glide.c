@@ -99,11 +99,35 @@ void gk_glide_rows(const gk_setup *setup, gk_work *work, int e)
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
     const size_t size = (size_t)(engaged->system.contacts * engaged->system.stride);
-    double **matrix[] = {&glide->gap_moves, &glide->gap_yields, &glide->moves, &glide->yields, &glide->by_z, &glide->D};
-    for (size_t i = 0; i < 6; i++) *matrix[i] = glide->matrix + i * size;
+    double **matrix[] = {&glide->gap_moves, &glide->gap_yields, &glide->moves, &glide->yields,
+                         &glide->by_z,      &glide->gap_rests,  &glide->rests, &glide->D}; /* D is the largest */
+    for (size_t i = 0; i < 8; i++) *matrix[i] = glide->matrix + i * size;
     memset(glide->matrix, 0, 4 * size * sizeof(double));
     gk_rows_form_along(setup, work, e);
     for (int w = 0; w < 2 && GK_ON(setup, residual); w++) slide_residual(engaged, &setup->mesh[e].side[w], glide);
+    memcpy(glide->gap_rests, glide->gap_yields, size * sizeof(double));
+    memcpy(glide->rests, glide->yields, size * sizeof(double));
+}
+
+/* What forces of an engagement itself do through the oscillators: of friction to its gaps, added; of all to the sliding
+ * of its contacts. Before its local yield is in `yields`, or without it. */
+void gk_glide_own(const gk_glide *glide, const gk_system *s, const gk_forces *f, double *gaps, double *along)
+{
+    GK_ASSERT(glide && gaps && along);
+    gk_clear(along, s->stride / 4);
+    for (int j = 0; j < s->contacts; j++) {
+        const int at = j * s->stride;
+        const double step = f->along[STEP][j], once = f->along[ONCE][j];
+        for (int i = 0; i < s->n; i++) {
+            const double yields = glide->gap_yields[at + i] - glide->gap_rests[at + i];
+            gaps[i] += step * glide->gap_moves[at + i] + once * yields;
+            along[j] += f->of[STEP][i] * glide->gap_moves[at + i] + f->of[ONCE][i] * yields;
+        }
+        for (int i = 0; i < s->contacts; i++) {
+            const double local = i == j ? gk_friction_local_yield(s, i) : 0.0;
+            along[i] += step * glide->moves[at + i] + once * (glide->yields[at + i] - local - glide->rests[at + i]);
+        }
+    }
 }
 
 /* Adds what the oscillators and spins do in the step k */

@@ -3,7 +3,7 @@
  * that spread the forces of a step. */
 #include "problem/gk_linearise.h"
 #include "problem/gk_engage.h"
-#include "problem/gk_shared.h"
+#include "problem/gk_far.h"
 #include "problem/gk_exchange.h"
 #include "problem/gk_rows.h"
 
@@ -113,16 +113,6 @@ static double own_compliance(const gk_system *s, int i, int j)
     return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
 }
 
-/* forces on far teeth: those of one engagement alone */
-static void push_far(const gk_model *model, gk_work *work, int of, const double *force)
-{
-    for (int e = 0; e < model->engagements; e++) {
-        gk_forces *f = &work->engaged[e].forces;
-        memset(f, 0, sizeof *f);
-        if (e == of) memcpy(f->far, force, sizeof f->far);
-    }
-}
-
 /* what a unit force of one row does at once to all rows of its own engagement, and between bores and flanks to those of
  * others */
 static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, const kept *rows, int r,
@@ -134,15 +124,20 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
     unit[rows[r].row] = 1.0;
     gk_bores bores = {{0}, {0}};
     gk_exchange_push_bores(setup, &work->engaged[rows[r].engagement], unit, &bores);
-    push_far(model, work, rows[r].engagement, unit);
+    const gk_coupled coupled = {
+        .model = model, .setup = setup, .work = work, .island = setup->mesh[rows[r].engagement].island};
+    static const double none[MAX_STRIDE];
+    for (int e = 0; e < model->engagements; e++)
+        gk_far_push(setup, &work->engaged[e], e == rows[r].engagement ? unit : none);
+    gk_far_list(&coupled);
+    gk_far_move(work);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
         if (!same && e != of) {
-            memset(read, 0, sizeof read);
             of = e;
+            gk_far_read(setup, &work->engaged[e], read);
             gk_exchange_read_bores(setup, &work->engaged[e], &bores, read);
-            gk_shared_read(setup, work, e, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
@@ -243,7 +238,6 @@ gk_outcome gk_linearise(const gk_model *model, const gk_setup *setup, gk_work *w
     out->rows = list_kept(model, work, rows);
     describe_coordinates(model, setup, out);
     fill_supports(model, setup, work, rows, out);
-    gk_shared_form(model, setup, work, -1);
     fill_rows(model, setup, work, rows, out);
     return GK_OK;
 }

@@ -12,7 +12,7 @@ static void read_rigid(const gk_setup *setup, const gk_work *work, int e, const 
     memset(rigid, 0, POSE * sizeof *rigid);
     for (int w = 0; w < 2; w++) {
         const int g = setup->mesh[e].side[w].gear;
-        const double *seen = work->by_patterns && base->patterns[g] ? work->seen[g] : NULL;
+        const double *seen = work->by_tables && base->patterns[g] ? work->seen[g] : NULL;
         for (int m = 0; m < base->motions[g]; m++) {
             const int c = base->motion[g][m];
             if (seen)
@@ -175,6 +175,20 @@ static void joint_rows(const gk_setup *setup, const gk_mesh *mesh, gk_engaged *e
             memset(row, 0, size);
 }
 
+/* rows in single precision, those of either side in whole halves */
+static void round_rows(const gk_engaged *engaged, const double *rows, int count, gk_real *near)
+{
+    const gk_quad *from = (const gk_quad *)rows;
+    gk_four *to = (gk_four *)near;
+    for (int i = 0; i < count; i++)
+        for (int w = 0; w < 2; w++) {
+            const int quads = engaged->wide[w] / 4;
+            for (int q = 0; q < quads; q++) to[q] = __builtin_convertvector(from[q], gk_four);
+            if (quads % 2) to[quads] = (gk_four){0};
+            from += quads, to += (quads + 1) / 2 * 2;
+        }
+}
+
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
 void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
 {
@@ -203,6 +217,7 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
         }
         joint_rows(setup, mesh, engaged, w);
     }
+    if (mesh->coupled) round_rows(engaged, engaged->ground, engaged->system.n, engaged->near);
 }
 
 /* Fills the rows of the sliding of all contacts: gear groups, ground group, spins; those of the gaps are there */
@@ -223,6 +238,7 @@ void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
         if (mesh->local)
             ground_rows_of(&f, setup->base.motions[side->gear], setup->spatial ? 1 : strips, strips, ADD_ALONG);
     }
+    if (mesh->coupled) round_rows(engaged, glide->ground, contacts, glide->near);
     for (int i = 0; i < contacts; i++) {
         const double *slide = gk_point_of(setup, &engaged->place[i / strips], i % strips)->slide;
         glide->rigid[0][i] = slide[PHIA], glide->rigid[1][i] = slide[PHIB];

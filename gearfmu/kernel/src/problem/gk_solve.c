@@ -5,8 +5,9 @@
  * η_d dashpot of a row closed at either end: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to
  * |λ0 + λ1| (no pull), of a contact that closes or opens to what it may do while it touches
  *
- * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last
- * one (block principal pivoting, Júdice & Pires 1994). */
+ * Active-set Newton with chord steps, in an island with one factorisation as long as no status changes. All violated
+ * rows flip at once, after four rounds without progress only the last one (block principal pivoting, Júdice & Pires
+ * 1994). */
 #include "problem/gk_system.h"
 
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40 };
@@ -70,6 +71,7 @@ GK_INLINE void products(const gk_system *s, const double *f, const int dashpots,
 void gk_solve_status(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
+    s->factored = 0;
     gk_bits any = {0};
     for (int i = s->n; i < s->stride; i++) s->active[i] = 0, s->clip[i] = 2, s->hold[i] = 0;
     for (int q = 0; q < s->stride / 4; q++) {
@@ -208,7 +210,7 @@ static void newton(gk_system *s)
 {
     double x[MAX_STRIDE], e[MAX_STRIDE], change, last = INFINITY;
     const int films = gk_film_on(s), most = films ? FILM_LIMIT : CHORD_LIMIT;
-    gk_tangent_factorise(s);
+    if (!s->factored) gk_tangent_factorise(s);
     residual(s, x);
     for (int round = 0; round < most; round++) {
         gk_tangent_solve(s, x);
@@ -222,6 +224,7 @@ static void newton(gk_system *s)
         }
         last = change;
     }
+    s->factored = s->coupled && !films && !s->rubs;
     gk_solve_settle(s);
 }
 

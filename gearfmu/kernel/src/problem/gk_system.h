@@ -72,6 +72,7 @@ typedef struct gk_system {
     double energy_correction;  /* what of it this step should make good */
     double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
     double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
+    int coupled, factored;     /* it has neighbours; the tangent's factors are those of its status */
     int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
     int dashpots_stand;                          /* where they are: no search for what limits them */
     int films;                                   /* rows whose gap is open at the start of the step, with oil in it */

@@ -27,6 +27,7 @@ typedef struct gk_bores { /* at once: moments on ports, and what contacts turn t
  * contact j does to row i. */
 typedef struct gk_glide {
     gk_real *basis[2]; /* (contacts, n), (contacts, local part) rows of the sliding, as those of the gaps */
+    gk_real *near;     /* as that of the gaps */
     double *ground, rigid[MAX_LOCAL][MAX_STRIDE];
     double *matrix, *small;                     /* small: two of (contacts, rows + 1) */
     double *gap_moves, *gap_yields;             /* (contacts, stride) to the gaps of all rows: in the step; at once */
@@ -34,6 +35,8 @@ typedef struct gk_glide {
     double gap[MAX_STRIDE];                     /* gaps without friction */
     double free[MAX_STRIDE], begin[MAX_STRIDE]; /* sliding in the step by the forces of the last one alone; by the
                                                    speed at its start */
+    double moved_along[MAX_STRIDE];             /* as read in a pass, of all engagements */
+    double *gap_rests, *rests;                  /* of gap_yields and yields what is not dynamic */
     double others[MAX_STRIDE],                  /* by other engagements; */
         others_start[MAX_STRIDE];               /* at once at the start of the step */
     double most[MAX_STRIDE];                    /* coefficient of friction */
@@ -57,29 +60,40 @@ typedef struct gk_glide {
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
 
-/* forces of an engagement by what they meet: D in the step, A at once, far teeth; the same along the profile */
-typedef struct gk_forces {
-    double step[MAX_STRIDE], once[MAX_STRIDE], far[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
-    int at_once; /* step is 0 */
+/* what an island exchanges in a pass (gk_pass.c): forces in the step, z; λ + f_d, under which what is quasi-static
+ * yields; λ alone. What rows read of it: in the step; as deflection at once under λ */
+enum { STEP, ONCE, AT_ONCE, PUSHES };
+enum { WHOLE, YIELDED, MOVES };
+typedef struct gk_forces { /* of an engagement; along: the same along the profile */
+    double of[PUSHES][MAX_STRIDE], along[2][MAX_STRIDE];
 } gk_forces;
 
-/* a gear that two engagements share: (contacts of the second, stride) what its forces do to the gaps of the first at
- * once through far teeth */
-typedef struct gk_shared {
-    int engagement[2], side[2], gear, stride;
-    double *far;
-} gk_shared;
+/* halves of LANES that hold n */
+enum { MAX_NEAR = (MAX_GROUND + 4 * MAX_ROTORS) / 8 + 1 };
+static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
 
-typedef struct gk_felt { /* forces on the patterns of a gear: by z, by what acts at once */
-    gk_real moved[MOST_PATTERNS], yielded[MOST_PATTERNS];
-} gk_felt;
+typedef struct gk_far_tooth { /* load on a tooth by patterns, and what others move of it */
+    gk_real load[LANES], moved[LANES];
+    int loaded;
+} gk_far_tooth;
+
+typedef struct gk_far_pair { /* a tooth that feels another of its gear */
+    const gk_real *S;
+    const gk_far_tooth *from;
+    gk_far_tooth *to;
+} gk_far_pair;
+
+typedef struct gk_kept { /* D and K = Q − A of an engagement as of some steps ago, between the rows of that time */
+    double *D, *K;
+    int n, places, age; /* n −1: none */
+    gk_key key[MAX_PAIRS];
+} gk_kept;
 
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
     int local, wide[2]; /* numbers of a row on the ground group: together, of either side: oscillators or patterns */
     int by_patterns[2]; /* a side's are patterns */
-    gk_felt pattern[2];
-    gk_glide *glide; /* with friction */
+    gk_glide *glide;    /* with friction */
     gk_film film;
     gk_place place[MAX_PAIRS];
     int places;
@@ -87,15 +101,17 @@ typedef struct gk_engaged { /* an engagement in a step */
     gk_position position[2];
     gk_real *basis[2]; /* (contacts, n) rows of the contacts in the frame of the reference tooth */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
-    double *matrix;    /* D, A, P, J, L, B */
-    double *given_ground,
-        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
-                                                       step less at once; of spins in the step, at once */
-    gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
+    gk_real *near;     /* (rows, halves) the same in whole halves, those of either side by themselves */
+    int halves;
+    double *matrix;               /* D, A, P, J, L, B */
     double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
-    double *far[2];               /* (contacts, FAR) patterns of far teeth */
-    gk_forces forces;             /* as given to the others */
-    gk_bores given_bores;
+    gk_real *far[2];              /* (contacts, LANES) patterns of far teeth */
+    gk_far_tooth far_tooth[2][MAX_PAIRS];
+    gk_forces forces;                /* as pushed in a pass */
+    gk_bores own_bores[MOVES];       /* its part of what is pushed at bores */
+    double moved[MOVES][MAX_STRIDE]; /* what its rows read in a pass, of all engagements */
+    double *rest;                    /* (n, stride) what is not dynamic of its own compliance, less P */
+    gk_kept kept;
     gk_step_side table[2];
     gk_system system;
 } gk_engaged;
@@ -126,8 +142,6 @@ struct gk_work {
     double table_h, table_gamma; /* step of the tables of D and K; 0: none yet */
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
-    gk_shared *shared;           /* (shareds) */
-    int shareds;
     double *tally;    /* (6, ground oscillators) sums of a communication step and their scratch (gk_tally.c) */
     double *pushed;   /* forces on all oscillators of the ground group, then of a gear group */
     double *mode_row; /* (modes) scratch */
@@ -140,18 +154,21 @@ struct gk_work {
     double *spread;    /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
-    double *island;                             /* the limit of the step: (2, rows, rows) of all engagements */
-    double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
-    gk_real *sum_modes[MAX_GEARS];
-    gk_felt sum_patterns[MAX_GEARS];
-    gk_real by_others[MAX_GEARS][MOST_PATTERNS]; /* moved by the forces on other gears, as of the last round */
-    gk_real *between[MAX_GEARS][MAX_GEARS];      /* (2, patterns of the second, of the first) in a step with tables */
-    int by_patterns;                             /* this step goes by patterns */
-    double seen[MAX_GEARS][MOST_PATTERNS];       /* predicted displacement of the patterns */
-    double pushed_z[MAX_GEARS][MOST_PATTERNS], pushed_next[MAX_GEARS][MOST_PATTERNS];
-    gk_bores sum_bores;
-    gk_field field[2];             /* nodal contact: teeth of A and B in hand */
-    uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
+    double *island; /* the limit of the step: (2, rows, rows) of all engagements */
+    /* of an island in a pass: forces pushed, and what these move */
+    double push_spin[PUSHES][MAX_SPINS], move_spin[MOVES][MAX_SPINS], yield_spin[MAX_SPINS];
+    gk_real *push_ground[PUSHES], *move_ground[MOVES];
+    gk_real push_pattern[PUSHES][MAX_GEARS][MOST_PATTERNS], move_pattern[MOVES][MAX_GEARS][MOST_PATTERNS];
+    double scatter_pattern[2][MAX_GEARS][MOST_PATTERNS]; /* forces of the step and at its end */
+    gk_real *move_modes[MOVES][MAX_GEARS];
+    gk_bores push_bores[MOVES];
+    gk_far_pair *far_pair;
+    int far_pairs, most_far_pairs;
+    gk_real *between[MAX_GEARS][MAX_GEARS]; /* (2, patterns of the second, of the first) in a step with tables */
+    int by_tables;                          /* this step goes by its tables and by patterns */
+    double seen[MAX_GEARS][MOST_PATTERNS];  /* predicted displacement of the patterns */
+    gk_field field[2];                      /* nodal contact: teeth of A and B in hand */
+    uint64_t cycles[PHASES], mark;          /* phase profile, filled by a build with GK_PROFILE */
 };
 
 /* gk_layout.c */
@@ -170,15 +187,13 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
                          double *sum);
 /* gk_moves.c */
 GK_HOT gk_moves_function gk_side_step;
-/* gk_far.c */
-GK_HOT void gk_far_form(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);
 /* gk_film.c */
 GK_HOT void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);
 /* gk_glide.c */
 GK_HOT void gk_glide_rows(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e);
+GK_HOT void gk_glide_own(const gk_glide *glide, const gk_system *s, const gk_forces *f, double *gaps, double *along);
 GK_HOT void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e);
 GK_HOT double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h);
 /* gk_friction.c */
@@ -190,14 +205,17 @@ GK_HOT double gk_friction_local_yield(const gk_system *s, int i);
 GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
 GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);
 /* gk_couple.c */
+/* by which a pass changes less than the one before, as long as it is not known */
+#define GK_FIRST_RATE 0.1
 typedef struct gk_coupled { /* an island in a step */
     const gk_model *model;
     const gk_setup *setup;
     gk_work *work;
     const gk_coefficients *k;
     int island, alone; /* alone: the engagement of an island of one */
-    int sweeps;        /* at most; 0: as many as a step may take */
-    double rate;       /* by which a sweep changed less than the one before */
+    int sweeps;        /* passes at most; 0: as many as a step may take */
+    double rate;       /* by which a pass changed less than the one before */
+    int read, known;   /* rows have read what the present forces do; it is known what engagements do to each other */
 } gk_coupled;
 GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
 GK_HOT void gk_couple_recall(gk_coupled *coupled);
@@ -207,7 +225,9 @@ static inline int gk_block_end(int i)
     GK_ASSERT(i >= 0);
     return i / 4 * 4 + 4;
 }
-GK_HOT void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables);
+typedef enum { BY_ROWS, BY_TABLES, NOT_DYNAMIC } gk_compliance_of;
+GK_HOT void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
+                               gk_compliance_of what);
 GK_HOT void gk_compliance_mirror(gk_system *s);
 /* gk_ground.c */
 GK_HOT void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,

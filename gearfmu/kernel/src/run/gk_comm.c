@@ -244,6 +244,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     int first = data->steps == 0; /* the balance begins after the run's first whole step */
     gk_tally tally;
     gk_tally_begin(model, setup, work, data, &tally);
+    for (int e = 0; e < model->engagements; e++) work->engaged[e].kept.n = -1; /* a restored state has none */
     if (!(data->table_h > 0.0)) data->table_h = h;
     gk_limit_run(model, setup, work, data, data->table_h);
     for (int64_t i = 0; i < steps; i++) {

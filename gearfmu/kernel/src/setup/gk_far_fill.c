@@ -83,14 +83,26 @@ static int any_static(const gk_model *model, const gk_setup *setup, int g)
     return any;
 }
 
+/* what a tooth does to another is what that does to it, to the last bit; `itself`: one tooth, or half way round */
+static void keep(const double *sum, int itself, gk_real *there, gk_real *back)
+{
+    for (int i = 0; i < FAR; i++)
+        for (int j = 0; j < FAR; j++) {
+            if (itself && i > j) continue;
+            there[i * LANES + j] = back[j * LANES + i] = (gk_real)sum[i * FAR + j];
+        }
+}
+
 /* S for every number of teeth, where something is not dynamic */
 void gk_far_fill(const gk_model *model, gk_setup *setup, int g)
 {
     setup->far_on[g] = setup->on.residual && gk_far_known(model, setup, g) && any_static(model, setup, g);
-    for (int m = 0; m < model->gear[g].z && setup->far_on[g]; m++) {
-        double *sum = setup->far[g] + (size_t)m * FAR * FAR;
-        memset(sum, 0, FAR * FAR * sizeof *sum);
+    memset(setup->far[g], 0, setup->far_on[g] ? (size_t)model->gear[g].z * FAR * LANES * sizeof(gk_real) : 0);
+    for (int m = 0; 2 * m <= model->gear[g].z && setup->far_on[g]; m++) {
+        const int z = model->gear[g].z, back = (z - m) % z;
+        double sum[FAR * FAR] = {0};
         add_modes(&model->gear[g], setup->modal[g].count, m, sum);
         add_ground(model, setup, g, m, sum);
+        keep(sum, m == back, setup->far[g] + (size_t)m * FAR * LANES, setup->far[g] + (size_t)back * FAR * LANES);
     }
 }

@@ -83,6 +83,7 @@ static void fill_gear(const gk_setup *setup, const gk_pace *pace, gk_coefficient
         if (o.kappa != 0.0 && i % modal->pairs + 1 > yields) yields = i % modal->pairs + 1;
         store(&k->flow[g], i, &o);
     }
+    k->flow[g].softest = yields;
     k->flow[g].yields = (yields + LANES - 1) / LANES * LANES;
 }
 

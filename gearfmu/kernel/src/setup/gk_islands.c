@@ -42,4 +42,9 @@ void gk_islands_find(const gk_model *model, gk_setup *setup)
         }
         setup->islands++;
     }
+    for (int a = 0; a < model->engagements; a++) {
+        setup->mesh[a].coupled = 0;
+        for (int b = 0; b < model->engagements; b++)
+            setup->mesh[a].coupled |= a != b && setup->mesh[a].island == setup->mesh[b].island;
+    }
 }

@@ -158,7 +158,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         at += OSCILLATOR_STATE * (size_t)setup->modal[g].n;
     }
     for (int g = 0; g < model->gears; g++)
-        setup->far[g] = doubles(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * FAR : 0);
+        setup->far[g] = reals(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * LANES : 0);
     for (int g = 0; g < model->gears; g++) lay_out_flank(&b, model, setup, g);
     lay_out_base(&b, model, &setup->base, ground);
     for (int e = 0; e < model->engagements; e++) {
@@ -213,53 +213,39 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
         const size_t points = (size_t)(side->candidates * setup->strips), n = (size_t)setup->modal[side->gear].n;
-        const int shared = setup->engagements_of[side->gear] > 1;
         engaged->basis[w] = reals(b, contacts * n);
-        engaged->given_modes[w] = reals(b, shared ? n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
-        engaged->far[w] = doubles(b, gk_far_known(model, setup, side->gear) ? contacts * FAR : 0);
+        engaged->far[w] = reals(b, gk_far_known(model, setup, side->gear) ? contacts * LANES : 0);
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
+    engaged->near = reals(b, model->engagements > 1 ? rows * ((size_t)setup->base.n + 2 * LANES) : 0);
     engaged->index = e;
     engaged->matrix = doubles(b, 6 * rows * rows);
-    engaged->given_ground = doubles(b, (size_t)setup->base.n);
+    const size_t several = model->engagements > 1 ? rows * rows : 0;
+    engaged->rest = doubles(b, several);
+    engaged->kept.D = doubles(b, several), engaged->kept.K = doubles(b, several);
+    engaged->kept.n = -1;
     if (!GK_ON(setup, friction)) return;
     gk_glide *glide = engaged->glide = take(b, sizeof *glide);
     gk_glide counted, *of = glide ? glide : &counted;
     memset(of, 0, sizeof *of);
     for (int w = 0; w < 2; w++) of->basis[w] = reals(b, contacts * (size_t)setup->modal[setup->mesh[e].side[w].gear].n);
     of->ground = doubles(b, rows * (size_t)setup->base.n);
-    of->matrix = doubles(b, 6 * rows * rows);
+    of->near = reals(b, model->engagements > 1 ? rows * ((size_t)setup->base.n + 2 * LANES) : 0);
+    of->matrix = doubles(b, 8 * rows * rows);
     of->small = doubles(b, 2 * rows * rows);
 }
 
-/* Pairs of engagements with a gear in common; list NULL: counts them */
-static int list_shared(const gk_model *model, gk_shared *list)
+/* pairs of teeth that may feel each other as far teeth, at most */
+static int far_pairs(const gk_model *model, const gk_setup *setup)
 {
     int count = 0;
-    for (int a = 0; a < model->engagements; a++)
-        for (int b = a + 1; b < model->engagements; b++)
-            for (int pair = 0; pair < 4; pair++) {
-                const int w = pair / 2, v = pair % 2, g = model->engagement[a].gear[w];
-                if (model->engagement[b].gear[v] != g) continue;
-                if (list) list[count].engagement[0] = a, list[count].engagement[1] = b;
-                if (list) list[count].side[0] = w, list[count].side[1] = v, list[count].gear = g;
-                count++;
-            }
-    return count;
-}
-
-static void lay_out_shared(bump *b, const gk_model *model, const gk_setup *setup, gk_work *work)
-{
-    const size_t contacts = MAX_PAIRS * (size_t)setup->strips, block = contacts * ((contacts + 3) / 4 * 4);
-    work->shareds = list_shared(model, NULL);
-    work->shared = take(b, (size_t)work->shareds * sizeof *work->shared);
-    if (work->shared) list_shared(model, work->shared);
-    for (int p = 0; p < work->shareds; p++) {
-        gk_shared counted, *s = work->shared ? &work->shared[p] : &counted;
-        s->far = doubles(b, block);
+    for (int g = 0; g < model->gears; g++) {
+        const int n = setup->engagements_of[g];
+        if (gk_far_known(model, setup, g)) count += n * (n - 1) * MAX_PAIRS * MAX_PAIRS;
     }
+    return count;
 }
 
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
@@ -269,8 +255,13 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
-        gk_real **array[] = {&work->qp[g],   &work->vp[g],      &work->force[g],
-                             &work->next[g], &work->reading[g], &work->sum_modes[g]};
+        gk_real **array[] = {&work->qp[g],
+                             &work->vp[g],
+                             &work->force[g],
+                             &work->next[g],
+                             &work->reading[g],
+                             &work->move_modes[WHOLE][g],
+                             &work->move_modes[YIELDED][g]};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(&b, n);
         work->turned_speed[g] = doubles(&b, n);
         for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
@@ -293,7 +284,6 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         gk_engaged counted;
         lay_out_engaged(&b, model, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
-    lay_out_shared(&b, model, setup, work);
     work->tally = doubles(&b, 6 * ground);
     work->pushed = doubles(&b, (size_t)model->ground[setup->base.set].n + most);
     work->mode_row = doubles(&b, most);
@@ -305,7 +295,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         unknowns += shared ? MAX_SOFT : 0;
     }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
-    work->soft_rows = doubles(&b, work->shareds ? 2 * MAX_ROWS * MAX_SOFT : 0);
+    work->soft_rows = doubles(&b, model->engagements > 1 ? 2 * MAX_ROWS * MAX_SOFT : 0);
     work->columns = doubles(&b, gk_side_scratch(model) +
                                     (size_t)(model->engagements * LIMIT_POSITIONS) * MAX_STRIDE * MAX_STRIDE);
     size_t blocks;
@@ -313,7 +303,10 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->blocks = reals(&b, blocks);
     const size_t rows = (size_t)model->engagements * (MAX_PAIRS * (size_t)setup->strips + MAX_JOINTS);
     work->island = doubles(&b, 2 * rows * rows);
-    work->sum_ground = doubles(&b, ground);
+    work->most_far_pairs = far_pairs(model, setup);
+    work->far_pair = take(&b, (size_t)work->most_far_pairs * sizeof *work->far_pair);
+    for (int t = 0; t < PUSHES; t++) work->push_ground[t] = reals(&b, ground + LANES);
+    for (int t = 0; t < MOVES; t++) work->move_ground[t] = reals(&b, ground + LANES);
     for (int g = 0; g < model->gears; g++)
         for (int f = 0; f < model->gears; f++)
             work->between[g][f] = reals(&b, by_patterns(setup) ? 2 * MOST_PATTERNS * MOST_PATTERNS : 0);

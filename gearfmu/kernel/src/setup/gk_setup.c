@@ -325,7 +325,7 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
         memset(k->flow[g].lead, 0, size);
         memset(k->flow[g].hold, 0, size);
         memset(work->zero, 0, size);
-        k->flow[g].yields = 0;
+        k->flow[g].yields = k->flow[g].softest = 0;
     }
     memset(k->ground.mobility, 0, ground);
     memset(k->ground.kappa, 0, ground);

@@ -134,6 +134,7 @@ typedef struct gk_sliding { /* of a contact, at the moment */
 
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
+    int coupled;         /* its island has others */
     gk_side side[2];
     gk_span part[2];      /* parts of the ground group that its rows read: gear A's, gear B's; one where these meet */
     int local;            /* their widths together */
@@ -174,7 +175,7 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
     gk_real *mobility; /* what a force at the end does to a gap */
     gk_real *kappa, *inverse_s2;
     gk_real *unit, *lead, *hold; /* v = unit ẋ + lead ḟ + hold f */
-    int yields;                  /* the first `yields` lanes of each half: κ ≠ 0 */
+    int yields, softest;         /* the first lanes of each half: κ ≠ 0; padded, and as they are */
 } gk_flow;
 
 typedef struct gk_ground_flow { /* the same of the ground group */
@@ -239,8 +240,8 @@ struct gk_setup {
                        [MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
     gk_modal modal[MAX_GEARS];
     gk_flank_tables flank[MAX_GEARS];
-    double *far[MAX_GEARS]; /* (z, FAR, FAR): what the patterns on a tooth displace by a load so many teeth before it */
-    int far_on[MAX_GEARS];  /* the gear has several engagements, and something in it is not dynamic */
+    gk_real *far[MAX_GEARS]; /* (z, FAR, LANES): what the patterns on a tooth displace by a load so many teeth before */
+    int far_on[MAX_GEARS];   /* the gear has several engagements, and something in it is not dynamic */
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];
     int islands;

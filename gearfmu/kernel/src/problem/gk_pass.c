@@ -1,0 +1,383 @@
+/* What the forces of an island do to all of its rows: pushed to spins, ground group, modes and far teeth, and read by
+ * the same numbers. Rows read what their own engagement does with the rest; its matrices only tell that apart
+ * (gk_couple.c). Forces come as those of the step, z; λ + f_d, under which what is quasi-static in it yields; λ alone,
+ * whose deflection stores energy. */
+#include "problem/gk_pass.h"
+#include "force/gk_turn.h"
+#include "problem/gk_exchange.h"
+#include "problem/gk_far.h"
+#include "problem/gk_felt.h"
+
+/* ---- forces ------------------------------------------------------------------------------------------------------ */
+/* a clutch knows no A; friction counts with all that forces do */
+static void forces_of(const gk_setup *setup, gk_engaged *engaged, gk_moment when)
+{
+    const gk_system *s = &engaged->system;
+    gk_forces *f = &engaged->forces;
+    const int start = when == ALONG_START;
+    const double *late = when == PRESENT ? s->force : s->force0; /* given torques may have changed */
+    for (int i = 0; i < s->stride; i++) {
+        const int row = i < s->n, yields = row && s->kind[i] != ROW_CLUTCH;
+        f->of[STEP][i] = row && !start ? s->z[i] : 0.0;
+        f->of[ONCE][i] = !yields ? 0.0 : start ? s->force0[i] + s->end0[i] : s->force[i] + s->end[i];
+        f->of[AT_ONCE][i] = yields ? late[i] : 0.0;
+        if (!GK_ON(setup, friction)) continue;
+        const gk_glide *glide = engaged->glide;
+        const int rubs = i < s->contacts;
+        f->along[STEP][i] = rubs && !start ? glide->step[i] : 0.0;
+        f->along[ONCE][i] = !rubs ? 0.0 : start ? glide->start_end[i] : glide->end[i];
+    }
+}
+
+void gk_pass_forces(const gk_coupled *c, gk_moment when)
+{
+    for (int e = 0; e < c->model->engagements; e++)
+        if (gk_is_within(c, e)) forces_of(c->setup, &c->work->engaged[e], when);
+}
+
+/* ---- pushing ----------------------------------------------------------------------------------------------------- */
+/* where forces on a side's part of the ground group are summed, and what moves is read: patterns or oscillators */
+static gk_real *ground_of(const gk_coupled *c, const gk_engaged *engaged, int w, gk_real *const *oscillators,
+                          gk_real (*patterns)[MAX_GEARS][MOST_PATTERNS], int t)
+{
+    const gk_mesh *mesh = &c->setup->mesh[engaged->index];
+    return engaged->by_patterns[w] ? patterns[t][mesh->side[w].gear] : oscillators[t] + mesh->part[w].from;
+}
+
+/* gear by gear: nothing has been pushed yet */
+static void clear_gear(const gk_coupled *c, int g)
+{
+    gk_work *work = c->work;
+    const gk_base *base = &c->setup->base;
+    for (int t = 0; t < PUSHES; t++)
+        if (work->by_tables && base->patterns[g])
+            memset(work->push_pattern[t][g], 0, (size_t)base->patterns[g] * sizeof(gk_real));
+        else
+            memset(work->push_ground[t] + base->from[g], 0, (size_t)base->width[g] * sizeof(gk_real));
+    for (int t = 0; t < MOVES; t++) memset(work->move_modes[t][g], 0, (size_t)GK_LANES(c->setup, g) * sizeof(gk_real));
+}
+
+static void push_spins(const gk_coupled *c, int e, int first, int last)
+{
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    const gk_engaged *engaged = &c->work->engaged[e];
+    const int quads = engaged->system.stride / 4;
+    for (int t = first; t <= last; t++)
+        for (int l = 0; l < mesh->spins; l++) {
+            double *to = &c->work->push_spin[t][mesh->spin[l]];
+            *to += gk_dot_quads(engaged->system.rigid[l], engaged->forces.of[t], quads);
+            if (GK_ON(c->setup, friction) && t != AT_ONCE)
+                *to += gk_dot_quads(engaged->glide->rigid[l], engaged->forces.along[t], quads);
+        }
+}
+
+typedef struct acting { /* rows whose forces are not zero, those of contacts first */
+    int count, contacts, row[MAX_ROWS];
+    gk_real by[PUSHES][MAX_ROWS];
+} acting;
+
+static void list_acting(const double (*by)[MAX_STRIDE], int kinds, const gk_system *s, acting *p)
+{
+    int n = 0;
+    for (int i = 0; i < (kinds == PUSHES ? s->n : s->contacts); i++) {
+        const double x = by[STEP][i], y = by[ONCE][i], u = kinds == PUSHES ? by[AT_ONCE][i] : 0.0;
+        if (i == s->contacts) p->contacts = n;
+        p->row[n] = i, p->by[STEP][n] = (gk_real)x, p->by[ONCE][n] = (gk_real)y, p->by[AT_ONCE][n] = (gk_real)u;
+        n += x != 0.0 || y != 0.0 || u != 0.0;
+    }
+    p->count = n;
+    if (kinds < PUSHES || s->n == s->contacts) p->contacts = n;
+}
+
+typedef struct half_block { /* `count` of the rows that act, on some oscillators, `width` halves each */
+    const gk_half *row;
+    int width, count;
+    const acting *by;
+} half_block;
+
+/* sums of rows over `wide` halves from `at` on, with forces of the kinds `first` … `last` */
+GK_INLINE void sum_halves(half_block of, int at, gk_half *const out[PUSHES], const int wide, const int first,
+                          const int last)
+{
+    gk_half sum[PUSHES][8];
+    for (int t = first; t <= last; t++)
+        for (int k = 0; k < wide; k++) sum[t][k] = (gk_half){0};
+    for (int r = 0; r < of.count; r++) {
+        const gk_half *row = of.row + of.by->row[r] * of.width + at;
+        for (int t = first; t <= last; t++)
+            for (int k = 0; k < wide; k++) sum[t][k] += of.by->by[t][r] * row[k];
+    }
+    for (int t = first; t <= last; t++)
+        for (int k = 0; k < wide; k++) out[t][at + k] = sum[t][k];
+}
+
+GK_INLINE void sum_blocks(half_block of, gk_span halves, gk_half *const out[PUSHES], const int first, const int last)
+{
+    const int end = halves.from + halves.width;
+    int at = halves.from;
+    if (first == last)
+        for (; at + 8 <= end; at += 8) sum_halves(of, at, out, 8, first, last);
+    for (; at + 4 <= end; at += 4) sum_halves(of, at, out, 4, first, last);
+    for (; at + 2 <= end; at += 2) sum_halves(of, at, out, 2, first, last);
+    if (at < end) sum_halves(of, at, out, 1, first, last);
+}
+
+/* sums of the kinds that a pass asks for */
+static void sum_all(half_block of, gk_span halves, gk_half *const out[PUSHES], int parts)
+{
+    switch (parts) {
+    case 1: sum_blocks(of, halves, out, STEP, ONCE); break;
+    case 2: sum_blocks(of, halves, out, AT_ONCE, AT_ONCE); break;
+    default: sum_blocks(of, halves, out, STEP, AT_ONCE);
+    }
+}
+
+/* what a gear's modes move by the sums, turned from the tooth to its axes: all lanes by mobility, the first of either
+ * half by κ too */
+static void move_modes(const gk_coupled *c, int e, int w, gk_half *const sum[PUSHES], int parts)
+{
+    const int g = c->setup->mesh[e].side[w].gear;
+    const gk_modal *m = &c->setup->modal[g];
+    const gk_flow *flow = &c->k->flow[g];
+    const int half = m->n / LANES, yields = gk_halves(flow->softest), tooth = c->work->engaged[e].position[w].tooth;
+    const gk_half *cosine = (const gk_half *)m->cosine + tooth * half, *sine = (const gk_half *)m->sine + tooth * half;
+    const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
+    gk_half *to = (gk_half *)c->work->move_modes[WHOLE][g], *once = (gk_half *)c->work->move_modes[YIELDED][g];
+    for (int k = 0; k < half && (parts & 1); k++) {
+        gk_half a = mobility[k] * sum[STEP][k], b = mobility[half + k] * sum[STEP][half + k];
+        if (k < yields) a -= kappa[k] * sum[ONCE][k], b -= kappa[half + k] * sum[ONCE][half + k];
+        to[k] += a * cosine[k] - b * sine[k];
+        to[half + k] += a * sine[k] + b * cosine[k];
+    }
+    for (int k = 0; k < yields && (parts & 2); k++) {
+        const gk_half a = -kappa[k] * sum[AT_ONCE][k], b = -kappa[half + k] * sum[AT_ONCE][half + k];
+        once[k] += a * cosine[k] - b * sine[k];
+        once[half + k] += a * sine[k] + b * cosine[k];
+    }
+}
+
+/* forces on modes of both gears and on the ground group, by the rows of the gaps or of the sliding */
+static void push_rows(const gk_coupled *c, const gk_engaged *engaged, const acting *p, int along, int parts)
+{
+    gk_work *work = c->work;
+    gk_half *const sum[PUSHES] = {(gk_half *)work->turned, (gk_half *)work->turned_next, (gk_half *)work->scaled};
+    gk_real *const *basis = along ? engaged->glide->basis : engaged->basis;
+    int at = 0;
+    for (int w = 0; w < 2; w++) {
+        const int g = c->setup->mesh[engaged->index].side[w].gear, half = GK_LANES(c->setup, g) / LANES;
+        const int yields = gk_halves(c->k->flow[g].softest);
+        const half_block modes = {(const gk_half *)basis[w], 2 * half, p->contacts, p};
+        if (!half || c->k->timeless || (parts == 2 && !yields)) continue;
+        for (int from = 0; from < 2 * half; from += half) {
+            sum_all(modes, (gk_span){from, yields}, sum, parts);
+            if (parts & 1) sum_blocks(modes, (gk_span){from + yields, half - yields}, sum, STEP, STEP);
+        }
+        move_modes(c, engaged->index, w, sum, parts);
+    }
+    for (int w = 0; w < 2; at += gk_halves(engaged->wide[w++])) {
+        gk_half by[PUSHES][MAX_NEAR], *const out[PUSHES] = {by[0] - at, by[1] - at, by[2] - at};
+        const half_block ground = {(const gk_half *)(along ? engaged->glide->near : engaged->near), engaged->halves,
+                                   p->count, p};
+        const int halves = gk_halves(engaged->wide[w]);
+        sum_all(ground, (gk_span){at, halves}, out, parts);
+        for (int t = parts == 2 ? AT_ONCE : STEP; t <= (parts & 2 ? AT_ONCE : ONCE); t++) {
+            gk_half *to = (gk_half *)ground_of(c, engaged, w, work->push_ground, work->push_pattern, t);
+            for (int k = 0; k < halves; k++) to[k] += by[t][k];
+        }
+    }
+}
+
+static void push_bores(const gk_coupled *c, gk_engaged *engaged, int t)
+{
+    gk_bores *own = &engaged->own_bores[t];
+    memset(own, 0, sizeof *own);
+    gk_exchange_push_bores(c->setup, engaged, engaged->forces.of[t == WHOLE ? ONCE : AT_ONCE], own);
+    for (int p = 0; p < c->model->ports; p++) {
+        c->work->push_bores[t].moment[p] += own->moment[p];
+        c->work->push_bores[t].turned[p] += own->turned[p];
+    }
+}
+
+/* parts: 1 in the step, 2 at once */
+static void push_engagement(const gk_coupled *c, int e, int parts)
+{
+    gk_engaged *engaged = &c->work->engaged[e];
+    const gk_forces *f = &engaged->forces;
+    acting p;
+    push_spins(c, e, parts == 2 ? AT_ONCE : STEP, parts & 2 ? AT_ONCE : ONCE);
+    for (int t = 0; t < MOVES; t++)
+        if (parts & (1 << t)) push_bores(c, engaged, t);
+    gk_far_push(c->setup, engaged, f->of[AT_ONCE]);
+    list_acting(f->of, PUSHES, &engaged->system, &p);
+    if (p.count) push_rows(c, engaged, &p, 0, parts);
+    if (!GK_ON(c->setup, friction) || !(parts & 1)) return;
+    list_acting(f->along, AT_ONCE, &engaged->system, &p);
+    if (p.count) push_rows(c, engaged, &p, 1, 1);
+}
+
+/* ---- what moves -------------------------------------------------------------------------------------------------- */
+static void move_spins(const gk_coupled *c)
+{
+    gk_work *work = c->work;
+    for (int d = 0; d < c->setup->spins; d++) {
+        const double mobility = c->k->rigid_mobility * c->setup->inverse_inertia[d];
+        const double kappa = c->k->rigid_kappa * c->setup->inverse_inertia[d];
+        work->yield_spin[d] = kappa * work->push_spin[ONCE][d];
+        work->move_spin[WHOLE][d] = mobility * work->push_spin[STEP][d] - work->yield_spin[d];
+        work->move_spin[YIELDED][d] = -kappa * work->push_spin[AT_ONCE][d];
+    }
+}
+
+static void move_ground(const gk_coupled *c, gk_span span)
+{
+    gk_work *work = c->work;
+    const gk_ground_flow *flow = &c->k->ground;
+#define FOUR(array) (((gk_four *)(array))[i])
+    for (int i = span.from / 4; i < (span.from + span.width) / 4; i++) {
+        const gk_four mobility = __builtin_convertvector(((const gk_quad *)flow->mobility)[i], gk_four);
+        const gk_four kappa = __builtin_convertvector(((const gk_quad *)flow->kappa)[i], gk_four);
+        FOUR(work->move_ground[WHOLE]) = mobility * FOUR(work->push_ground[STEP]) -
+                                         kappa * FOUR(work->push_ground[ONCE]);
+        FOUR(work->move_ground[YIELDED]) = -kappa * FOUR(work->push_ground[AT_ONCE]);
+    }
+#undef FOUR
+}
+
+/* ---- reading ----------------------------------------------------------------------------------------------------- */
+typedef struct seen { /* displacements, and rows on them, `width` halves each */
+    const gk_half *row, *y;
+    int width, halves;
+} seen;
+
+/* `each` rows side by side, whose sums do not wait for each other */
+GK_INLINE void read_some(const seen *parts, int count, int i, double *read, const int each)
+{
+    gk_half sum[5];
+    for (int l = 0; l < each; l++) sum[l] = (gk_half){0};
+    for (int p = 0; p < count; p++) {
+        const int width = parts[p].width;
+        const gk_half *rows = parts[p].row + i * width, *y = parts[p].y;
+        for (int k = 0; k < parts[p].halves; k++)
+            for (int l = 0; l < each; l++) sum[l] += rows[l * width + k] * y[k];
+    }
+    for (int l = 0; l < each; l++) read[i + l] += gk_across(&sum[l]);
+}
+
+static void read_parts(const seen *parts, int count, int i, int end, double *read)
+{
+    for (; i + 5 <= end; i += 5) read_some(parts, count, i, read, 5);
+    for (; i + 3 <= end; i += 3) read_some(parts, count, i, read, 3);
+    for (; i < end; i++) read_some(parts, count, i, read, 1);
+}
+
+/* adds what rows read of ground group and modes: those of the gaps, joints included, or of the sliding */
+static void read_group(const gk_coupled *c, const gk_engaged *engaged, int t, int along, double *read)
+{
+    gk_work *work = c->work;
+    gk_real *const *basis = along ? engaged->glide->basis : engaged->basis,
+                   *turned[2] = {work->turned, work->turned_next};
+    const gk_system *s = &engaged->system;
+    seen parts[6];
+    int count = 0, at = 0;
+    for (int w = 0; w < 2; w++) {
+        const int g = c->setup->mesh[engaged->index].side[w].gear, width = 2 * GK_LANES(c->setup, g) / LANES;
+        const int yields = gk_halves(c->k->flow[g].softest);
+        const gk_half *row = (const gk_half *)basis[w], *y = (const gk_half *)turned[w];
+        if (!width || c->k->timeless || (t == YIELDED && !yields)) continue;
+        gk_turn_back(&c->setup->modal[g], engaged->position[w].tooth, work->move_modes[t][g], turned[w]);
+        if (t == WHOLE) {
+            parts[count++] = (seen){row, y, width, width};
+            continue;
+        }
+        parts[count++] = (seen){row, y, width, yields};
+        parts[count++] = (seen){row + width / 2, y + width / 2, width, yields};
+    }
+    const int modes = count;
+    for (int w = 0; w < 2; at += gk_halves(engaged->wide[w++])) {
+        const gk_half *y = (const gk_half *)ground_of(c, engaged, w, work->move_ground, work->move_pattern, t);
+        const gk_half *row = (const gk_half *)(along ? engaged->glide->near : engaged->near) + at;
+        parts[count++] = (seen){row, y, engaged->halves, gk_halves(engaged->wide[w])};
+    }
+    read_parts(parts, count, 0, s->contacts, read);
+    if (!along) read_parts(parts + modes, count - modes, s->contacts, s->n, read);
+}
+
+static void read_bores(const gk_coupled *c, const gk_engaged *engaged, int t, double *read)
+{
+    gk_bores others;
+    for (int p = 0; p < c->model->ports; p++) {
+        others.moment[p] = c->work->push_bores[t].moment[p] - engaged->own_bores[t].moment[p];
+        others.turned[p] = c->work->push_bores[t].turned[p] - engaged->own_bores[t].turned[p];
+    }
+    gk_exchange_read_bores(c->setup, engaged, &others, read);
+}
+
+/* what rows of an engagement read: WHOLE or YIELDED; far: of far teeth */
+static void read_rows(const gk_coupled *c, int e, int t, const double *far)
+{
+    gk_engaged *engaged = &c->work->engaged[e];
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    double *read = engaged->moved[t];
+    gk_solve_times(s, engaged->rest, engaged->forces.of[t == WHOLE ? ONCE : AT_ONCE], read);
+    read_group(c, engaged, t, 0, read);
+    for (int l = 0; l < mesh->spins; l++) {
+        gk_axpy(c->work->move_spin[t][mesh->spin[l]], s->rigid[l], read, 0, s->stride / 4);
+        for (int i = s->n - s->clutches; i < s->n && t == WHOLE; i++)
+            read[i] += c->work->yield_spin[mesh->spin[l]] * s->rigid[l][i];
+    }
+    read_bores(c, engaged, t, read);
+    gk_axpy(1.0, far, read, 0, s->stride / 4);
+}
+
+/* what the sliding of contacts reads, without what is not dynamic in their own engagement */
+static void read_along(const gk_coupled *c, int e)
+{
+    gk_engaged *engaged = &c->work->engaged[e];
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    gk_clear(engaged->glide->moved_along, engaged->system.stride / 4);
+    read_group(c, engaged, WHOLE, 1, engaged->glide->moved_along);
+    for (int l = 0; l < mesh->spins; l++)
+        gk_axpy(c->work->move_spin[WHOLE][mesh->spin[l]], engaged->glide->rigid[l], engaged->glide->moved_along, 0,
+                engaged->system.stride / 4);
+}
+
+/* ---- the pass ---------------------------------------------------------------------------------------------------- */
+static void push_all(const gk_coupled *c, int parts)
+{
+    gk_work *work = c->work;
+    memset(work->push_spin, 0, sizeof work->push_spin);
+    memset(work->push_bores, 0, sizeof work->push_bores);
+    for (int g = 0; g < c->model->gears; g++) clear_gear(c, g);
+    for (int e = 0; e < c->model->engagements; e++)
+        if (gk_is_within(c, e)) push_engagement(c, e, parts);
+}
+
+void gk_pass(const gk_coupled *c, int whole, int at_once)
+{
+    GK_ASSERT(whole || at_once);
+    const gk_base *base = &c->setup->base;
+    push_all(c, whole + 2 * at_once);
+    move_spins(c);
+    for (int g = 0; g < c->model->gears; g++)
+        if (!c->work->by_tables || !base->patterns[g]) move_ground(c, (gk_span){base->from[g], base->width[g]});
+    if (c->work->by_tables) gk_felt_move(c, whole, at_once);
+    gk_far_move(c->work);
+    for (int e = 0; e < c->model->engagements; e++) {
+        double far[MAX_STRIDE];
+        if (!gk_is_within(c, e)) continue;
+        gk_far_read(c->setup, &c->work->engaged[e], far);
+        if (whole) read_rows(c, e, WHOLE, far);
+        if (at_once) read_rows(c, e, YIELDED, far);
+        if (whole && GK_ON(c->setup, friction)) read_along(c, e);
+    }
+}
+
+void gk_pass_unit(const gk_coupled *c, int from, int row)
+{
+    GK_ASSERT(gk_is_within(c, from) && row < c->work->engaged[from].system.n);
+    for (int e = 0; e < c->model->engagements; e++)
+        memset(&c->work->engaged[e].forces, 0, sizeof c->work->engaged[e].forces);
+    c->work->engaged[from].forces.of[AT_ONCE][row] = 1.0;
+    gk_pass(c, 0, 1);
+}
