@@ -6,6 +6,7 @@
 #include "problem/gk_system.h"
 
 static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
+static const double FOUNDATION = 8.0; /* 1/k over the sum of both bodies' 2 (1 − ν²)/(πE) */
 
 /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
 static void straighten(const gk_engagement *e, gk_laws *law)
@@ -44,16 +45,35 @@ static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh
     law->phi_high = law->high * law->high * (0.5 * secant_high - 0.125 * law->a - 0.5 * law->slope_high) + law->phi_log;
 }
 
+/* Parts of a line of contact close place after place, in the order of their gaps 0 = d₁ ≤ d₂ …: on a foundation of
+ * stiffness k per length the j-th but first closes at f = k (j/Q)(d_{j+1} − mean of d₁ … d_j), Q = GAPS places. */
+static void set_closing(const gk_system *s, int i, gk_laws *law)
+{
+    gk_quad sum = GK_ALL(0.0);
+    for (int j = 1; j < GAPS; j++) {
+        const gk_quad next = *(const gk_quad *)(s->opens[j - 1] + i);
+        law->closes[j - 1] = (j * next - sum) / (GAPS * s->yields);
+        sum += next;
+    }
+}
+
 /* the laws of all contacts of a problem, by their curvatures */
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
 {
     GK_ASSERT(s->contacts >= 0 && s->contacts <= MAX_CONTACTS);
-    for (int i = s->contacts; i % 4; i++) s->curvature[i] = s->curvature[0];
-    for (int i = 0; i < s->contacts; i += 4) set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
+    s->yields = mesh->yields;
+    for (int i = s->contacts; i % 4; i++) {
+        s->curvature[i] = s->curvature[0];
+        for (int k = 0; k < GAPS - 1; k++) s->opens[k][i] = 0.0;
+    }
+    for (int i = 0; i < s->contacts; i += 4) {
+        set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
+        if (s->yields > 0.0) set_closing(s, i, &s->law[i / 4]);
+    }
 }
 
 /* half-widths at which the logarithm begins and ends */
-void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
+void gk_law_bounds(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
     GK_ASSERT(gk_is_engagement(model, mesh->index));
     const gk_engagement *e = &model->engagement[mesh->index];
@@ -62,6 +82,9 @@ void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
     mesh->square_low = B_LOW < 0.5 * widest ? B_LOW * B_LOW : 0.25 * mesh->square_high;
     mesh->log_low = gk_log(mesh->square_low);
     mesh->log_high = gk_log(mesh->square_high);
+    mesh->yields = 0.0;
+    if (mesh->rides && GK_ON(setup, hertz) && !GK_ON(setup, film))
+        mesh->yields = FOUNDATION * (model->gear[e->gear[0]].local + model->gear[e->gear[1]].local);
 }
 
 /* ln x of four normal numbers, as gk_log */
@@ -76,10 +99,27 @@ GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
     *out = n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
 }
 
+/* Adds what parts yield of which j of Q places have closed, (Q/j − 1) f/k + mean of d₁ … d_j, as a sum over the
+ * intervals of f between closings; slope and ∫ f dδ likewise. */
+GK_INLINE void add_closing(const gk_laws *law, double yields, const gk_quad *f, gk_quad *d, gk_quad *slope,
+                           gk_quad *energy)
+{
+    gk_quad from = GK_ALL(0.0);
+    for (int j = 1; j < GAPS; j++) {
+        const double yield = yields * ((double)GAPS / j - 1.0);
+        const gk_quad to = law->closes[j - 1], least = GK_CHOOSE(*f < to, *f, to);
+        const gk_quad here = j > 1 ? GK_CHOOSE(least > from, least, from) : least;
+        *d += yield * (here - from);
+        *energy += 0.5 * yield * (here * here - from * from);
+        *slope += GK_CHOOSE((*f < to) & (here == *f), GK_ALL(yield), GK_ALL(0.0));
+        from = to;
+    }
+}
+
 /* δ, δ′ and ∫ λ dδ of four contacts of lengths `width` (per_width: their inverse, 0 where there is none); λ ≤ 0 follows
  * the straight line through the origin, for iterates only */
 GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double *width, const double *per_width,
-                           double *delta, double *yield, double *potential)
+                           double yields, double *delta, double *yield, double *potential)
 {
     const gk_quad per = *(const gk_quad *)per_width, f = *(const gk_quad *)force * per;
     gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = law->slope_high,
@@ -95,6 +135,7 @@ GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double
         energy = GK_CHOOSE(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f),
                            GK_CHOOSE(high, energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
     }
+    if (yields > 0.0) add_closing(law, yields, &f, &d, &slope, &energy);
     *(gk_quad *)delta = d;
     *(gk_quad *)yield = slope * per;
     *(gk_quad *)potential = energy * *(const gk_quad *)width;
@@ -107,8 +148,8 @@ double gk_law_slope(const gk_system *s, int i, double force)
     const int first = i / 4 * 4;
     const gk_quad forces = GK_ALL(force);
     double delta[4], yield[4], potential[4];
-    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, delta, yield,
-                potential);
+    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, s->yields, delta,
+                yield, potential);
     return yield[i % 4];
 }
 
@@ -117,6 +158,6 @@ void gk_law_apply(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
     for (int i = 0; i < s->contacts; i += 4)
-        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
-                    s->potential + i);
+        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->yields, s->delta + i,
+                    s->yield + i, s->potential + i);
 }

@@ -69,7 +69,11 @@ static double depth_of(const gk_posed *q, const gk_tooth_flanks *f, int which, d
     const double depth = relief(q->gear[which], GK_ON(q->setup, tip_relief), s, slope);
     if (!GK_HAS(flank_deviations) || !f->depth[which]) return depth;
     double own_slope;
-    const double own = gk_deviation_at(q->gear[which], f->depth[which], s, &own_slope);
+    double own = gk_deviation_at(q->gear[which], f->depth[which], s, &own_slope);
+    if (f->next[which]) {
+        double next_slope, next = gk_deviation_at(q->gear[which], f->next[which], s, &next_slope);
+        own += f->part[which] * (next - own), own_slope += f->part[which] * (next_slope - own_slope);
+    }
     *slope += own_slope;
     return depth + own;
 }
@@ -208,6 +212,6 @@ void gk_section_at(const gk_posed *q, const gk_tooth_flanks *f, const double rol
         here.beta[w] = f->beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
     }
     if (gk_section(q, &here, p, t)) return;
-    flank_contact(q, &s->l, &here, s->gap - f->closer + GK_OPEN, p);
+    flank_contact(q, &s->l, &here, s->gap - f->closer + f->open, p);
     flank_touch(q, &s->l, p, t);
 }

@@ -38,6 +38,9 @@ typedef struct gk_tooth_flanks {
     const gk_flank_side *side;
     double beta[2], closer; /* base angles; what the gap loses by the places of the teeth */
     const double *depth[2]; /* along the roll, beside involute and tip relief (eq. 5a); NULL: nothing */
+    const double *next[2];  /* the same at the next place across the width, NULL: at all places … */
+    double part[2];         /* … and the share of the way to it */
+    double open;            /* gap past ends of flanks whose tip edges do not carry, m */
 } gk_tooth_flanks;
 
 /* Where a transverse section touches: direction of the force on B, and the point halfway between the teeth from the

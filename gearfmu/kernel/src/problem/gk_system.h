@@ -25,6 +25,7 @@ typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 /* local laws of four contacts side by side */
 typedef struct gk_laws {
     gk_quad c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
+    gk_quad closes[GAPS - 1]; /* forces at which further places of a part close */
 } gk_laws;
 
 typedef struct gk_system {
@@ -38,6 +39,8 @@ typedef struct gk_system {
     double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
     double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
     double curvature[MAX_STRIDE];                    /* of the contacts, 1/m */
+    double opens[GAPS - 1][MAX_STRIDE];              /* of parts of lines of contact: gk_point.opens, m */
+    double yields;                                   /* gk_mesh.yields; 0: contacts close as a whole */
     gk_laws law[MAX_STRIDE / 4];                     /* laws of the contacts, per metre */
     double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
     double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
@@ -202,7 +205,7 @@ GK_HOT void gk_balance_plain(const gk_island *island);
 GK_HOT void gk_balance_solve(const gk_island *island);
 /* gk_law.c */
 GK_HOT void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s);
-GK_HOT void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
+GK_HOT void gk_law_bounds(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 GK_HOT double gk_law_slope(const gk_system *s, int i, double force);
 GK_HOT void gk_law_apply(gk_system *s);
 #endif
