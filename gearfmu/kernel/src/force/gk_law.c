@@ -83,7 +83,7 @@ void gk_law_bounds(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
     mesh->log_low = gk_log(mesh->square_low);
     mesh->log_high = gk_log(mesh->square_high);
     mesh->yields = 0.0;
-    if (mesh->rides && GK_ON(setup, hertz) && !GK_ON(setup, film))
+    if (mesh->rides && GK_ON(setup, hertz))
         mesh->yields = FOUNDATION * (model->gear[e->gear[0]].local + model->gear[e->gear[1]].local);
 }
 

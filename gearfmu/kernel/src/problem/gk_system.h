@@ -98,7 +98,8 @@ struct gk_island {
 /* Squeeze film of an engagement in a step (gk_film.c); zeros in rows without */
 typedef struct gk_film {
     double step;                /* h; 0: no time passes, the speed of approach is given */
-    double cut, inverse_root;   /* roughness r; (H + r)^-½ */
+    double cut[MAX_STRIDE], inverse_root[MAX_STRIDE]; /* r: roughness, of a part of a line of contact more by the mean
+                                                         of its gaps over the least; (H + r)^-½ */
     double factor[MAX_STRIDE];  /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
     double open[MAX_STRIDE];    /* thickness d0 at the start */
     double speed[MAX_STRIDE];   /* of approach, where that is given */
