@@ -75,7 +75,8 @@ static int modulo(int64_t k, int z)
 /* one tooth pair; 0 when it does not come within `search_distance` */
 static int tooth_pair(const gk_posed *q, const gk_flank_side *s, int k, double search_distance, gk_place *p)
 {
-    gk_tooth_flanks f = {s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL}, {NULL}, {0.0}, GK_OPEN};
+    gk_tooth_flanks f = {
+        s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL}, {NULL}, {0.0}, GK_OPEN};
     double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
     p->key.flank = p->flank = s->flank;
     p->key.tooth = k;

@@ -5,7 +5,7 @@
  * differentiable. */
 #include "problem/gk_system.h"
 
-static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
+static const double B_LOW = 5e-6;     /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
 static const double FOUNDATION = 8.0; /* 1/k over the sum of both bodies' 2 (1 − ν²)/(πE) */
 
 /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
@@ -68,6 +68,7 @@ void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mes
     }
     for (int i = 0; i < s->contacts; i += 4) {
         set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
+        s->law[i / 4].yields = GK_ALL(s->yields);
         if (s->yields > 0.0) set_closing(s, i, &s->law[i / 4]);
     }
 }
@@ -101,17 +102,16 @@ GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
 
 /* Adds what parts yield of which j of Q places have closed, (Q/j − 1) f/k + mean of d₁ … d_j, as a sum over the
  * intervals of f between closings; slope and ∫ f dδ likewise. */
-GK_INLINE void add_closing(const gk_laws *law, double yields, const gk_quad *f, gk_quad *d, gk_quad *slope,
-                           gk_quad *energy)
+GK_INLINE void add_closing(const gk_laws *law, const gk_quad *f, gk_quad *d, gk_quad *slope, gk_quad *energy)
 {
     gk_quad from = GK_ALL(0.0);
     for (int j = 1; j < GAPS; j++) {
-        const double yield = yields * ((double)GAPS / j - 1.0);
+        const gk_quad yield = law->yields * ((double)GAPS / j - 1.0);
         const gk_quad to = law->closes[j - 1], least = GK_CHOOSE(*f < to, *f, to);
         const gk_quad here = j > 1 ? GK_CHOOSE(least > from, least, from) : least;
         *d += yield * (here - from);
         *energy += 0.5 * yield * (here * here - from * from);
-        *slope += GK_CHOOSE((*f < to) & (here == *f), GK_ALL(yield), GK_ALL(0.0));
+        *slope += GK_CHOOSE((*f < to) & (here == *f), yield, GK_ALL(0.0));
         from = to;
     }
 }
@@ -119,7 +119,7 @@ GK_INLINE void add_closing(const gk_laws *law, double yields, const gk_quad *f, 
 /* δ, δ′ and ∫ λ dδ of four contacts of lengths `width` (per_width: their inverse, 0 where there is none); λ ≤ 0 follows
  * the straight line through the origin, for iterates only */
 GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double *width, const double *per_width,
-                           double yields, double *delta, double *yield, double *potential)
+                           double *delta, double *yield, double *potential)
 {
     const gk_quad per = *(const gk_quad *)per_width, f = *(const gk_quad *)force * per;
     gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = law->slope_high,
@@ -135,7 +135,7 @@ GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double
         energy = GK_CHOOSE(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f),
                            GK_CHOOSE(high, energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
     }
-    if (yields > 0.0) add_closing(law, yields, &f, &d, &slope, &energy);
+    if (law->yields[0] > 0.0) add_closing(law, &f, &d, &slope, &energy);
     *(gk_quad *)delta = d;
     *(gk_quad *)yield = slope * per;
     *(gk_quad *)potential = energy * *(const gk_quad *)width;
@@ -148,8 +148,8 @@ double gk_law_slope(const gk_system *s, int i, double force)
     const int first = i / 4 * 4;
     const gk_quad forces = GK_ALL(force);
     double delta[4], yield[4], potential[4];
-    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, s->yields, delta,
-                yield, potential);
+    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, delta, yield,
+                potential);
     return yield[i % 4];
 }
 
@@ -158,6 +158,6 @@ void gk_law_apply(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
     for (int i = 0; i < s->contacts; i += 4)
-        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->yields, s->delta + i,
-                    s->yield + i, s->potential + i);
+        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
+                    s->potential + i);
 }

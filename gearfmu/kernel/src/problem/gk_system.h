@@ -25,7 +25,7 @@ typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 /* local laws of four contacts side by side */
 typedef struct gk_laws {
     gk_quad c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
-    gk_quad closes[GAPS - 1]; /* forces at which further places of a part close */
+    gk_quad yields, closes[GAPS - 1]; /* of parts: gk_mesh.yields; forces at which further places close */
 } gk_laws;
 
 typedef struct gk_system {
@@ -97,12 +97,12 @@ struct gk_island {
 
 /* Squeeze film of an engagement in a step (gk_film.c); zeros in rows without */
 typedef struct gk_film {
-    double step;                /* h; 0: no time passes, the speed of approach is given */
+    double step;                                      /* h; 0: no time passes, the speed of approach is given */
     double cut[MAX_STRIDE], inverse_root[MAX_STRIDE]; /* r: roughness, of a part of a line of contact more by the mean
                                                          of its gaps over the least; (H + r)^-½ */
-    double factor[MAX_STRIDE];  /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
-    double open[MAX_STRIDE];    /* thickness d0 at the start */
-    double speed[MAX_STRIDE];   /* of approach, where that is given */
+    double factor[MAX_STRIDE];                        /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
+    double open[MAX_STRIDE];                          /* thickness d0 at the start */
+    double speed[MAX_STRIDE];                         /* of approach, where that is given */
     double sinks[MAX_STRIDE];   /* 1: time passes, z = λ1 + min(λ1, closes) − λ0 + η: what a film carries is a mean */
     double lift[MAX_STRIDE];    /* 1: z grows by twice the force */
     double at_open[MAX_STRIDE]; /* I(d0) */

@@ -7,6 +7,8 @@ static const double BROKEN = 0.5; /* of all energy there is: what the balance ma
 static const double LEAK = 0.01;  /* … beside this of what passed the ports: what is left grows with that in any run */
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
+enum { EVERY_SLICE_IS_A_VARIABLE = 1 / (V_SLICE_20 - V_SLICE_1 + 1 == MAX_SLICES) }; /* gk_variables.inc */
+
 /* adds the force of a contact to those of the slices of the width */
 static void add_slice(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int i, double force,
                       double *slice)

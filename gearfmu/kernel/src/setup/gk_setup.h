@@ -102,7 +102,7 @@ typedef struct gk_side {
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
 } gk_side;
 
-typedef struct gk_line { /* of contact of a tooth pair, z (m) in the engagement's width */
+typedef struct gk_line {    /* of contact of a tooth pair, z (m) in the engagement's width */
     double end[2], edge[2]; /* its ends; tip edges */
     double missing;         /* of the least length, 0 … 1: the pair has left its flanks, or is about to reach them */
 } gk_line;
@@ -152,8 +152,8 @@ typedef struct gk_mesh { /* an engagement */
     gk_deviation deviation[2];     /* of gear A and of gear B, by strip */
     double protrusion;             /* what places of teeth and flanks may close of a gap, m */
     int runs_out;                  /* a toothing does not run true */
-    int rides;                     /* strips are parts of the line of contact and move with it, not slices of the width */
-    double yields;                 /* 1/k: what a part yields more, before all of it has closed (gk_law.c), m²/N */
+    int rides;     /* strips are parts of the line of contact and move with it, not slices of the width */
+    double yields; /* 1/k: what a part yields more, before all of it has closed (gk_law.c), m²/N */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high;                               /* bounds of b² in the local law, and their ln */
     gk_nodes nodes[2];                          /* nodal contact: of gear A and of gear B */
