@@ -78,10 +78,20 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         if len(meshes) > 1:
             click.echo(mesh)
         _tell(result)
+        _tell_slices(model, torques, mesh)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
     _end(model, torques, failed)
+
+
+def _tell_slices(model: Any, torques: Sequence[float], mesh: str | None = None) -> None:
+    """What the number of slices of a helical stage leaves open."""
+    from gearfmu.stage.run.refinement import left_of_slices
+
+    left = left_of_slices(model, torques, mesh)
+    if left is not None:
+        click.echo(f"{'':14}{left.text}")
 
 
 def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
@@ -134,6 +144,7 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     _tell(result)
+    _tell_slices(model, torques)
     for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")

@@ -3,7 +3,6 @@ how much of a result is due to their number."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -45,10 +44,12 @@ class Change:
         return f"orders 1 to {ORDERS} change by at most {1e9 * self.length:.2g} nm{level} with {self.slices} slices"
 
 
-def left_of_slices(model: StageModel, torques: Sequence[float], mesh: str | None = None) -> Change | None:
-    """Of the default number of slices under these torques (N·m on the input); None for spur stages, and where a
-    torque has no equilibrium."""
-    own = model.stage.slices
+def left_of_slices(
+    model: StageModel, torques: Sequence[float], mesh: str | None = None, slices: int | None = None
+) -> Change | None:
+    """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
+    where a torque has no equilibrium."""
+    own = slices or model.stage.slices
     finer = twice(model.stage, own)
     if finer == own:
         return None
