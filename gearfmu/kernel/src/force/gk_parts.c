@@ -63,14 +63,19 @@ static double lead_at(const gk_posed *q, int flank, double z)
     return sum;
 }
 
-/* a section at z with all that opens it there; the gradient is that of a force at `middle` */
-static void section(const gk_posed *q, const gk_place *place, gk_tooth_flanks *f, const double roll[2], double z,
-                    gk_point *p, gk_touch *t)
+typedef struct cut { /* a section at z */
+    double z;
+    gk_point point;
+    gk_touch touch;
+} cut;
+
+/* the section at z with all that opens it there */
+static void cut_line(const gk_posed *q, const gk_place *place, gk_tooth_flanks *f, const double roll[2], cut *at)
 {
-    take_fields(q, place, z, f);
-    gk_section_at(q, f, roll, z, p, t);
-    gk_parts_lean(q, f->side->sg, t, z, p);
-    p->gap += q->mesh->cosine * lead_at(q, f->side->flank, z);
+    take_fields(q, place, at->z, f);
+    gk_section_at(q, f, roll, at->z, &at->point, &at->touch);
+    gk_parts_lean(q, f->side->sg, &at->touch, at->z, &at->point);
+    at->point.gap += q->mesh->cosine * lead_at(q, f->side->flank, at->z);
 }
 
 static void order(double *a, double *b)
@@ -107,21 +112,23 @@ int gk_parts_find(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], d
     place->gap = GK_OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         const gk_part part = gk_strips_part(q->setup, &line, i);
-        gk_point *p = &place->point[i], end;
-        gk_touch t, there;
-        for (int k = i ? 2 : 0; k < 3; k += 2) {
-            section(q, place, f, roll, part.end[k / 2], &end, &there);
-            gap[k] = end.gap;
+        const double z[3] = {part.end[0], part.end[1], part.middle};
+        const int into[3] = {0, 2, 1};
+        gk_point *p = &place->point[i];
+        cut at;
+        for (int k = i ? 1 : 0; k < 3; k++) {
+            at.z = z[k];
+            cut_line(q, place, f, roll, &at);
+            gap[into[k]] = at.point.gap;
         }
-        section(q, place, f, roll, part.middle, p, &t);
-        gap[1] = p->gap;
         if (part.flank != part.middle) {
             take_fields(q, place, part.flank, f);
-            gk_section_at(q, f, roll, part.flank, p, &t);
-            gk_parts_lean(q, sg, &t, part.middle, p);
+            gk_section_at(q, f, roll, part.flank, &at.point, &at.touch);
+            gk_parts_lean(q, sg, &at.touch, part.middle, &at.point);
         }
+        *p = at.point;
         profile(gap, gradual, p);
-        if (GK_ON(q->setup, friction)) gk_parts_glide(q, sg, &t, part.middle, p);
+        if (GK_ON(q->setup, friction)) gk_parts_glide(q, sg, &at.touch, part.middle, p);
         memcpy(p->end, part.end, sizeof p->end);
         p->share = (part.end[1] - part.end[0]) * q->setup->slices / q->e->width;
         place->gap = gk_min(place->gap, p->gap);

@@ -1,6 +1,8 @@
 /* Sections in space, and the parts of a line of contact (gk_parts.c). */
 #ifndef GK_PARTS_H
 #define GK_PARTS_H
+#include "base/gk_lanes.h"
+#include "force/gk_place.h"
 #include "force/gk_section.h"
 
 /* a section at z: gap, gradient and curvature along the normal in space; with friction, its sliding */

@@ -116,8 +116,8 @@ void gk_strips_spread(const gk_setup *setup, const gk_engagement *e, const doubl
 }
 
 /* The tip edge carries a line of contact on past the end of its flank: here by twice the half-width of the load patch,
- * where the gap of the edge is wider than deflections are; without end for spur teeth, which leave the flank as a whole.
- * Without contact of tip edges the line ends with its flank. */
+ * where the gap of the edge is wider than deflections are; without end for spur teeth, which leave the flank as a
+ * whole. Without contact of tip edges the line ends with its flank. */
 static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
 {
     if (!GK_ON(setup, tip_contact) || e->kind == MESH_FLAT) return 0.0;
