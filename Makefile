@@ -3,13 +3,14 @@ PYTHON ?= python3
 VENV   ?= .venv
 RUN     = $(VENV)/bin/python
 PIP     = $(RUN) -m pip install --quiet
-BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20"
+BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20" "plotly>=6"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
+PRICES  ?= phases steps fmu_overhead harness effects_cost levels
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
-EVIDENCE = $(RUN) evidence/ledger.py
+EVIDENCE = $(RUN) -m evidence.ledger
+TIER   ?= 1
 export JOBS
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -26,15 +27,15 @@ demo: $(VENV)/.base
 test: lint
 	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
-## make test-full   make test, then the slow tests; how those ended is kept in evidence/ledger.json
-test-full: test
-	$(EVIDENCE) make --again test-full
+## make test-full   the slow tests in six parts (PART=3: one of them); how each ended is kept in evidence/ledger.json
+test-full: $(STAMP)
+	$(EVIDENCE) make --again $(foreach part,$(or $(PART),1 2 3 4 5 6),test-full-$(part))
 
-## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists
+## make bench       prices on this machine, which should be idle: the tables of evidence/price and the stages' price lists
 bench: $(STAMP)
-	$(EVIDENCE) make --again $(BENCHMARKS)
+	$(EVIDENCE) make --again $(PRICES)
 
-## make stability   the hard cases at every level and step: evidence/stability.csv and .json, docs/stability.md
+## make stability   the hard cases: table and page
 stability: $(STAMP)
 	$(EVIDENCE) make --again stability
 
@@ -46,18 +47,20 @@ study: $(STAMP)
 study-bodies: $(STAMP)
 	$(EVIDENCE) make --again study_bodies
 
-## make evidence    what is stale of all tables, pictures and pages, and only that; some by name: TARGETS="phases study"
+## make evidence    stale tables, pictures and pages of README and study; TIER=2: of validation too; TARGETS="phases study"
 evidence: $(STAMP)
-	$(EVIDENCE) make $(TARGETS)
+	$(EVIDENCE) make --tier $(TIER) $(TARGETS)
 
-## make evidence-check  lists what is stale; fails where README.md shows any of it
+## make evidence-check  lists what is stale; fails where any of it is of tier 1 (README, study)
 evidence-check: $(STAMP)
 	$(EVIDENCE) check
 
-## make wheel       dist/*.whl with the linux64 and win64 kernels
+## make wheel       what a release uploads, checked: dist/*.whl with the linux64 and win64 kernels, dist/*.tar.gz
 wheel: $(STAMP)
-	$(RUN) -m pip install --quiet build
-	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --outdir dist
+	$(RUN) -m pip install --quiet build twine
+	rm -rf dist
+	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --sdist --outdir dist
+	$(RUN) -m twine check --strict dist/*
 
 ## make models      reduce all bodies of the model library again from their stage files (half an hour on two cores)
 models: $(STAMP)

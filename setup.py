@@ -1,12 +1,15 @@
 """Builds the kernel library into the package; everything else is in pyproject.toml.
 
+Reports carry plotly's script: the build takes this one file of 61 MB out of the package, which nobody needs afterwards.
 A source install builds the host's kernel only. GEARFMU_PLATFORMS="linux64 win64" (make wheel, with ziglang) puts
 several into one wheel; "none" leaves the library to whoever sets it (make, which compiles beside pip)."""
 
 import importlib.util
 import os
+import re
 import shutil
 import sys
+from importlib.metadata import distribution
 from pathlib import Path
 
 from setuptools import Distribution, setup
@@ -28,8 +31,33 @@ def kernel_build():
     return module
 
 
+def take_plotly():
+    """plotly.min.js and its licence beside the other scripts of reports."""
+    package = distribution("plotly")
+    script = next(p for p in package.files if p.name == "plotly.min.js")
+    licence = next(p for p in package.files if p.name.startswith("LICENSE") and ".dist-info" in p.parts[0])
+    for file, name in ((script, "plotly.min.js"), (licence, "plotly.LICENSE")):
+        shutil.copyfile(file.locate(), ROOT / "gearfmu" / "report" / "web" / name)
+
+
+def page_of_the_package():
+    """README.md for an index of packages: its links within the checkout become addresses of this version."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    source, version = (re.search(rf'^{key} = "(.+)"$', text, re.M)[1] for key in ("Source", "version"))
+
+    def absolute(match):
+        picture, link = match[1].startswith("!"), match[2]
+        if "://" in link or link.startswith("#"):
+            return match[0]
+        query = "?sanitize=true" if link.endswith(".svg") else ""  # else the file comes as text
+        return f"{match[1]}({source}/{'raw' if picture else 'blob'}/v{version}/{link}{query})"
+
+    return re.sub(r"(!?\[[^\[\]]*\])\(([^)\s]+)\)", absolute, (ROOT / "README.md").read_text(encoding="utf-8"))
+
+
 class BuildWithKernel(build_py):
     def run(self):
+        take_plotly()
         build = kernel_build()
         libraries = [build.build_library(platform) for platform in RELEASE] if NAMED else [build.current_library()]
         super().run()
@@ -57,6 +85,8 @@ class BinaryDistribution(Distribution):
 
 
 setup(
+    long_description=page_of_the_package(),
+    long_description_content_type="text/markdown",
     distclass=BinaryDistribution,
     cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
     setup_requires=kernel_build().build_requirements(NAMED),

@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
+    from gearfmu.api.stages import effects, efficiency, new
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
+    from gearfmu.fmu.validate import validate
     from gearfmu.stage.build.model import StageModel
     from gearfmu.stage.run.te import TeResult
     from gearfmu.stage.run.trace import Channel, Trace
@@ -49,9 +51,13 @@ __all__ = [
     "compare",
     "convert",
     "drive",
+    "effects",
+    "efficiency",
     "export",
     "load",
     "load_scene",
+    "modes",
+    "new",
     "plan",
     "reduce",
     "run",
@@ -59,6 +65,7 @@ __all__ = [
     "simulate",
     "sweep",
     "te",
+    "validate",
     "wound_up",
     "write_report",
 ]
@@ -68,8 +75,10 @@ _HOMES = {
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.settings": ("Settings",),
+    "api.stages": ("effects", "efficiency", "new"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
+    "fmu.validate": ("validate",),
     "stage.build.model": ("StageModel",),
     "stage.run.te": ("TeResult",),
     "stage.run.trace": ("Channel", "Trace"),
@@ -82,6 +91,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("gearfmu")
+    if name == "modes":  # the package, which can be called
+        return import_module("gearfmu.modes")
     for home, names in _HOMES.items():
         if name in names:
             found = getattr(import_module(f"gearfmu.{home}"), name)

@@ -7,6 +7,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 import click
 
@@ -40,7 +41,7 @@ VERBS = {
         "Loss of every mesh to friction of its flanks.",
     ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
-    "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),
+    "frf": ("gearfmu.commands.frf:frf", "Reduction of a body judged by its transfer matrix."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),
@@ -53,13 +54,9 @@ VERBS = {
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),
-    "stability": (
-        "gearfmu.commands.stability:stability",
-        "Run the hard cases at every level; exit code = number of failures.",
-    ),
     "effects": ("gearfmu.commands.effects:effects", "Effects: price of each, how to switch it."),
     "inspect": ("gearfmu.commands.files:inspect", "Show the contents of a stage, scene, body, trace or FMU."),
-    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; tables of variables, effects."),
+    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files."),
 }
 
 
@@ -74,6 +71,16 @@ class Verbs(click.Group):
             return None
         module, function = VERBS[name][0].split(":")
         return getattr(importlib.import_module(module), function)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click does, with the nearest verbs for one that there is not."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], VERBS, n=2, cutoff=0.6)
+            meant = f"; did you mean {' or '.join(near)}?" if near else ""
+            raise click.UsageError(f"there is no verb '{args[0]}'{meant}", ctx)
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Verbs"):

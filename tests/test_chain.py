@@ -198,7 +198,7 @@ def test_the_wheel_is_small(wheel: Path) -> None:
 @pytest.mark.needs("ziglang", "build")
 def test_the_wheel_is_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
     """Both kernels are in it and export the same names; the Windows one is not loaded here."""
-    from gearfmu.fmu.symbols import exported_symbols
+    from evidence.fmu_probes.symbols import exported_symbols
 
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
     with zipfile.ZipFile(wheel) as archive:

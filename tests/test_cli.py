@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.commands import shared, variables
+from gearfmu.commands import shared
 from gearfmu.stage.run.trace import Channel, Trace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -239,21 +239,6 @@ def test_schema_is_json_and_knows_the_fields(kind: str, tmp_path: Path, capsys: 
     made = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
     known = {"stage": "gears", "general": "engagements", "planetary": "carrier", "scene": "coupling"}
     assert known[kind] in made["properties"]
-
-
-def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = call("schema", "variables", capsys=capsys)
-    assert code == 0
-    assert (ROOT / "docs" / "variables.md").read_text(encoding="utf-8") == out, "run: make docs"
-
-
-def test_every_row_of_the_table_is_read() -> None:
-    source = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_variables.inc").read_text(encoding="utf-8")
-    found = variables.rows()
-    assert len(found) == source.count("GK_REAL, GK_") + source.count("GK_INTEGER, GK_") + source.count(
-        "GK_BOOLEAN, GK_"
-    ) + source.count("GK_ENUM, GK_")
-    assert all(row.description and row.exists in variables.WHEN for row in found)
 
 
 def small_trace(path: Path) -> Path:

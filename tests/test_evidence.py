@@ -1,4 +1,5 @@
-"""The ledger of evidence: every generated file has an entry, none was written without a record; how it ages."""
+"""The ledger of evidence: every generated file has an entry, none was written without a record; how it ages, is made,
+carried and shown."""
 
 from __future__ import annotations
 
@@ -8,14 +9,19 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from ledger import GOLDEN, Ledger, check, content, make
+
+from evidence import sources
+from evidence.ledger import Ledger, carry, check, make
+from evidence.pages_made import MARK, filled, made
+from evidence.sources import Sources, c_code, python_code
 
 ROOT = Path(__file__).resolve().parents[1]
-
+LAW = "gearfmu/kernel/src/force/gk_law.c"
 GENERATED = (
     r"evidence/.*\.(csv|json|png|svg)|docs/pictures/.*\.(png|svg)|docs/(stability|variables|effects)\.md|"
     r"gearfmu/.*\.csv|reduced_models/.*\.csv"
 )
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a checkout")
@@ -30,71 +36,242 @@ def test_no_file_was_written_without_a_record() -> None:
     ledger = Ledger()
     touched = {name: ledger.touched(entry) for name, entry in ledger.read().items()}
     wrong = {name: files for name, files in touched.items() if files}
-    assert not wrong, f"python evidence/ledger.py make --again {' '.join(wrong)} (or forget)"
+    assert not wrong, f"python -m evidence.ledger make --again {' '.join(wrong)} (or forget)"
 
 
 def test_inputs_exist_and_are_made_before_they_are_used() -> None:
     made: set[str] = set()
     for name, entry in reversed(Ledger().read().items()):
-        files = {need for need in entry["needs"] if not re.match(r"kernel|reduction$|stage ", need)}
+        files = {need for need in entry["needs"] if not re.match(r"kernel$|reduction$|code$|stage ", need)}
+        later = made & files if entry["tier"] == 1 else set()
         assert all(any(ROOT.glob(need)) for need in files), name
-        assert not made & files, f"{name} stands before what it is made from"
+        assert not later - made_below(name), f"{name} stands before what it is made from"
         made |= set(entry["makes"])
 
 
-def test_the_readme_shows_its_pictures_and_what_they_are_made_from() -> None:
-    assert Ledger().shown() == {"pictures", "cost", "study", "study_sets"}
+def made_below(name: str) -> set[str]:
+    """Files of later tiers, which a target takes as they are."""
+    entries = Ledger().read()
+    return {file for entry in entries.values() if entry["tier"] > entries[name]["tier"] for file in entry["makes"]}
+
+
+def test_inputs_follow_from_the_code_that_a_command_runs() -> None:
+    """Whoever loads the kernel ages with its sources; whoever uses what makes models names the model or that code."""
+    present = Sources(ROOT)
+    for name, entry in Ledger().read().items():
+        if "code" not in entry["needs"]:
+            continue
+        modules = present.modules(entry["command"])
+        assert any(module.startswith(("evidence/", "gearfmu/commands/", "tests/")) for module in modules), name
+        if name in ("cost", "pages", "mutants"):  # rows of a table; tables of the code; all of the code
+            continue
+        named = " ".join(entry["needs"])
+        if "evidence/" in entry["command"].replace(".", "/") and "gearfmu/kernel/instance.py" in modules:
+            assert "kernel" in entry["needs"] or "reduction" in entry["needs"], name
+        assert "stage " in named or "reduction" in named, name
+
+
+def test_what_the_readme_shows_is_of_tier_1() -> None:
+    shown = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    tiers = {file: entry["tier"] for entry in Ledger().read().values() for file in entry["makes"]}
+    assert shown and {tiers[file] for file in shown} == {1}
+
+
+def test_tiers_keep_their_time() -> None:
+    """Minutes of all commands at their last making: 40 on two cores, and 120, of which at least half run alone."""
+    minutes = {1: 0.0, 2: 0.0}
+    for name, entry in Ledger().read().items():
+        minutes[entry["tier"]] += 0.0 if name.startswith("test-full") else entry["minutes"] or 0.0
+    assert minutes[1] <= 40 and set(minutes) == {1, 2}
+
+
+# A trial: one constant is changed.
+
+
+@pytest.fixture()
+def current(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ledger:
+    """The ledger as if all of it had been made a moment ago; assembling models is left out."""
+    monkeypatch.setattr(sources, "stage_hash", lambda name: f"model of {name}")
+    ledger = Ledger()
+    entries, now = ledger.read(), ledger.sources()
+    for entry in entries.values():
+        entry["needs"] = {need: now.digest(need, entry["command"]) for need in entry["needs"]}
+    (tmp_path / "ledger.json").write_text(json.dumps(entries))
+    return Ledger(file=tmp_path / "ledger.json")
+
+
+def edited(ledger: Ledger, file: str, pattern: str, new: str) -> set[str]:
+    """Names of stale targets after an edit of a file, which must change it."""
+    text = (ROOT / file).read_text(encoding="utf-8")
+    after, count = re.subn(pattern, new, text, count=1, flags=re.MULTILINE)
+    assert count == 1 and after != text
+    code = python_code(after) if file.endswith(".py") else c_code(after)
+    return set(Ledger(file=ledger.file, edits={file: code.encode()}).stale())
+
+
+def test_a_constant_of_the_kernel_ages_all_that_runs_it(current: Ledger) -> None:
+    entries = current.read()
+    assert current.stale() == {}
+    stale = edited(current, LAW, r"\b0\.5\b", "0.51")
+    assert stale == {name for name, entry in entries.items() if "kernel" in entry["needs"]} | {"cost"}
+    assert {"study", "study_sets", "steps", "pictures", "stability", "energy", "plans"} <= stale
+    assert not {"frf", "modes_speed", "bore_on_shaft", "calculix_frequencies"} & stale
+
+
+def test_a_constant_of_the_reduction_ages_all_that_reduces(current: Ledger) -> None:
+    entries = current.read()
+    stale = edited(current, "gearfmu/reduction/carrier.py", r"^FINER = 1\.6", "FINER = 1.7")
+    assert stale == {name for name, entry in entries.items() if {"reduction", "gearfmu/**/*.py"} & set(entry["needs"])}
+    assert {"frf", "coarse", "reduce_own", "in_time", "exudyn", "study_bodies"} <= stale
+    assert not {"study", "steps", "stability", "pages"} & stale
+
+
+def test_code_behind_the_model_ages_what_uses_it(current: Ledger) -> None:
+    def touched(file: str) -> set[str]:
+        return edited(current, file, r"\A", "MORE = 1\n")
+
+    assert {"plans"} <= touched("gearfmu/planning/judge.py") and "study" not in touched("gearfmu/planning/judge.py")
+    assert {"study", "study_sets", "cost"} <= touched("gearfmu/cosim/coupled.py")
+    assert "energy" not in touched("gearfmu/cosim/coupled.py") and "energy" in touched("evidence/energy/energy.py")
+    assert not touched("evidence/energy/energy.py") - {
+        "energy",
+        "mutants",
+        *(f"test-full-{part}" for part in range(1, 7)),
+    }
+
+
+def test_words_about_code_are_no_input(current: Ledger) -> None:
+    assert not edited(current, LAW, r"\A", "/* why */ // how\n")
+    assert not edited(current, "gearfmu/study/norm.py", r"\A", "# why\n")
+    first = '"""Says what."""\n\n# why\nx = 1  # one\ny = "# two"\n'
+    second = '"""Says it\n\nbetter."""\nx = 1\n\ny = "# two"  # three\n'
+    assert python_code(first) == python_code(second) == 'x = 1\ny = "# two"'
+    assert c_code('a = 1; /* b\n c */\nd = "/* e */"; // f\n\n') == 'a = 1;\nd = "/* e */";'
+
+
+# Making, on a small tree.
 
 
 @pytest.fixture()
 def small(tmp_path: Path) -> Ledger:
-    """A table made from a stage file and the golden runs, a page made from the table, a picture that fails."""
+    """A table made from a stage file and the kernel, a page made from the table, a picture of tier 2 that fails."""
     targets = {
-        "table": ("sed s/in/out/ stage.toml > table.csv; echo done", ["kernel", "*.toml"], ["table.csv"]),
-        "page": ("cat table.csv > page.svg", ["table.csv"], ["page.svg"]),
-        "picture": ("echo no browser; exit 3", ["kernel"], []),
+        "table": (1, "cp stage.csv table.csv; echo done", ["kernel", "*stage.csv"], ["table.csv"]),
+        "page": (1, "cat table.csv > page.svg", ["table.csv"], ["page.svg"]),
+        "picture": (2, "echo no browser; exit 3", ["kernel"], []),
     }
     entries = {
-        name: {"command": command, "needs": dict.fromkeys(needs, ""), "makes": dict.fromkeys(makes, "")}
+        name: {"tier": tier, "command": command, "needs": dict.fromkeys(needs, ""), "makes": dict.fromkeys(makes, "")}
         | {"made": "", "minutes": None, "ended": ""}
-        for name, (command, needs, makes) in targets.items()
+        for name, (tier, command, needs, makes) in targets.items()
     }
-    (tmp_path / GOLDEN).parent.mkdir(parents=True)
-    (tmp_path / GOLDEN).write_text('{"float": {"loaded/fast": "12"}}')
-    (tmp_path / "stage.toml").write_text("in = 1\n")
-    (tmp_path / "README.md").write_text("![cost](page.svg)")
+    (tmp_path / "gearfmu/kernel/src").mkdir(parents=True)
+    (tmp_path / "gearfmu/kernel/src/gk_law.c").write_text("half = 0.5;")
+    (tmp_path / "stage.csv").write_text("name,z,s\n" + "".join(f"a{k},{k}.5,{k}\n" for k in range(5)))
+    (tmp_path / "README.md").write_text("Made <!-- made: table -->never<!-- -->.\n")
     (tmp_path / "ledger.json").write_text(json.dumps(entries))
     return Ledger(tmp_path, tmp_path / "ledger.json")
 
 
-def test_what_is_stale_is_made_and_only_that(small: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Ledger, "golden", lambda self: True)
+def test_what_is_stale_is_made_and_only_that(small: Ledger) -> None:
     said: list[str] = []
+    law = small.root / "gearfmu/kernel/src/gk_law.c"
     assert list(small.stale()) == ["table", "page", "picture"] and check(small, said.append) == 1
-    assert make(small, [], tell=said.append) == 1 and (small.root / "page.svg").read_text() == "out = 1\n"
-    assert small.stale() == {"picture": ["exit 3: no browser"]} and check(small, said.append) == 0
-    assert small.read()["table"]["ended"] == "done" and "1 of 3 stale" in said[-1]
-    (small.root / GOLDEN).write_text('{"float":\n {"loaded/fast": "12", "helical/friction": "7"}}')
-    assert list(small.stale()) == ["picture"]
-    (small.root / GOLDEN).write_text('{"float": {"loaded/fast": "13"}}')
+    assert make(small, [], tell=said.append) == 0 and (small.root / "page.svg").read_text().startswith("name,z")
+    assert small.stale() == {"picture": ["made from what is not known"]} and check(small, said.append) == 0
+    assert make(small, [], tier=2, tell=said.append) == 1 and small.stale() == {"picture": ["exit 3: no browser"]}
+    assert small.read()["table"]["ended"] == "done" and "failed: picture" in said[-1]
+    law.write_text("half = 0.51;")
     assert small.stale()["table"] == ["kernel moved"] and small.stale()["page"] == ["table.csv is stale"]
     assert make(small, ["table"], tell=said.append) == 0 and list(small.stale()) == ["picture"]
+    assert "1 made" in said[-1]
     (small.root / "table.csv").write_text("by hand")
     assert small.stale()["table"] == ["table.csv is not what was recorded"]
     small.record("table", {})
     assert small.stale()["table"] == ["made from what is not known"]
 
 
-def test_nothing_is_made_by_a_kernel_with_other_runs(small: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Ledger, "golden", lambda self: False)
-    with pytest.raises(SystemExit, match="golden_runs"):
-        make(small, [], tell=print)
-    assert not (small.root / "table.csv").exists()
+def test_a_crash_leaves_the_target_stale(small: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(small, ["table"], tell=str)
+    assert "table" not in small.stale()
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("evidence.ledger.run", killed)
+    with pytest.raises(KeyboardInterrupt):
+        small.make("table", again=True)
+    assert small.stale()["table"] == ["exit: interrupted"]
 
 
-def test_words_about_code_are_no_input(tmp_path: Path) -> None:
-    first, second, third = (tmp_path / f"{name}.py" for name in ("first", "second", "third"))
-    first.write_text('"""Says what."""\n\n# why\nx = 1  # one\n')
-    second.write_text('"""Says it\n\nbetter."""\nx = 1\n')
-    third.write_text("x = 2\n")
-    assert content(first) == content(second) != content(third)
+def test_pages_say_when_their_tables_were_made(small: Ledger) -> None:
+    make(small, ["table"], tell=str)
+    page = (small.root / "README.md").read_text()
+    assert page == f"Made <!-- made: table -->{made(small.read()['table'])}<!-- -->.\n" and "20" in page
+    entry = {"made": "2026-11-28", "commit": "a401c1e1d2b3", "tier": 2, "minutes": 3}
+    text = filled("<!-- tier: 2 -->\n<!-- -->", {"plans": entry}, ROOT)
+    assert "| plans | 2026-11-28, commit a401c1e1d2b3 | 3 |" in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_shows_ledger_and_tables_as_they_are(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert text == filled(text, Ledger().read(), ROOT / "evidence"), "python -m evidence.ledger pages"
+
+
+def test_pages_that_show_tables_of_tier_2_print_their_date() -> None:
+    marks = {mark[3] for page in PAGES for mark in MARK.finditer(page.read_text(encoding="utf-8")) if mark[2] == "made"}
+    assert {"stability", "plans", "frf", "in_time", "coarse", "imported_pinion", "coupling", "study_bodies"} <= marks
+    assert "<!-- tier: 2 -->" in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+
+
+def test_carried_is_what_three_rows_made_again_show(small: Ledger, tmp_path: Path) -> None:
+    make(small, ["table"], tell=str)
+    (small.root / "gearfmu/kernel/src/gk_law.c").write_text("half = 1.0 / 2.0;")
+    said: list[str] = []
+    assert carry(small, "table", "rewritten", None, [], said.append) == 0 and len(said) == 3
+    assert small.stale()["table"] == ["kernel moved"]
+    names = [word for line in said for word in re.findall(r"a\d", line)]
+    again = tmp_path / "again.csv"
+    again.write_text("name,z,s\n" + "".join(f"{n},{n[1]}.5000000001,9\n" for n in names))
+    assert carry(small, "table", "rewritten", again, [], said.append) == 1
+    assert carry(small, "table", "rewritten", again, ["s"], said.append) == 0 and "table" not in small.stale()
+    entry = small.read()["table"]
+    assert entry["carried"]["reason"] == "rewritten" and len(entry["carried"]["rows"]) == 3
+    again.write_text("name,z,s\n" + "".join(f"{n},{n[1]}.51,9\n" for n in names))
+    assert carry(small, "table", "rewritten", again, ["s"], said.append) == 1
+    make(small, ["table"], again=True, tell=str)
+    assert "carried" not in small.read()["table"]
+
+
+def test_two_at_a_time_unless_alone_and_after_their_inputs(small: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    import threading
+    import time
+
+    entries = small.read()
+    entries |= {"other": dict(entries["picture"], tier=1, command="true"), "price": dict(entries["picture"], tier=1)}
+    entries["price"] |= {"alone": True, "command": "true"}
+    small.file.write_text(json.dumps(entries))
+    running, seen, lock = set[str](), list[tuple[str, frozenset[str]]](), threading.Lock()
+
+    def watched(command: str, *_: object) -> tuple[int, str]:
+        with lock:
+            running.add(command)
+        time.sleep(0.1)
+        with lock:
+            seen.append((command, frozenset(running)))
+            running.discard(command)
+        if command == entries["table"]["command"]:
+            (small.root / "table.csv").write_text("a\n1\n")
+        return 0, ""
+
+    entries["price"]["command"] = "true  # alone"
+    small.file.write_text(json.dumps(entries))
+    monkeypatch.setattr("evidence.ledger.run", watched)
+    make(small, [], tell=str)
+    together = dict(seen)
+    table = entries["table"]["command"]
+    assert len(seen) == 4 and ("true" in together[table] or table in together["true"])
+    assert together["true  # alone"] == {"true  # alone"}
+    order = [command for command, _ in seen]
+    assert order.index(entries["table"]["command"]) < order.index(entries["page"]["command"])

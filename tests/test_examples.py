@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
+import wave
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.run.trace import Channel, Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 BASE_RADIUS = 0.5 * 4.5e-3 * 16 * 0.9396926207859084  # m, pinion of fzg_c
@@ -95,6 +102,49 @@ def test_read_a_trace(tmp_path: Path) -> None:
     text = example("read_a_trace.py", tmp_path / "trace.h5", cwd=tmp_path)
     first = re.search(r"mesh order 1: +(-?[\d.]+) dB re 1 N at (\d+) Hz", text)
     assert first and float(first[2]) == pytest.approx(16 * 2000 / 60, abs=2)
+
+
+def test_a_run_is_heard_at_its_level(tmp_path: Path) -> None:
+    """A tone of 40 N: 29.0 dB re 1 N, full scale 1 dB above its peak."""
+    time = np.arange(25_000) * 2e-5
+    tone = Channel(900 + 40 * np.sin(2 * np.pi * 950 * time), "N")
+    Trace(time, {"bearing.pinion.fy": tone}, {}).save(tmp_path / "trace.h5")
+    text = example("hear_a_run.py", tmp_path / "trace.h5", "bearing.pinion.fy", tmp_path / "s.wav", cwd=tmp_path)
+    rms, full = (float(re.search(pattern, text)[1]) for pattern in (r"([\d.]+) dB", r"peak of ([\d.]+)"))
+    assert rms == pytest.approx(20 * np.log10(40 / np.sqrt(2)), abs=0.35)  # ends, where the average reaches out
+    assert full == pytest.approx(45, rel=0.15)
+    with wave.open(str(tmp_path / "s.wav")) as file:
+        assert (file.getframerate(), file.getnframes()) == (48_000, 24_000)
+
+
+def test_a_pickup_on_the_ring_hears_the_planets_pass(tmp_path: Path) -> None:
+    """A mode under a ramp, against the closed form: q' = (1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t))/ω². Four planets
+    in alternating phase at 54 orders of the carrier: 52 and 56 are heard, 54 is not (McFadden and Smith, Proc. IMechE
+    199 (1985) 65)."""
+    example("ring_pickup.py", recorded(tmp_path), cwd=tmp_path)
+    pickup = runpy.run_path(str(ROOT / "examples" / "ring_pickup.py"), run_name="pickup")
+    omega, zeta, t = 700.0, 0.02, 1e-4 * np.arange(2000)
+    damped = omega * np.sqrt(1 - zeta**2)
+    swing = np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
+    exact = (1 - swing) / omega**2
+    found = pickup["modal_velocity"](t, 1e-4, omega, zeta)
+    assert np.allclose(found, exact, rtol=0.0, atol=1e-12 * np.abs(exact).max())
+    turns, step = 20, 2e-5  # a whole number of turns of the carrier, at 20 turns a second
+    angle = 2 * np.pi * 20 * step * np.arange(round(turns / 20 / step))
+    forces = {f"p{k}": 1000.0 + 50.0 * (-1) ** k * np.cos(54.0 * angle) for k in range(4)}
+    angles = {f"p{k}": angle + 0.5 * np.pi * k for k in range(4)}
+    velocity = pickup["rim_velocity"](load_bodies(load_stage("planetary54"))[2], step, forces, angles)
+    half = velocity[velocity.size // 2 :]
+    order = np.abs(np.fft.rfft(half))[[10 * k for k in (52, 53, 54, 55, 56)]]
+    assert min(order[0], order[4]) > 30 * order[1:4].max(), order
+
+
+def recorded(folder: Path) -> Path:
+    """A run of the set in a file, the forces of the ring alone."""
+    time = np.arange(2000) * 2e-5
+    channels = {f"ring_planet{k + 1}.force": Channel(1000 + 50 * np.sin(7e3 * time + k), "N") for k in range(4)}
+    Trace(time, channels | {"carrier.gear.phi": Channel(85.0 * time, "rad")}, {}).save(folder / "trace.h5")
+    return folder / "trace.h5"
 
 
 def test_every_example_has_its_test() -> None:

@@ -27,8 +27,9 @@ def errors(path: Path) -> dict[str, list[float]]:
     return found
 
 
+@pytest.mark.full
 def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
-    options = ["--scale", 0.3, "--lines", 30, "--loaded", "bolt*.ux,bolt*.uy", "--out", tmp_path]
+    options = ["--scale", 0.3, "--lines", 30, "--out", tmp_path]
     code, out, err = call(capsys, "planetary54", "carrier", *options)
     assert code == 0, err
     assert "24 inputs, held at its ground, rotations times 45 mm, 1 % damping" in out
@@ -48,7 +49,7 @@ def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
 
 def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path, capsys) -> None:
     """24 inputs: four whole blocks of the five that 100 vectors would begin."""
-    options = ["--scale", 0.3, "--lines", 5, "--methods", "rubin,krylov", "--size", 100, "--out", tmp_path]
+    options = ["--scale", 0.2, "--lines", 5, "--methods", "rubin,krylov", "--size", 100, "--out", tmp_path]
     code, out, err = call(capsys, "planetary54", "carrier", *options)
     assert code == 0, err
     assert "krylov has 96 vectors where 100 were asked for: it takes whole blocks of one vector per input" in out
@@ -57,12 +58,12 @@ def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path, capsys) ->
 
 @pytest.mark.full
 def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path, capsys) -> None:
-    options = ["--scale", 0.3, "--lines", 12, "--free", "--methods", "modal:10, static:90", "--out", tmp_path]
+    options = ["--scale", 0.3, "--lines", 12, "--free", "--methods", "modal:10, rubin:90", "--out", tmp_path]
     code, out, err = call(capsys, "fzg_c", "pinion", *options)
     assert code == 0, err
     found = errors(tmp_path / "pinion_frf.csv")
-    assert set(found) == {"modal", "static"} and all(len(values) == 12 for values in found.values())
-    assert "reduced free, judged with bore held" in out and found["static"][0] < 1e-6 < found["modal"][0]
+    assert set(found) == {"modal", "rubin"} and all(len(values) == 12 for values in found.values())
+    assert "reduced free, judged with bore held" in out and found["rubin"][0] < 1e-6 < found["modal"][0]
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,6 @@ def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path, capsys) -
     [
         (["planetary54", "wheel"], "no body 'wheel'; the stage has sun, planet, ring, carrier"),
         (["planetary54", "carrier", "--methods", "guyan"], "'guyan' is no method; there are modal, craig_bampton"),
-        (["planetary54", "carrier", "--scale", 0.4, "--loaded", "pin*"], "'pin\\*' matches none of bolt0.ux"),
         (["planetary54", "carrier", "--scale", 0.4, "--methods", "krylov", "--size", 20], "give at least that"),
         (["planetary54", "carrier", "--band", "5 kHz", "1 kHz", "--scale", 0.4], "from a lower to a higher frequency"),
     ],

@@ -68,7 +68,7 @@ def test_a_tiny_pair_is_coarse_in_seconds_and_meshes(
     path.write_text(text, encoding="utf-8")
     code, out, err = call(["reduce", "tiny", "--coarse"], capsys)
     assert code == 0, err
-    assert "evidence/coarse.csv" in out and "2 bodies reduced, 0 read" in out
+    assert "evidence/bodies/coarse.csv" in out and "2 bodies reduced, 0 read" in out
     assert sorted(p.name for p in (tmp_path / "tiny" / "coarse").iterdir()) == ["pinion.h5", "stage.toml", "wheel.h5"]
     assert "0 bodies reduced, 2 read" in call(["reduce", "tiny", "--coarse"], capsys)[1]
     code, out, err = call("te tiny/coarse --positions 4 --torque".split() + ["1 N*m", "--out", "te.csv"], capsys)

@@ -12,8 +12,9 @@ import fmpy
 import numpy as np
 import pytest
 
+from evidence.fmu_probes.everything import findings
 from gearfmu.body import reduce_bodies
-from gearfmu.fmu import export, validate
+from gearfmu.fmu import export
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.stage import load_stage
@@ -70,7 +71,7 @@ def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None
     assert pair.contact_ratio - 0.05 < pairs < pair.contact_ratio + 0.6  # tip corners carry beyond the path of contact
 
     fmu = export(model, tmp_path / "second.fmu")
-    assert validate(fmu) == []
+    assert findings(fmu) == []
     inputs = Steady(model, SPEED, LOAD)
     times = np.arange(0, 0.01 + STEP / 2, STEP)
     names = sorted(inputs(0.0))

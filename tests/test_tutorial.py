@@ -18,4 +18,6 @@ def test_scenes_load_the_tutorials_pair_within_its_torque_max() -> None:
     assert like is not None and scene is not None
     most, rig = load_stage(like[1]).torque_max, load_scene(scene[1]).test_rig
     assert rig is not None and abs(rig.torque) <= most
-    assert f"{rig.torque:g} N·m on the pinion" in page and f"made for {most:g} N·m" in page
+    assert f"the scene puts {rig.torque:g} N·m on the pinion" in page and f"{most:g} N·m here" in page
+    asked = re.search(r'--fmu my_pair.fmu --torque "(\d+) N\*m"', page)
+    assert asked is not None and float(asked[1]) <= most

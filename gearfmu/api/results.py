@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import warnings
+import webbrowser
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +21,7 @@ from gearfmu.api.settings import Starts
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
+from gearfmu.fmu.package import Extras
 from gearfmu.report import write
 from gearfmu.report.run import Run
 from gearfmu.spec.forms.members import Form
@@ -31,8 +36,8 @@ def export(
     stage: AnyStage,
     path: PathLike | None = None,
     runtime: str = "native",
-    platforms: Sequence[str] = ("host",),
-    terminals: bool = True,
+    platforms: Sequence[str] | None = None,
+    extras: Extras | None = None,
     **starts: Unpack[Starts],
 ) -> Path:
     """Export a stage as an FMI 2.0 co-simulation FMU; returns its path.
@@ -40,8 +45,10 @@ def export(
     stage : a name or path, a `load`ed stage, or an `assemble`d model (for other kinds of port and observed gears).
     path : <stage>.fmu in the working folder when None.
     runtime : "native", which needs nothing where it is imported, or "python" for hosts that are Python.
-    platforms : "host", "linux64", "win64"; others than the host's need gearfmu[cross].
-    terminals : with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
+    platforms : "host", "linux64", "win64", "darwin64"; all whose kernel is installed when None. The wheel has Linux's
+        and Windows'; a checkout makes others with gearfmu[cross].
+    extras : {"author": …, "copyright": …, "license": …} of the model; {"sources": True}: with the C sources;
+        {"terminals": True}: with terminalsAndIcons.xml, which some importers refuse (docs/howto-fmu.md).
     starts : start values of parameters (docs/variables.md): level="fast", slices=10. torque and speed, of the input:
         <path>_windup.csv beside the FMU lists the inputs with which it starts under that torque.
 
@@ -50,7 +57,7 @@ def export(
     model, wound = with_windup(model_of(stage), starts.pop("torque", None), starts.pop("speed", None))
     model = model.with_starts(parameters(model, starts))
     target = Path(f"{model.name}.fmu") if path is None else Path(path)
-    written = fmu.export(model, target, runtime, platforms, terminals)
+    written = fmu.export(model, target, runtime, platforms, **(extras or {}))
     if wound:
         write_starts(windup_file(target), model, wound)
     return written
@@ -82,27 +89,45 @@ def write_report(
     stage: PathLike | Form | None = None,
     home: PathLike | None = None,
     tell: Callable[[str], None] = warnings.warn,
-    sound: str | None = None,
 ) -> Path:
     """Write report.html of a trace into the folder `out`; returns its path.
 
     trace : a Trace, or the file of one.
-    stage : of the run, for the picture of the deformed gears; the one that the trace names when None.
+    stage : of the run, for the deformed gears; the one that the trace names when None.
     home : folder of the run's other files (deformation.h5); `out` when None.
-    tell : is called with a sentence where stage or bodies cannot be read and the report goes without that picture.
-    sound : the channel to be heard, a bearing or mesh force when None. TraceError for one that there is not.
+    tell : is called with a sentence where stage or bodies cannot be read and the report goes without them.
     """
     trace = trace if isinstance(trace, Trace) else Trace.load(trace)
-    summary = {**trace.meta, "sound": trace.chosen([sound])[0]} if sound is not None else trace.meta
     if not (stage or stage_of(trace.meta)):
-        return write(trace, summary, Path(out))
+        return write(trace, trace.meta, Path(out))
     try:
         spec, bodies = stage_and_bodies(trace.meta, stage)
         deformation = recorded_deformation(trace, Path(home or out))
-        return write(trace, summary, Path(out), spec, bodies, deformation)
+        return write(trace, trace.meta, Path(out), spec, bodies, deformation)
     except GearfmuError as error:
-        tell(f"the report goes without the deformed pair: {error}")
-        return write(trace, summary, Path(out))
+        tell(f"the report goes without the deformed gears: {error}")
+        return write(trace, trace.meta, Path(out))
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report that was written, at `path`."""
+
+    path: Path
+
+    def open(self) -> None:
+        """Open it in the browser."""
+        webbrowser.open(self.path.resolve().as_uri())
+
+    def _repr_html_(self) -> str:
+        """The whole page inside a notebook, which need not reach the file."""
+        text = escape(self.path.read_text(encoding="utf-8"), quote=True)
+        return f'<iframe srcdoc="{text}" style="width:100%;height:80vh;border:0"></iframe>'
+
+
+def shown(trace: Trace, folder: PathLike | None = None) -> Page:
+    """The report of a trace as a notebook shows it; `Trace.show`."""
+    return Page(write_report(trace, folder if folder is not None else tempfile.mkdtemp(prefix="gearfmu-")))
 
 
 def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike], path: PathLike) -> Path:

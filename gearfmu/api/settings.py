@@ -12,7 +12,7 @@ from gearfmu.api.quantities import Quantity
 from gearfmu.spec.scene import Level
 from gearfmu.spec.tables.profile import Profile
 
-Integrator: TypeAlias = Literal["dg4", "mix4", "em", "rk45", "central"]
+Integrator: TypeAlias = Literal["dg4", "em", "rk45", "central"]
 Settings = TypedDict(
     "Settings",
     {

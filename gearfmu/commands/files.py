@@ -30,11 +30,10 @@ def inspect(path: Path, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["stage", "general", "planetary", "scene", "variables", "effects"]))
+@click.argument("kind", type=click.Choice(["stage", "general", "planetary", "scene"]))
 @click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
-    """JSON schema of the stage.toml of a pair (stage), a general stage or a planetary set, or of scene.toml; or the
-    table of FMU variables (docs/variables.md) or effects (docs/effects.md)."""
+    """JSON schema of the stage.toml of a pair (stage), a general stage or a planetary set, or of scene.toml."""
     from gearfmu.files import write_text
 
     text = _schema_text(kind)
@@ -45,14 +44,6 @@ def schema(kind: str, out: Path | None) -> None:
 
 
 def _schema_text(kind: str) -> str:
-    if kind == "variables":
-        from gearfmu.commands.variables import variables_page
-
-        return variables_page()
-    if kind == "effects":
-        from gearfmu.commands.effects import effects_page
-
-        return effects_page()
     from gearfmu.spec.scene import SceneSpec
     from gearfmu.spec.schema import file_schema, general_schema, set_schema, stage_schema
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import progress_bar, stage_names
 
 OF_INPUT = ("torque", "speed")  # starts that are no parameters
 PORT_KINDS = ("spring", "torque", "fixed")
 
 
 @click.command()
-@click.argument("stage", required=False)
+@click.argument("stage", required=False, shell_complete=stage_names)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
 @click.option(
     "--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat."
@@ -35,9 +35,9 @@ PORT_KINDS = ("spring", "torque", "fixed")
     "--platform",
     "platforms",
     multiple=True,
-    type=click.Choice(["host", "linux64", "win64", "darwin64"]),
-    default=("host",),
-    help="Platforms to put in; others than the host's need the [cross] extra; may repeat.",
+    type=click.Choice(["host", "linux64", "win64", "darwin64", "aarch64-linux"]),
+    help="A platform to put in, may repeat; all whose kernel is installed when not given. A checkout makes others than "
+    "its own with the [cross] extra.",
 )
 @click.option(
     "--observe",
@@ -56,10 +56,13 @@ PORT_KINDS = ("spring", "torque", "fixed")
 )
 @click.option(
     "--terminals/--no-terminals",
-    default=True,
+    default=False,
     show_default=True,
-    help="The file terminalsAndIcons.xml, which some importers read wrongly: docs/howto-fmu.md.",
+    help="The file terminalsAndIcons.xml, which some importers refuse: docs/howto-fmu.md.",
 )
+@click.option("--author", default="", help="Author of the model, for its description.")
+@click.option("--copyright", default="", help='Copyright of the model: "(c) 2026 …".')
+@click.option("--license", default="", help="Licence of the model; that of the binary lies in the FMU anyway.")
 @click.option("--sources", is_flag=True, help="Also the C sources of the binary and how to build it.")
 def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], **how: Any) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
@@ -82,6 +85,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     model, inputs = with_windup(model, wound.get("torque"), wound.get("speed"))
     model = model.with_starts(parameters(model, tuple(s for s in starts if s.split("=")[0] not in OF_INPUT), "--start"))
     path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
+    how["platforms"] = how["platforms"] or None
     with progress_bar(f"export {model.spec.name}") as progress:
         progress(None, "writing")
         fmu.export(model, path, **how)

@@ -1,40 +1,49 @@
-"""The verb frf: reduction methods judged by the transfer matrix of a body."""
+"""The verb frf: a body of a stage, reduced, judged by its transfer matrix."""
 
 from __future__ import annotations
 
-import fnmatch
-import os
-import tracemalloc
+import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
-from gearfmu.commands.models import by_text
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, stage_names
 
 if TYPE_CHECKING:
-    from gearfmu.reduction.comparison import Contest
+    from gearfmu.reduction.basis import Size
     from gearfmu.reduction.full_order import FullOrder
+    from gearfmu.reduction.transfer import Judging, Reference
 
-HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded", "CPU s", "memory MB")
+HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "CPU s")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A method on the body: matrix (F, m, m) of the oscillators alone, error (F,) of it, mended (F,) with the static
+    residual, seconds of processor time beyond what methods before it had made."""
+
+    method: str
+    size: int
+    matrix: np.ndarray
+    error: np.ndarray
+    mended: np.ndarray
+    seconds: float
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.argument("body")
 @click.option(
     "--methods",
     default="modal,craig_bampton,rubin,krylov",
     show_default=True,
-    help="Methods, comma-separated: modal, craig_bampton, rubin, krylov, static, snapshots; 'krylov:240' has a size of "
-    "its own.",
+    help="Methods, comma-separated: those of a carrier's stage file; 'krylov:240' has a size of its own.",
 )
 @click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n, rigid modes aside.")
-@click.option("--tolerance", type=float, help="Instead of --size: the largest relative error allowed over the band.")
 @click.option(
     "--band",
     nargs=2,
@@ -49,10 +58,7 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
 @click.option("--lines", type=click.IntRange(2), default=400, show_default=True, help="Logarithmically spaced lines.")
 @click.option("--free/--held", default=False, help="Reduce the free body (as the kernel takes it) or, as the paper, "
               "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip
-@click.option("--loaded", help="Rows that are really loaded, as patterns: 'bolt*.ux,bolt*.uy'; judged once more alone.")
 @click.option("--scale", type=click.FloatRange(0.05, 4), help="Factor on the element counts of the stage.")
-@click.option("--jobs", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 3), show_default="cores, up to 3",
-              help="Processes (one where the system cannot fork).")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of results.")
 def frf(stage: str, body: str, **options: Any) -> None:
     """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
@@ -60,27 +66,21 @@ def frf(stage: str, body: str, **options: Any) -> None:
     Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error), a chart, and the transfer matrices
     themselves: <body>_H.npz for numpy.load.
     """
+    from gearfmu.reduction.transfer import Judging, reference
+
     entries = _entries(options)
     full = full_order_of(stage, body, options["scale"])
     full = full if options["free"] else full.grounded()
-    contest = _contest(full, entries, options)
-    from gearfmu.reduction.comparison import compare
-
-    tracemalloc.start()
-    with progress_bar(body) as progress:
-        found = compare(full, contest, by_text(progress), options["jobs"])
-    tracemalloc.stop()
+    judging = Judging.over(tuple(options["band"]), options["lines"], options["damping"])
+    exact = reference(full, judging)
+    trials = [_tried(full, exact, judging, *entry) for entry in entries]
     how = f"rotations times {1e3 * full.length:.4g} mm, {100 * options['damping']:g} % damping"
-    inputs = len(found.reference.labels)
-    click.echo(f"{body}: {full.size} unknowns, {inputs} inputs, {_ground(full, options)}, {how}")
-    for line in table(found.trials, contest):
+    click.echo(f"{body}: {full.size} unknowns, {len(exact.labels)} inputs, {_ground(full, options)}, {how}")
+    for line in [*_table(trials, judging), *_shortfalls(trials, entries)]:
         click.echo(line)
-    for line in shortfalls(found.trials, entries):
-        click.echo(line)
-    click.echo(f"reference: {found.reference.size} vectors, last change {found.reference.change:.1e}, "
-               f"{found.reference_seconds:.1f} s; all {found.seconds:.1f} s of processor time")  # fmt: skip
-    path = write_matrices(full, found, contest.judging, options["out"] / f"{body}_H.npz")
-    written = write(found, contest, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
+    click.echo(f"reference: {exact.size} vectors, last change {exact.change:.1e}")
+    path = _write_matrices(full, exact, trials, options["out"] / f"{body}_H.npz")
+    written = _write(exact, trials, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
     click.echo(", ".join(map(str, [*written, path])))
 
 
@@ -111,89 +111,70 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrde
     return gear_full_order(spec, body, **factor)
 
 
-def table(trials: Sequence[Any], contest: Any) -> list[str]:
+def _tried(full: FullOrder, exact: Reference, judging: Judging, method: str, size: Size) -> Trial:
+    from gearfmu.reduction.methods import METHODS
+    from gearfmu.reduction.oscillators import oscillators
+    from gearfmu.reduction.transfer import relative_error, transfer
+
+    clock = time.process_time()
+    model = oscillators(full, METHODS[method](full, size), judging.damping_ratio)
+    seconds = time.process_time() - clock
+    matrix = transfer(model, judging, full.ground)
+    mended = transfer(model, judging, full.ground, residual=True)
+    errors = relative_error(exact.matrix, matrix), relative_error(exact.matrix, mended)
+    return Trial(method, model.size, matrix, *errors, seconds)
+
+
+def _table(trials: Sequence[Trial], judging: Judging) -> list[str]:
     """The trials as lines of text."""
     rows: list[tuple[str, ...]] = [HEADER]
     for t in trials:
-        worst = contest.judging.frequency[t.error.argmax()]
-        errors = (f"{np.median(t.error):.1e}", f"{t.mended.max():.1e}", f"{t.loaded.max():.1e}")
-        cost = (f"{t.seconds:.1f}", f"{1e-6 * t.memory:.0f}")
-        rows.append((t.method, str(t.model.size), f"{t.error.max():.1e}", f"{worst:.0f}", *errors, *cost))
-    kept = [k for k, name in enumerate(HEADER) if name != "loaded" or contest.loaded is not None]
-    widths = [max(len(row[k]) for row in rows) for k in kept]
-    return ["  ".join(row[k].rjust(w) for k, w in zip(kept, widths, strict=True)) for row in rows]
+        errors = (f"{np.median(t.error):.1e}", f"{t.mended.max():.1e}", f"{t.seconds:.1f}")
+        at = f"{judging.frequency[t.error.argmax()]:.0f}"
+        rows.append((t.method, str(t.size), f"{t.error.max():.1e}", at, *errors))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(text.rjust(w) for text, w in zip(row, widths, strict=True)) for row in rows]
 
 
-def shortfalls(trials: Sequence[Any], entries: Sequence[tuple[str, Any]]) -> list[str]:
+def _shortfalls(trials: Sequence[Trial], entries: Sequence[tuple[str, Size]]) -> list[str]:
     """Trials, in the order of their entries, that have fewer vectors than were asked for."""
     return [
-        f"{t.method} has {t.model.size} vectors where {size.count} were asked for: it takes "
+        f"{t.method} has {t.size} vectors where {size.count} were asked for: it takes "
         + ("whole blocks of one vector per input" if t.method == "krylov" else "what there is")
-        + f"; a method of the same size is rubin:{t.model.size}"
+        + f"; a method of the same size is rubin:{t.size}"
         for t, (_, size) in zip(trials, entries, strict=True)
-        if size.count is not None and t.model.size < size.count
+        if t.size < size.count
     ]
 
 
-def write(found: Any, contest: Any, base: Path, title: str) -> list[Path]:
+def _write(exact: Reference, trials: Sequence[Trial], base: Path, title: str) -> list[Path]:
     """The CSV file (`method,n,frequency_Hz,error`) and the chart at `base` with their suffixes."""
     from gearfmu.files import write_text
-    from gearfmu.report.frf import label_of, write_error_chart
+    from gearfmu.report.frf import error_curves, write_error_chart
 
-    lines = ["method,n,frequency_Hz,error"]
-    curves = {"norm": (contest.judging.frequency, np.linalg.norm(found.reference.matrix, axis=(1, 2)))}
-    for t in found.trials:
-        pairs = zip(contest.judging.frequency, t.error, strict=True)
-        lines += [f"{t.method},{t.model.size},{f:.6g},{e:.4e}" for f, e in pairs]
-        curves[f"{label_of(t.method)}, n = {t.model.size}"] = (contest.judging.frequency, t.error)
     path = base.with_suffix(".csv")
-    write_text(path, "\n".join(lines) + "\n")
+    table, curves = error_curves(exact, [(t.method, t.size, t.error) for t in trials])
+    write_text(path, table)
     return [path, *write_error_chart(curves, base, title)]
 
 
-def write_matrices(full: FullOrder, found: Any, judging: Any, path: Path) -> Path:
+def _write_matrices(full: FullOrder, exact: Reference, trials: Sequence[Trial], path: Path) -> Path:
     """The transfer matrices as <path>.npz: frequency_Hz (F,), rows (m,) "bolt0.ux", length_m by which rotations are
     multiplied and moments divided, H_reference (F, m, m) and H_<method>_<n>, all in m/N; complex."""
     from gearfmu.files import written_whole
-    from gearfmu.reduction.transfer import transfer
 
-    matrices: dict[str, Any] = {
-        f"H_{t.method}_{t.model.size}": transfer(t.model, judging, full.ground) for t in found.trials
-    }
-    rows = np.array([".".join(label) for label in found.reference.labels])
+    matrices: dict[str, Any] = {f"H_{t.method}_{t.size}": t.matrix for t in trials}
+    rows = np.array([".".join(label) for label in exact.labels])
     with written_whole(path) as temporary:
-        np.savez_compressed(temporary, frequency_Hz=judging.frequency, rows=rows, length_m=full.length,
-                            H_reference=found.reference.matrix, **matrices)  # fmt: skip
+        np.savez_compressed(temporary, frequency_Hz=exact.judging.frequency, rows=rows, length_m=full.length,
+                            H_reference=exact.matrix, **matrices)  # fmt: skip
     return path
 
 
-def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:
-    """Indices of the rows "interface.component" that match one of the patterns (comma-separated); a usage error for
-    none."""
-    wanted = [pattern.strip() for pattern in patterns.split(",")]
-    names = [".".join(label) for label in labels]
-    found = [k for k, name in enumerate(names) if any(fnmatch.fnmatch(name, pattern) for pattern in wanted)]
-    if not found:
-        raise click.BadParameter(f"'{patterns}' matches none of {', '.join(names[:8])} …", param_hint="--loaded")
-    return np.array(found)
-
-
-def _contest(full: Any, entries: list[tuple[str, Any]], options: dict[str, Any]) -> Contest:
-    from gearfmu.reduction.comparison import Contest
-    from gearfmu.reduction.transfer import Judging
-
-    judging = Judging.over(tuple(options["band"]), options["lines"], options["damping"])
-    labels = [(i.name, c) for i in full.interfaces if i.name not in full.ground for c in i.components]
-    loaded = loaded_rows(labels, options["loaded"]) if options["loaded"] else None
-    return Contest(tuple(entries), judging, loaded)
-
-
-def _entries(options: dict[str, Any]) -> list[tuple[str, Any]]:
+def _entries(options: dict[str, Any]) -> list[tuple[str, Size]]:
     from gearfmu.reduction.basis import Size
     from gearfmu.reduction.methods import METHODS
 
-    band, tolerance = tuple(options["band"]), options["tolerance"]
-    general = Size(None if tolerance else options["size"], tolerance, band)
     entries = []
     for text in options["methods"].split(","):
         name, _, own = text.strip().partition(":")
@@ -202,11 +183,11 @@ def _entries(options: dict[str, Any]) -> list[tuple[str, Any]]:
                 f"'{text.strip()}' is no method; there are {', '.join(METHODS)}, each with ':n' behind it for a size",
                 param_hint="--methods",
             )
-        entries.append((name, replace(general, count=int(own), tolerance=None) if own else general))
+        entries.append((name, Size(int(own or options["size"]), tuple(options["band"]))))
     return entries
 
 
-def _ground(full: Any, options: dict[str, Any]) -> str:
+def _ground(full: FullOrder, options: dict[str, Any]) -> str:
     if options["free"] and full.ground:
         return f"reduced free, judged with {', '.join(full.ground)} held"
     if full.constraints is not None:

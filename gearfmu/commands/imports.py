@@ -8,12 +8,12 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, echo_pairs
+from gearfmu.commands.shared import Quantity, echo_pairs, stage_names
 
 
 @click.command(name="import")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.argument("stage", required=False)
+@click.argument("stage", required=False, shell_complete=stage_names)
 @click.argument("gear", required=False)
 @click.option("--length", type=Quantity("length_unit"), required=True, help='One length unit of the file: "1 mm".')
 @click.option(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, progress_bar, stage_names
 from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ COUPLED = (
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.option("--body", "name", metavar="NAME", help="Modes of this body, with pictures; without: of the whole stage.")
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")

@@ -59,10 +59,15 @@ class _Teeth(click.ParamType):
 @click.option("--planets", type=int, metavar="N", help="A planetary set with so many planets.")
 @click.option("--unequal", is_flag=True, help="Planets at the places nearest to even ones at which teeth fit.")
 @click.option("--module", type=Quantity("module"), help='Normal module: "2.5 mm".')
+@click.option("--diametral-pitch", type=float, metavar="P", help="In place of --module: teeth per inch, 25.4 mm/m_n.")
 @click.option("--width", type=Quantity("face_width"), help='Common face width: "30 mm".')
 @click.option("--center", type=Quantity("center_distance"), help="Centre distance; without it one is proposed.")
 @click.option("--helix", type=Quantity("helix_angle"), help='Helix angle of pinion or sun: "22 deg".')
 @click.option("--pressure-angle", type=Quantity("pressure_angle"), help="Normal pressure angle, 20 deg without it.")
+@click.option("--shift", "shifts", multiple=True, type=float, metavar="X",
+              help="Profile shift; twice, of pinion and wheel or of sun and planet.")  # fmt: skip
+@click.option("--bore", "bores", multiple=True, type=Quantity("bore"), help='Bore diameter, "30 mm"; twice, likewise.')
+@click.option("--relief", type=Quantity("relief"), help='Tip relief of these gears: "20 um", parabolic.')
 @click.option("--torque", type=Quantity("torque_max"), help="Largest torque of the pinion or the carrier.")
 @click.option("--speed", type=Quantity("speed_max"), help="Largest speed of the pinion or the carrier.")
 def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: Any) -> int:
@@ -70,7 +75,7 @@ def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: A
     proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
     from gearfmu.spec.proposals.new import new_stage
 
-    given = {key: value for key, value in numbers.items() if value not in (None, False)}
+    given = {key: value for key, value in numbers.items() if value not in (None, False, ())}
     forms = [word for word, there in (("--like", like), ("--rexs", rexs), ("--teeth", given)) if there]
     if len(forms) > 1:
         raise click.UsageError(f"{' and '.join(forms)} are different ways to begin: choose one")
@@ -87,10 +92,10 @@ def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
     """The stage file of teeth, module and width, and the shape that it proposes."""
     from gearfmu.spec.forms.expand import as_general
     from gearfmu.spec.forms.shapes import centre_distance
-    from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
+    from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
     from gearfmu.spec.stage import load_stage
 
-    path = new_from_numbers(name, Wish(**({"teeth": ()} | given)))
+    path = new_from_numbers(name, wish_of(given))
     spec = load_stage(path)
     stage = as_general(spec)
     mesh = stage.engagements[0]

@@ -7,12 +7,12 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.runs import with_step
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.runs import changed_scene
+from gearfmu.commands.shared import Quantity, progress_bar, scene_names
 
 
 @click.command()
-@click.argument("scene")
+@click.argument("scene", shell_complete=scene_names)
 @click.option(
     "--output", "outputs", multiple=True, required=True,
     help="Judged outputs: te, bearing.pinion.fx, bearing.pinion, mesh.force …; may repeat.",
@@ -20,6 +20,9 @@ from gearfmu.commands.shared import Quantity, progress_bar
 @click.option("--band", nargs=2, required=True, metavar="LOW HIGH", help='Where it is judged, "200 Hz" "5 kHz".')
 @click.option("--budget", help='Largest error of the levels in the band, "1 dB".')
 @click.option("--waveform", help='Largest error of the waveforms in the band after a common delay, "5 %".')
+@click.option("--stage", help="Another STAGE than the scene's.")
+@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
+@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
 @click.option("--step", type=Quantity("step"), help="Another communication step than the scene's.")
 @click.option(
     "--may-drop", "force", multiple=True, metavar="EFFECT",
@@ -34,10 +37,8 @@ def plan(scene: str, outputs: tuple[str, ...], band: tuple[str, str], out: Path,
     `gearfmu run --plan`; exit code 1 where no set but the full model keeps the budget."""
     from gearfmu.api.plans import plan as make
     from gearfmu.planning.table import plan_text
-    from gearfmu.spec.scene import load_scene
 
-    spec, step = load_scene(scene), how.pop("step")
-    spec = spec if step is None else with_step(spec, step)
+    spec = changed_scene(scene, **{key: how.pop(key) for key in ("step", "stage", "torque", "speed")})
     jobs, scheduler, force = how.pop("jobs"), how.pop("scheduler"), how.pop("force")
     with progress_bar(spec.name) as progress:
         how["tell"] = lambda text: progress(None, text)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.spec.scene import SceneSpec
 
 DEMO_STEP = 20e-6  # s
 OUT = click.Path(path_type=Path, file_okay=False)
@@ -27,7 +30,7 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
 
 
 @click.command()
-@click.argument("scene", required=False)
+@click.argument("scene", required=False, shell_complete=scene_names)
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
 @click.option(
     "--plan",
@@ -51,23 +54,25 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 @click.option("--stage", help="Another STAGE than the scene's; with --fmu the one that the FMU must be of.")
 @click.option("--step", type=Quantity("step"), help="Another communication step than the scene's: 20 us for spectra.")
+@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
+@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
+@level_option
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
 )
-def run(scene: str | None, out: Path | None, stage: str | None, step: float | None, **how: Any) -> int:
+def run(scene: str | None, out: Path | None, stage: str | None, **how: Any) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
-    from gearfmu.spec.scene import load_scene
-
+    changed = {key: how.pop(key) for key in ("torque", "speed", "level", "step")}
     if how["fmu_path"] is not None and how["unit"] == "kernel":
         raise click.UsageError("--fmu is run as an FMU: leave --unit kernel away")
     if how["plan_path"] is not None:
-        if scene is not None or stage is not None or step is not None or how["verify"]:
-            raise click.UsageError("--plan names scene, stage and step itself, and verifies by spot checks: give none")
+        if scene is not None or stage is not None or how["verify"] or set(changed.values()) != {None}:
+            remedy = "--plan names scene, stage, load, level and step itself, and verifies by spot checks: give none"
+            raise click.UsageError(remedy)
         return run_plan(how["plan_path"], out, _unit(how))
     if scene is None:
         raise click.UsageError("name a SCENE, or a plan with --plan")
-    spec = load_scene(scene)
-    spec = spec if step is None else with_step(spec, step)
+    spec = changed_scene(scene, **changed)
     return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=_unit(how), verify=how["verify"])
 
 
@@ -77,7 +82,7 @@ def _unit(how: dict[str, Any]) -> Any:
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.option("--torque", type=Quantity("torque"), help='Torque on the input, "302 N*m".')
 @click.option("--speed", type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
 @click.option(
@@ -108,6 +113,7 @@ def _unit(how: dict[str, Any]) -> Any:
     metavar="NAME=VALUE",
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
+@level_option
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
@@ -117,6 +123,8 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
     from gearfmu.spec.tables.profile import read_profile
     from gearfmu.stage.run.steady import Drive, steady_run
 
+    level = drive.pop("level")
+    settings = (*settings, f"level={level}") if level else settings
     if profile is None and (missing := [f"--{name}" for name in ("torque", "speed") if drive[name] is None]):
         raise click.UsageError(f"give {' and '.join(missing)}, or a --profile")
     driven = Drive(**drive, profile=None if profile is None else read_profile(profile))
@@ -157,15 +165,14 @@ def deformed(path: Path, stage: str | None, out: Path | None) -> None:
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
-@click.option("--stage", help="STAGE of the run, for the picture of the deformed gears.")
+@click.option("--stage", help="STAGE of the run, for the deformed gears.")
 @click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
-@click.option("--sound", metavar="CHANNEL", help="Channel to be heard: data/sound.wav and in the page.")
-def report(path: Path, stage: str | None, out: Path | None, sound: str | None) -> None:
+def report(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
     from gearfmu.api.results import trace_file, write_report
 
     source = trace_file(path)
-    click.echo(write_report(source, out or source.parent, stage, source.parent, _tell, sound))
+    click.echo(write_report(source, out or source.parent, stage, source.parent, _tell))
 
 
 @click.command()
@@ -181,12 +188,22 @@ def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -
     click.echo(write(dict(zip(names, paths, strict=True)) if names else paths, out or Path("comparison.html")))
 
 
-def with_step(scene: Any, step: float) -> Any:
+def changed_scene(scene: str, step: float | None = None, **others: object) -> SceneSpec:
+    """The SceneSpec of SCENE with another communication step (s), torque, speed, level or stage where one is given."""
+    from gearfmu.spec.scene import load_scene
+
+    keys = {"level": "stage.level", "stage": "stage.name"}
+    changes = {keys.get(key, key): value for key, value in others.items() if value is not None}
+    spec = load_scene(scene, changes)
+    return spec if step is None else with_step(spec, step)
+
+
+def with_step(scene: SceneSpec, step: float) -> SceneSpec:
     """The SceneSpec with another communication step (s)."""
     return scene.model_copy(update={"coupling": scene.coupling.model_copy(update={"step": step})})
 
 
-def run_scene(scene: Any, out: Path, **options: Any) -> int:
+def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
     from gearfmu.api.results import recorded_deformation, stage_and_bodies
     from gearfmu.api.runs import run as run_it

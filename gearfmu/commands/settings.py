@@ -22,3 +22,8 @@ def parameters(model: StageModel, settings: tuple[str, ...], option: str = "--se
         return steady.parameters(model, {name: value for name, _, value in pairs})
     except ModelError as error:
         raise click.BadParameter(str(error), param_hint=option) from None
+
+
+def level_of(model: StageModel, level: str | None) -> dict[str, float]:
+    """The kernel parameter of --level; none where it is not given."""
+    return parameters(model, (f"level={level}",), "--level") if level else {}

@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
+LEVELS = ("rigid", "fast", "standard", "full", "paper", "explicit")
 Progress = Callable[..., None]
 _EVERY = 9.0  # s between lines of progress where there is no terminal
 
@@ -47,6 +49,29 @@ class Quantity(click.ParamType):
             field = "" if param is None else param.opts[0].lstrip("-")
             raise SpecError([Problem("", field, str(value), refusal)])
         return number
+
+
+def level_option(command: Callable[..., object]) -> Callable[..., object]:
+    """--level, which means the same on every verb that computes."""
+    return click.option("--level", type=click.Choice(LEVELS), help="Fidelity level, standard when not given.")(command)
+
+
+def stage_names(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Shipped stages that begin so, for the completion of shells; files where there is none."""
+    from gearfmu.spec.reading.library import shipped_stages
+
+    return _completed(shipped_stages(), begun)
+
+
+def scene_names(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
+    """As `stage_names` for scenes."""
+    from gearfmu.spec.scene import shipped_scenes
+
+    return _completed(shipped_scenes(), begun)
+
+
+def _completed(names: Iterable[str], begun: str) -> list[CompletionItem]:
+    return [CompletionItem(name) for name in names if name.startswith(begun)] or [CompletionItem(begun, type="file")]
 
 
 @contextmanager

@@ -9,11 +9,11 @@ from typing import Any
 import click
 
 from gearfmu.commands.models import by_text, reducing
-from gearfmu.commands.shared import echo_pairs
+from gearfmu.commands.shared import echo_pairs, stage_names
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.option("--gear", "only", metavar="NAME", help="Only this body: a gear's name, or the carrier.")
 @click.option(
     "--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts."
@@ -46,7 +46,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder of the .h5 files; beside the stage file when not given."
 )

@@ -9,12 +9,12 @@ from typing import Any
 import click
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_names
 from gearfmu.errors import SimulationError
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", shell_complete=stage_names)
 @click.option(
     "--torque",
     "torques",
@@ -44,6 +44,7 @@ from gearfmu.errors import SimulationError
     help="Bores of all gears: averaging (they may deform about their mean motion) or rigid (on stiff shafts); as the "
     "stage file says when not given. Other bodies than the stage's are reduced once, into a folder beside it.",
 )
+@level_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -61,7 +62,10 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
+    from gearfmu.commands.settings import level_of
+
     model = model_of(stage, bores=bore)
+    where |= level_of(model, where.pop("level"))
     if model.stage.carriers:
         return _of_set(model, list(torques), out, **where)
     from gearfmu.report.te import write_plot
@@ -139,7 +143,8 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     from gearfmu.stage.run.trace import write_columns
 
     with progress_bar(f"te {model.spec.name}") as progress:
-        result = set_te(model, torques, where["positions"], where["pitches"], progress)
+        known = {name: where[name] for name in ("level",) if name in where}
+        result = set_te(model, torques, where["positions"], where["pitches"], progress, **known)
     write_columns(out, result.columns())
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)

@@ -34,6 +34,7 @@ from fmpy.logging import addLoggerProxy
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
+from gearfmu.kernel.build import SUFFIX, host_platform
 
 KINDS = {
     "Real": ("Real", fmi2Real),
@@ -135,6 +136,7 @@ class FmuUnit:
             unzipDirectory=folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName=self.description.modelName,
+            libraryPath=_own_library(folder, self.description.coSimulation.modelIdentifier),
         )
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
@@ -295,6 +297,12 @@ def outcome_of(message: str) -> str:
     "discarded" for another FMU's words."""
     texts = {name: load().gk_outcome_text(number).decode() for number, name in enumerate(OUTCOMES)}
     return next((name for name, text in texts.items() if message.rstrip().endswith(text)), "discarded")
+
+
+def _own_library(folder: str, identifier: str) -> str | None:
+    """This machine's binary of an FMU; None leaves the search to fmpy, which takes linux64 for any processor."""
+    library = Path(folder, "binaries", host_platform(), identifier + SUFFIX[host_platform()])
+    return str(library) if library.is_file() else None
 
 
 def _plain(unit: str | None) -> str:

@@ -163,7 +163,7 @@ def stage_source(staged: Staged, unit: str, out_dir: str | Path | None) -> Itera
         yield Source(model, None if unit == "kernel" else staged.fmu)
         return
     with tempfile.TemporaryDirectory(prefix="gearfmu-") as folder:
-        yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
+        yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu", platforms=("host",)))
 
 
 def run_once(

@@ -28,16 +28,6 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Smooth:
-    """A continuous function of time."""
-
-    function: Callable[[float], float]
-
-    def ends(self, t0: float, t1: float) -> tuple[float, float]:
-        return self.function(t0), self.function(t1)
-
-
-@dataclass(frozen=True)
 class Ramp:
     """Straight lines through the points (time s, value), constant before the first and after the last.
 

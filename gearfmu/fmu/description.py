@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
 from gearfmu.fmu.units import DISPLAY, base_exponents, unit_of
@@ -25,7 +25,8 @@ class Identity:
     """What modelDescription.xml says about the FMU as a whole.
 
     identifier: modelIdentifier, a C name; guid: hash of the model, checked by the binary; native: the binary needs
-    nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/."""
+    nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/;
+    rights: author, copyright and license of the model, which are its maker's; nominals: size of outputs by unit."""
 
     name: str
     identifier: str
@@ -34,6 +35,8 @@ class Identity:
     description: str = ""
     native: bool = True
     sources: tuple[str, ...] = ()
+    rights: Mapping[str, str] = field(default_factory=dict)
+    nominals: Mapping[str, float] = field(default_factory=dict)
 
 
 def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
@@ -46,7 +49,7 @@ def model_description(identity: Identity, variables: Sequence[Variable]) -> byte
             "guid": identity.guid,
             "description": identity.description,
             "version": identity.version,
-            "license": "BSD-3-Clause",
+            **identity.rights,
             "generationTool": f"gearfmu {identity.version}",
             "variableNamingConvention": "structured",
             "numberOfEventIndicators": "0",
@@ -67,7 +70,7 @@ def model_description(identity: Identity, variables: Sequence[Variable]) -> byte
     )
     listed = ET.SubElement(root, "ModelVariables")
     for variable in variables:
-        _add_variable(listed, variable)
+        _add_variable(listed, variable, identity.nominals)
     _add_structure(root, variables)
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
@@ -119,7 +122,7 @@ def _add_enumerations(root: ET.Element, variables: Sequence[Variable]) -> None:
             ET.SubElement(node, "Item", {"name": item, "value": str(value)})
 
 
-def _add_variable(listed: ET.Element, variable: Variable) -> None:
+def _add_variable(listed: ET.Element, variable: Variable, nominals: Mapping[str, float]) -> None:
     output = variable.causality == "output"
     attributes = {
         "name": variable.name,
@@ -134,6 +137,10 @@ def _add_variable(listed: ET.Element, variable: Variable) -> None:
     detail = {"declaredType": enumeration_type(variable)} if variable.type == "Enumeration" else {}
     if unit := unit_of(variable):
         detail["unit"] = unit
+        if unit in DISPLAY:
+            detail["displayUnit"] = DISPLAY[unit][0][0]
+        if output and unit in nominals:
+            detail["nominal"] = repr(nominals[unit])
     if not output and variable.type != "Boolean":
         detail.update(min=value_text(variable, variable.minimum), max=value_text(variable, variable.maximum))
     if not output:

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import TypedDict
+
+from typing_extensions import Unpack
 
 from gearfmu.errors import FmuError
 from gearfmu.files import written_whole
 from gearfmu.fmu.description import Identity, model_description
 from gearfmu.fmu.documentation import licences, page
+from gearfmu.fmu.naming import named
 from gearfmu.fmu.source_code import build_description, compiled, source_files
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.build import host_platform, library_path
+from gearfmu.kernel.build import SUFFIX, BuildError, host_platform, library_path
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.model import StageModel
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
@@ -25,35 +31,62 @@ RUNTIMES = ("native", "python")
 LONGEST_NAME = 40
 
 
+class Extras(TypedDict, total=False):
+    """What an FMU may also carry. terminals : terminalsAndIcons.xml, which FMI Library 3 refuses in FMI 2
+    (docs/howto-fmu.md). sources : the C sources of the binary and a build description (native only). author,
+    copyright, license : of the model, for its description; nothing is said there without them."""
+
+    terminals: bool
+    sources: bool
+    author: str
+    copyright: str
+    license: str
+
+
+RIGHTS = ("author", "copyright", "license")
+
+
 def export(
     model: StageModel,
     path: str | Path,
     runtime: str = "native",
-    platforms: Sequence[str] = ("host",),
-    terminals: bool = True,
-    sources: bool = False,
+    platforms: Sequence[str] | None = None,
+    **extras: Unpack[Extras],
 ) -> Path:
     """Write `model` as an FMI 2.0 co-simulation FMU and return its path.
 
     runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python"
     (pythonfmu's binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64",
-    "darwin64".
-    terminals: with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md). sources: with the C
-    sources of the binary and a build description (native only).
+    "darwin64"; all whose kernel is installed when None.
     The same model gives the same bytes; the file appears whole or not at all.
     Raises FmuError for unknown options and BuildError when a platform's library is missing or stale."""
     if runtime not in RUNTIMES:
         raise FmuError(f"runtime = {runtime!r}: use {' or '.join(RUNTIMES)}")
+    libraries = _installed() if platforms is None else _asked(platforms)
+    if extras.get("sources") and runtime != "native":
+        raise FmuError("sources belong to the compiled FMU: export with runtime native")
+    files = _native_files(model, libraries, extras) if runtime == "native" else _python_files(model, libraries, extras)
+    if not extras.get("terminals"):
+        del files[TERMINALS]
+    return write_archive(path, files)
+
+
+def _asked(platforms: Sequence[str]) -> dict[str, Path]:
     names = list(dict.fromkeys(host_platform() if p == "host" else p for p in platforms))
     if not names:
         raise FmuError('platforms is empty: name at least one, e.g. "host"')
-    libraries = {name: library_path("host" if name == host_platform() else name) for name in names}
-    if sources and runtime != "native":
-        raise FmuError("sources belong to the compiled FMU: export with runtime native")
-    files = _native_files(model, libraries, sources) if runtime == "native" else _python_files(model, libraries)
-    if not terminals:
-        del files[TERMINALS]
-    return write_archive(path, files)
+    return {name: library_path("host" if name == host_platform() else name) for name in names}
+
+
+def _installed() -> dict[str, Path]:
+    """This machine's library, and those of other platforms that belong to the same sources."""
+    found = _asked(["host"])
+    for name in SUFFIX:
+        try:
+            found.setdefault(name, library_path(name))
+        except BuildError:
+            continue
+    return found
 
 
 def write_archive(path: str | Path, files: Mapping[str, bytes]) -> Path:
@@ -80,11 +113,11 @@ def content_identifier(name: str, contents: Sequence[bytes]) -> str:
     return f"{'_' if plain[0].isdigit() else ''}{plain}_{digest.hexdigest()[:12]}"
 
 
-def _native_files(model: StageModel, libraries: Mapping[str, Path], with_sources: bool) -> dict[str, bytes]:
+def _native_files(model: StageModel, libraries: Mapping[str, Path], extras: Extras) -> dict[str, bytes]:
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
-    code = source_files() if with_sources else {}
+    code = source_files() if extras.get("sources") else {}
     identifier = content_identifier(model.name, [model.blob, *binaries.values(), *code.values()])
-    files = _common_files(model, identifier, native=True, sources=tuple(compiled(list(code))))
+    files = _common_files(model, identifier, extras, sources=tuple(compiled(list(code))))
     files |= {f"sources/{name}": content for name, content in code.items()}
     if code:
         files["sources/buildDescription.xml"] = build_description(identifier, list(code))
@@ -93,14 +126,14 @@ def _native_files(model: StageModel, libraries: Mapping[str, Path], with_sources
     return files
 
 
-def _python_files(model: StageModel, libraries: Mapping[str, Path]) -> dict[str, bytes]:
+def _python_files(model: StageModel, libraries: Mapping[str, Path], extras: Extras) -> dict[str, bytes]:
     """pythonfmu's binary loads resources/<slavemodule>.py; the module's name carries the content hash, else two FMUs in
     one process would share the first one's module."""
     frame = _pythonfmu_folder()
     slave = Path(__file__).with_name("slave.py").read_text(encoding="utf-8")
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
     identifier = content_identifier(model.name, [model.blob, slave.encode(), *binaries.values()])
-    files = _common_files(model, identifier, native=False)
+    files = _common_files(model, identifier, extras, native=False)
     for name, library in libraries.items():
         binary = next(iter((frame / "resources" / "binaries" / name).glob(f"*{library.suffix}")), None)
         if binary is None:
@@ -115,8 +148,10 @@ def _python_files(model: StageModel, libraries: Mapping[str, Path]) -> dict[str,
     return files
 
 
-def _common_files(model: StageModel, identifier: str, native: bool, sources: tuple[str, ...] = ()) -> dict[str, bytes]:
-    variables = list(Kernel(model.blob).variables.values())
+def _common_files(
+    model: StageModel, identifier: str, extras: Extras, native: bool = True, sources: tuple[str, ...] = ()
+) -> dict[str, bytes]:
+    variables = named(list(Kernel(model.blob).variables.values()), model.stage)
     identity = Identity(
         model.name,
         identifier,
@@ -125,15 +160,29 @@ def _common_files(model: StageModel, identifier: str, native: bool, sources: tup
         model.spec.description,
         native,
         sources,
+        {name: text for name in RIGHTS if (text := str(extras.get(name, "")))},
+        nominals(model.stage),
     )
+    icon = Path(__file__).with_name("icons") / f"{'set' if model.stage.carriers else 'pair'}.png"
     return {
         "modelDescription.xml": model_description(identity, variables),
+        "model.png": icon.read_bytes(),
         TERMINALS: terminals_and_icons(variables),
         "documentation/index.html": page(identity, variables).encode(),
         **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
         MODEL_FILE: model.blob,
         STAGE_FILE: stage_file(model),
     }
+
+
+def nominals(stage: Stage) -> dict[str, float]:
+    """Unit → size of outputs of that unit, one digit: torque, force and speed that the first mesh is made for, and a
+    hundredth of a millimetre."""
+    mesh, teeth = stage.engagements[0], {gear.name: gear for gear in stage.gears}
+    gear = teeth[mesh.gears[0]]
+    radius = 0.5 * gear.teeth * gear.normal_module / math.cos(gear.helix_angle) * math.cos(gear.pressure_angle)
+    sizes = {"N.m": mesh.torque_max, "N": mesh.torque_max / radius, "rad/s": mesh.speed_max}
+    return {unit: float(f"{size:.0e}") for unit, size in sizes.items()} | {"m": 1e-5}
 
 
 def _pythonfmu_folder() -> Path:

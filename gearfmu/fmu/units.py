@@ -17,18 +17,19 @@ ATOMS: dict[str, dict[str, int]] = {
     "Pa": {"kg": 1, "m": -1, "s": -2},
     "Hz": {"s": -1},
 }
-DISPLAY = {
+DISPLAY = {  # the first is that of the variables
     "rad": (("deg", 180 / math.pi),),
     "rad/s": (("rev/min", 30 / math.pi),),
-    "m": (("mm", 1e3), ("um", 1e6)),
-    "s": (("ms", 1e3), ("us", 1e6)),
+    "m": (("um", 1e6), ("mm", 1e3)),
+    "s": (("us", 1e6), ("ms", 1e3)),
 }
+SAME = {"N.s/m2": "Pa.s"}  # one unit has one name in an FMU
 
 
 def unit_of(variable: Variable) -> str | None:
     """Name of a variable's unit in the model description: "1" for a Real without one, as in Modelica; None for other
     types."""
-    return (variable.unit or "1") if variable.type == "Real" else None
+    return SAME.get(variable.unit, variable.unit or "1") if variable.type == "Real" else None
 
 
 def base_exponents(unit: str) -> dict[str, int]:

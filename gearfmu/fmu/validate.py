@@ -1,17 +1,12 @@
-"""All that can be found wrong with an FMU: what fmpy checks, and what only shows when it is opened and called."""
+"""What can be found wrong with an FMU: what fmpy checks, files that do not fit each other, a first run that fails."""
 
 from __future__ import annotations
 
-import json
-import queue
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import fmpy
 from fmpy.model_description import ModelDescription
@@ -19,12 +14,11 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from gearfmu.errors import FmuError, Problem
-from gearfmu.fmu.probes import CHECKS
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, read_stage_file
-from gearfmu.fmu.symbols import exported_symbols
-from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
+from gearfmu.kernel.build import SUFFIX, host_platform
 
-TIMEOUT = 300  # s without an answer: of a single check, as big stages take long to initialise
+TIMEOUT = 600  # s without an end of the first run: big stages take long to initialise
+STEPS = 10
 EXPORT_AGAIN = "export the FMU again"
 TERMINALS_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 
@@ -32,8 +26,8 @@ TERMINALS_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3Termina
 def validate(path: str | Path) -> list[Problem]:
     """All problems of the FMU at `path`; an empty list when there are none.
 
-    Checks the XML against schema and rules (fmpy), units, start values, terminals, stage, exported symbols and, when
-    there is a binary for this machine, its answers to right and wrong calls in a process of its own.
+    Checks the XML against schema and rules (fmpy), units, terminals, stage, names of the binaries and, when there is a
+    binary for this machine, a run of ten steps in a process of its own.
     Raises FmuError when the file cannot be read as an FMU at all."""
     file = Path(path)
     with tempfile.TemporaryDirectory(prefix="gearfmu-validate-") as work:
@@ -44,7 +38,7 @@ def validate(path: str | Path) -> list[Problem]:
         except Exception as error:  # fmpy stumbles over what its own validation has found
             found = found or [("modelDescription.xml", str(error), EXPORT_AGAIN)]
         else:
-            found += _contents(folder, description)
+            found += _contents(file, folder, description)
         return [Problem(str(file), field, value, remedy) for field, value, remedy in found]
 
 
@@ -58,12 +52,12 @@ def _unpack(file: Path, folder: Path) -> Path:
     return folder
 
 
-def _contents(folder: Path, description: ModelDescription) -> list[tuple[str, str, str]]:
+def _contents(file: Path, folder: Path, description: ModelDescription) -> list[tuple[str, str, str]]:
     if description.coSimulation is None or not description.fmiVersion.startswith("2."):
         return [("modelDescription.xml", f"FMI {description.fmiVersion}", "only FMI 2.0 co-simulation is looked at")]
     found = [finding for check in (_units, _terminals, _stage, _binaries) for finding in check(folder, description)]
     if (folder / "binaries" / host_platform()).is_dir():
-        found += _answers(folder)
+        found += _first_run(file, description)
     return found
 
 
@@ -95,6 +89,7 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
 
 def _stage(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
     """An FMU of ours says which stage it is, and means the model beside it."""
+
     if not (folder / MODEL_FILE).is_file():
         return
     if not (folder / STAGE_FILE).is_file():
@@ -118,96 +113,19 @@ def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str
         library = place / (simulation.modelIdentifier + SUFFIX[place.name])
         if not library.is_file():
             yield f"binaries/{place.name}", f"{library.name} is missing", "name the file by the modelIdentifier"
-        elif place.name != "darwin64":
-            yield from _symbols(library, exact=not simulation.needsExecutionTool)
 
 
-def _symbols(library: Path, exact: bool) -> Iterator[tuple[str, str, str]]:
-    """All co-simulation functions of FMI 2; a native FMU of ours exports nothing else but those of model exchange,
-    which some loaders demand, and the gk_ functions."""
-    exported, wanted = exported_symbols(library), fmi_functions()
-    for name in sorted(wanted - exported):
-        yield library.name, f"{name} is not exported", "importers look up every function of FMI 2"
-    ours = any(name.startswith("gk_") for name in exported)
-    beyond = exported - wanted - exchange_functions() if exact and ours else set()
-    for name in sorted(n for n in beyond if not n.startswith("gk_")):
-        yield library.name, f"{name} is exported", "hide it: another FMU in the process could take it for its own"
-
-
-def fmi_functions() -> set[str]:
-    """Names of the functions that a co-simulation FMU exports, from the FMI 2 header."""
-    common, _, simulation = _declared()
-    return common | simulation
-
-
-def exchange_functions() -> set[str]:
-    """Names of the functions that a model exchange FMU exports besides the common ones."""
-    return _declared()[1]
-
-
-@cache
-def _declared() -> tuple[set[str], ...]:
-    """Functions of the FMI 2 header: common, of model exchange, of co-simulation."""
-    text = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8", errors="replace")
-    heads = ("Common Functions", "Functions for FMI2 for Model Exchange", "Functions for FMI2 for Co-Simulation")
-    places = [*(text.rindex(head) for head in heads), len(text)]
-    parts = (text[start:end] for start, end in zip(places, places[1:], strict=False))
-    return tuple(
-        {line.split()[2].rstrip(";") for line in part.splitlines() if line.strip().startswith("FMI2_Export")}
-        for part in parts
-    )
-
-
-def _answers(folder: Path) -> Iterator[tuple[str, str, str]]:
-    """Findings of the probes; after a crash the remaining ones go on in a new process."""
-    left = list(CHECKS)
-    while left:
-        text, ending = _probe(folder, left)
-        begun = None
-        for line in text.splitlines():
-            try:
-                report = json.loads(line)
-            except ValueError:
-                continue  # something the FMU printed itself
-            if not isinstance(report, dict):
-                continue
-            begun = report.get("begin", begun)
-            if report.get("end") in left:
-                left.remove(report["end"])
-                yield from (tuple(finding) for finding in report["found"])
-        if begun is None:
-            raise FmuError(f"the probes could not be started: {ending}")
-        if begun in left:
-            left.remove(begun)
-            yield begun, ending, f"it brings its process down: `python -m gearfmu.fmu FOLDER {begun}` shows it"
-
-
-def _probe(folder: Path, checks: list[str]) -> tuple[str, str]:
-    """Output of a probe process and how it ended; it is stopped when a check does not answer within TIMEOUT."""
-    command, output = [sys.executable, "-m", "gearfmu.fmu", str(folder), *checks], ""
-    with tempfile.TemporaryFile("w+", errors="replace") as said:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, errors="replace")
-        lines: queue.Queue[str | None] = queue.Queue()
-        reader = threading.Thread(target=_read, args=(process.stdout, lines), daemon=True)
-        reader.start()
-        try:
-            while (line := lines.get(timeout=TIMEOUT)) is not None:
-                output += line
-            code, late = process.wait(), False
-        except queue.Empty:
-            process.kill()
-            code, late = process.wait(), True
-        reader.join(1.0)
-        said.seek(0)
-        return (
-            output,
-            f"no answer within {TIMEOUT} s" if late else f"ended with code {code} {said.read().strip()[-300:]}",
-        )
-
-
-def _read(stream: Any, lines: queue.Queue[str | None]) -> None:
-    """Lines of a process as they come, None at the end."""
-    for line in stream:
-        lines.put(line)
-    stream.close()
-    lines.put(None)
+def _first_run(file: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
+    """Ten steps with start values by fmpy; what brings the process down is a finding."""
+    step = float(getattr(description.defaultExperiment, "stepSize", None) or 1e-4)
+    end = "os._exit(0)" if description.coSimulation.needsExecutionTool else "pass"  # its interpreter is ended by nobody
+    program = f"import os, sys, fmpy; fmpy.simulate_fmu(sys.argv[1], stop_time=float(sys.argv[2])); {end}"
+    command = [sys.executable, "-c", program, str(file), repr(STEPS * step)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT)
+    except subprocess.TimeoutExpired:
+        yield "fmi2DoStep", f"no end within {TIMEOUT} s", "run it under a debugger"
+        return
+    if done.returncode:
+        last = (done.stderr.strip() or done.stdout.strip())[-300:]
+        yield f"a run of {STEPS} steps", f"ended with code {done.returncode}: {last}", EXPORT_AGAIN

@@ -32,7 +32,8 @@ from gearfmu.errors import GearfmuError
 
 HERE = Path(__file__).resolve().parent
 STEM = "gearfmu_kernel"
-SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib", "aarch64-linux": ".so"}
+INTEL = ("x86_64", "amd64")
 ZIG_TARGETS = {
     "linux64": ("x86_64-linux-gnu.2.17",),
     "win64": ("x86_64-windows-gnu",),
@@ -67,14 +68,17 @@ class BuildError(GearfmuError):
 
 
 def host_platform() -> str:
-    """FMI 2 name of this machine's platform: "linux64", "win64" or "darwin64".
+    """Name of this machine's platform in an FMU: "linux64", "win64" and "darwin64" of FMI 2; "aarch64-linux" of FMI 3,
+    since linux64 is for x86-64.
 
-    Raises BuildError on a 32-bit or unknown system."""
-    name = {"Linux": "linux64", "Windows": "win64", "Darwin": "darwin64"}.get(_platform.system())
+    Raises BuildError on a 32-bit or unknown system or processor."""
+    system, processor = _platform.system(), _platform.machine()
+    intel = {"Linux": "linux64", "Windows": "win64"}.get(system) if processor.lower() in INTEL else None
+    arm = "aarch64-linux" if (system, processor.lower()) in (("Linux", "aarch64"), ("Linux", "arm64")) else None
+    name = intel or arm or ("darwin64" if system == "Darwin" else None)
     if name is None or sys.maxsize <= 2**32:
         raise BuildError(
-            f"no kernel for this system ({_platform.system()} {_platform.machine()}): "
-            f"gearfmu runs on 64-bit {', '.join(SUFFIX)}"
+            f"no kernel for this system ({system} {processor}): gearfmu runs on 64-bit {', '.join(SUFFIX)}"
         )
     return name
 
@@ -296,7 +300,7 @@ def _compilers(name: str, sanitize: bool) -> list[tuple[str, ...]]:
 
 def _zig_serves(name: str) -> bool:
     """Whether ziglang's code runs on that platform; on this machine only with an x86-64 processor."""
-    return name in ZIG_TARGETS and (name != host_platform() or _platform.machine().lower() in ("x86_64", "amd64"))
+    return name in ZIG_TARGETS and (name != host_platform() or _platform.machine().lower() in INTEL)
 
 
 def system_compiler() -> str:
@@ -333,7 +337,7 @@ def _position(name: str) -> list[str]:
 
 def _libraries(name: str) -> list[str]:
     """dlopen for programs; sqrt where a compiler without optimisation calls it (IEEE exact in every C library)."""
-    return ["-Wl,--as-needed", "-lm", "-ldl"] if name == "linux64" else []
+    return ["-Wl,--as-needed", "-lm", "-ldl"] if name.endswith(("linux64", "-linux")) else []
 
 
 def _run(command: Sequence[str]) -> None:

@@ -163,7 +163,8 @@ def _pruned(space: Space, bench: Bench, now: Measured, most: float, tell: Tell) 
     """Take out what is dearest first, as long as the set keeps the budget; what fails once is not tried again."""
     refused: dict[str, Measured] = {}
     before: dict[str, Measured] = {}
-    for knob in space.candidates:
+    for place, knob in enumerate(space.candidates, start=1):
+        tell(f"what can be left out: {knob.name}, {place} of {len(space.candidates)}")
         while (lower := space.cheaper(now.choice, knob.name)) is not None:
             tried = bench.one(lower)
             if tried.bound > most or not tried.price < DEARER * now.price:

@@ -17,30 +17,18 @@ _FIRST, _ROOM = 640, 4  # room for vectors and by how much it grows: what is not
 
 @dataclass(frozen=True)
 class Size:
-    """How large a basis shall be: by number or by tolerance.
+    """How large a basis shall be. Raises BodyError for what is no size.
 
-    count : elastic vectors n; rigid modes come on top. A method may return fewer, never more.
-    tolerance : largest relative error of the transfer matrix (paper eq. 3, ground held) over `band`, Hz.
-    band also places the expansion points of the Krylov method. Raises BodyError for anything else.
+    count : elastic vectors n; rigid modes come on top. A method may return fewer, never more. band : Hz, places the
+    expansion points of the Krylov method.
     """
 
-    count: int | None = None
-    tolerance: float | None = None
+    count: int
     band: tuple[float, float] = BAND
 
-    @property
-    def vectors(self) -> int:
-        """`count` of a size that was given by number."""
-        assert self.count is not None
-        return self.count
-
     def __post_init__(self) -> None:
-        if (self.count is None) == (self.tolerance is None):
-            raise BodyError("size: give the number of vectors or a tolerance, one of them")
-        if self.count is not None and self.count < 1:
+        if self.count < 1:
             raise BodyError(f"size: count = {self.count}: at least one vector")
-        if self.tolerance is not None and not 0 < self.tolerance < 1:
-            raise BodyError(f"size: tolerance = {self.tolerance}: a relative error between 0 and 1")
         if not 0 <= self.band[0] < self.band[1]:
             raise BodyError(f"size: band = {self.band} Hz: from a lower to a higher frequency")
 

@@ -10,10 +10,7 @@ Dynamics (2006), ch. 17.
 
 from __future__ import annotations
 
-import time
-import tracemalloc
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -44,30 +41,19 @@ def elastic(body: FullOrder) -> Elastic:
     return _KNOWN[body]
 
 
-@dataclass(frozen=True)
-class Piece:
-    """Something made once and kept: what it is, processor seconds and bytes (0 while memory is not traced) it took."""
-
-    made: Any
-    seconds: float
-    memory: int
-
-
 class Elastic(Balanced):
     """Operators of a body under its constraints; vectors are (N, k).
 
     rigid : (N, r) mass-normalised rigid modes that nothing holds. elastic : number of elastic degrees of freedom.
-    twin : operators of the same body with other constraints, whose factor is used.
-    pieces, touched : what was made and kept (factors, modes) and which of it was asked for since the caller cleared the
-    set, so that a method is charged for what it uses, whoever asked first.
+    twin : operators of the same body with other constraints, whose factor is used. pieces : factors and modes that were
+    made once and are kept.
     """
 
     dtype = float
 
     def __init__(self, body: FullOrder, twin: Elastic | None = None):
         self._twin = twin
-        self.pieces: dict[str, Piece] = {}
-        self.touched: set[str] = set()
+        self.pieces: dict[str, Any] = {}
         self.stiffness, self.mass_matrix = body.stiffness, body.mass
         self.cells, self.node_of_dof, self.size = body.cells, body.node_of_dof, body.size
         self.parts = body.parts
@@ -80,13 +66,9 @@ class Elastic(Balanced):
 
     def kept(self, name: str, make: Callable[[], Any]) -> Any:
         """What is kept under `name`, made now if it is not there."""
-        self.touched.add(name)
         if name not in self.pieces:
-            clock, memory = time.process_time(), tracemalloc.get_traced_memory()[0]
-            made = make()
-            taken = tracemalloc.get_traced_memory()[0] - memory
-            self.pieces[name] = Piece(made, time.process_time() - clock, max(taken, 0))
-        return self.pieces[name].made
+            self.pieces[name] = make()
+        return self.pieces[name]
 
     def _free_motions(self) -> np.ndarray:
         fields = self._kernel
@@ -188,7 +170,7 @@ class Elastic(Balanced):
         """The `count` lowest elastic modes (fewer when the body has fewer): ω² (k,) and mass-normalised shapes (N, k).
 
         Raises ModesError."""
-        if "modes" in self.pieces and len(self.pieces["modes"].made[0]) < min(count, self.elastic):
+        if "modes" in self.pieces and len(self.pieces["modes"][0]) < min(count, self.elastic):
             del self.pieces["modes"]
         block = 24 if count > 60 else 8
         squared, shapes = self.kept("modes", lambda: lowest_modes(self, count, _SHAPES, block))

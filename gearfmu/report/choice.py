@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
-from gearfmu.report import mesh_cycle, picture, plots, plots_nvh, plots_runup, plots_set
+from gearfmu.report import mesh_cycle, plots, plots_nvh, plots_runup, plots_set
 from gearfmu.report.chart import Plot
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
@@ -91,8 +91,6 @@ def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
         )
     makers += [lambda: plots.bearing_forces(trace), lambda: plots.axial_and_tilting(trace)]
     makers += _statics(run, [[mesh] for mesh in run.shown_meshes])
-    if run.stage is not None:
-        makers += [partial(picture.deformed_pair, trace, run.stage, mesh, run.bodies or ()) for mesh in names]
     makers += deformed
     if run.run_up is not None:
         makers += [partial(make, run.run_up) for make in plots_runup.FIGURES]
@@ -120,7 +118,6 @@ def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
         lambda: plots_set.pin_forces(trace, own),
         *_statics(run, [[mesh] for mesh in run.shown_meshes]),
         *deformed,
-        *_set_pair(run, own),
         lambda: plots.bearing_forces(trace, carried=True),
         lambda: plots.axial_and_tilting(trace),
         lambda: plots_set.energy(trace),
@@ -138,15 +135,6 @@ def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:
     for mesh, loads in run.loads.items():
         makers.append(partial(mesh_cycle.contact_pattern, run.trace, run.stage, mesh, loads))
     return makers
-
-
-def _set_pair(run: Run, own: PlanetSet) -> list[Maker]:
-    """What draws the sun with the planet that presses most."""
-    if run.stage is None or "sun" not in own.meshes:
-        return []
-    mesh = max(own.meshes["sun"].values(), key=lambda name: float(np.abs(run.trace[f"{name}.force"]).max()))
-    known = list(gear_bodies(run.spec, run.bodies or ()).values())
-    return [partial(picture.deformed_pair, run.trace, run.stage, mesh, known)]
 
 
 def _made(makers: Sequence[Maker]) -> tuple[list[Plot], list[str]]:

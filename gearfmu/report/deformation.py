@@ -21,9 +21,7 @@ from PIL import Image
 
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
-from gearfmu.report.picture import round_scale
-from gearfmu.report.scene3d import STEEL
-from gearfmu.report.style import INK, MUTED, WIDTH, png, styled
+from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, png, round_scale, styled
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation

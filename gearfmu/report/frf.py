@@ -1,14 +1,15 @@
-"""Charts of reduction methods: error over frequency, error against size, error against processor time."""
+"""Chart of reduction methods: error over frequency."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 
+from gearfmu.reduction.transfer import Reference
 from gearfmu.report.style import COLOURS, INK, panels, saved, styled
 
 LABELS = {
@@ -34,8 +35,8 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
             colour = COLOURS[number % len(COLOURS)]
             axes[-1].loglog(frequency, np.maximum(error, 1e-16), color=colour, label=label)
         for panel in axes:
-            _formatted(panel.yaxis, powers=True)
-            _formatted(panel.xaxis, powers=False)
+            readable(panel.yaxis, powers=True)
+            readable(panel.xaxis, powers=False)
         axes[0].set_title(title, loc="left")
         axes[-1].set_ylabel("relative error (Frobenius)")
         axes[-1].set_xlabel("frequency, Hz")
@@ -43,64 +44,28 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
         return saved(figure, path)
 
 
-def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str) -> list[Path]:
-    """Largest error against the number of vectors and against processor time, one line a method; rows with method, n,
-    max_error, seconds."""
-    with styled(), rc_context({"svg.hashsalt": path.stem}):
-        figure, axes = panels((3.2, 3.2), share=False)
-        for number, method in enumerate(dict.fromkeys(row["method"] for row in rows)):
-            line = [row for row in rows if row["method"] == method]
-            style = {"color": COLOURS[number % len(COLOURS)], "marker": "o", "markersize": 3.5}
-            error = [row["max_error"] for row in line]
-            axes[0].semilogy([row["n"] for row in line], error, label=label_of(method), **style)
-            axes[1].loglog([row["seconds"] for row in line], error, **style)
-        for axis in axes:
-            axis.set_ylabel("largest relative error")
-            _formatted(axis.yaxis, powers=True)
-        _formatted(axes[1].xaxis, powers=False)
-        axes[0].set_title(title, loc="left")
-        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        axes[0].set_xlabel("vectors n")
-        axes[1].set_xlabel("processor time of the reduction, s")
-        return saved(figure, path)
-
-
-def write_cost_chart(
-    by_mesh: Sequence[Mapping[str, Any]], by_inputs: Sequence[Mapping[str, Any]], path: Path, title: str
-) -> list[Path]:
-    """Processor time and memory against the number of unknowns, time against the number of inputs, one line a method;
-    rows with method, dof, inputs, seconds, memory_MB."""
-    shown = ((by_mesh, "dof", "seconds"), (by_mesh, "dof", "memory_MB"), (by_inputs, "inputs", "seconds"))
-    named = {"dof": "unknowns", "inputs": "inputs", "seconds": "processor time, s", "memory_MB": "memory, MB"}
-    methods = list(dict.fromkeys(row["method"] for row in by_mesh))
-    with styled(), rc_context({"svg.hashsalt": path.stem}):
-        figure, axes = panels((2.6,) * len(shown), share=False)
-        for axis, (rows, x, y) in zip(axes, shown, strict=True):
-            for number, method in enumerate(methods):
-                line = [row for row in rows if row["method"] == method]
-                style = {"color": COLOURS[number % len(COLOURS)], "marker": "o", "markersize": 3.5}
-                axis.loglog([row[x] for row in line], [row[y] for row in line], label=label_of(method), **style)
-            axis.set_xlabel(named[x])
-            axis.set_ylabel(named[y])
-            axis.set_xticks(sorted({row[x] for row in rows}))
-            _formatted(axis.xaxis, powers=False)
-            _formatted(axis.yaxis, powers=False)
-            axis.set_ylim(bottom=0.5 * min(row[y] for row in rows))
-        axes[0].set_title(title, loc="left")
-        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        return saved(figure, path)
-
-
-def _power(value: float, _: int) -> str:
-    return f"1e{round(np.log10(value))}"
-
-
-def _formatted(axis: Any, powers: bool) -> None:
-    axis.set_major_formatter(_power if powers else "{x:g}")
-    axis.set_minor_formatter("")
+def error_curves(exact: Reference, found: Iterable[tuple[str, int, np.ndarray]]) -> tuple[str, dict[str, Any]]:
+    """The errors of (method, n, error (F,)) as the text of a CSV file (`method,n,frequency_Hz,error`), and as curves
+    for `write_error_chart` with the norm of the exact transfer matrix."""
+    frequency, lines = exact.judging.frequency, ["method,n,frequency_Hz,error"]
+    curves: dict[str, Any] = {"norm": (frequency, np.linalg.norm(exact.matrix, axis=(1, 2)))}
+    for method, size, error in found:
+        lines += [f"{method},{size},{f:.6g},{e:.4e}" for f, e in zip(frequency, error, strict=True)]
+        curves[f"{label_of(method)}, n = {size}"] = (frequency, error)
+    return "\n".join(lines) + "\n", curves
 
 
 def label_of(method: str) -> str:
     """A method's name for a legend; what follows a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
+
+
+def readable(axis: Any, powers: bool) -> None:
+    """Label the ticks of an axis as powers of ten or as plain numbers."""
+    axis.set_major_formatter(_power if powers else "{x:g}")
+    axis.set_minor_formatter("")
+
+
+def _power(value: float, _: int) -> str:
+    return f"1e{round(np.log10(value))}"

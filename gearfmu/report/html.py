@@ -8,21 +8,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gearfmu.files import write_text, written_whole
+from gearfmu.files import write_text
 from gearfmu.report import heading, page, sections
 from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
-from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plan import plan_sections
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
 from gearfmu.report.run import Run
-from gearfmu.report.sound import Sound, heard_channel, player, sound_of
 from gearfmu.stage.run.deformation import Deformation
-from gearfmu.stage.run.trace import Trace, TraceError, write_columns
+from gearfmu.stage.run.trace import Trace, write_columns
 
 NVH = ("spectrum", "orders", "spectrogram")
 RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")
-SOUND, LEAST_SAMPLES = "data/sound.wav", 1000
 
 
 def write(
@@ -47,27 +44,11 @@ def write(
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
     write_text(folder / "summary.json", json.dumps(strict({**summary, "results": results}), indent=2) + "\n")
-    sound = _sound(run, missing)
-    if sound is not None:
-        with written_whole(folder / SOUND) as temporary:
-            temporary.write_bytes(sound.wav)
-    write_text(folder / "report.html", _document(run, made, missing, sound))
+    write_text(folder / "report.html", _document(run, made, missing))
     return folder / "report.html"
 
 
-def _sound(run: Run, missing: list[str]) -> Sound | None:
-    """The channel that the summary names as "sound", else a force; None without one, with the reason in `missing`."""
-    channel = run.summary.get("sound") or heard_channel(run.trace)
-    if channel is None or run.trace.time.size < LEAST_SAMPLES:
-        return None
-    try:
-        return sound_of(run.trace, str(channel))
-    except (MetricsError, TraceError) as error:
-        missing.append(f"Sound: {error}")
-        return None
-
-
-def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sound | None) -> str:
+def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
     summary = run.summary
     about = [run.title, *(str(summary[key]) for key in ("description", "started") if summary.get(key))]
     over_speed = [plot for plot in made if plot.name in RUN_UP]
@@ -91,7 +72,6 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sou
         *([] if over_speed else sections.warned(run.trace)),
         *([page.section("Octave bands", octaves, name="octaves")] if octaves else []),
         *[page.figure(plot) for plot in over_frequency],
-        *([page.section("Sound", player(sound, SOUND), name="sound")] if sound is not None else []),
         page.section("Accuracy and cost", *sections.accuracy(run), name="accuracy"),
         page.details(
             "Where it comes from", page.pairs_table(sections.provenance(summary)), sections.channels(run.trace)

@@ -1,4 +1,4 @@
-"""The price list of a stage's fidelity levels, as evidence/levels.py measured it: levels.csv beside the stage
+"""The price list of a stage's fidelity levels, as evidence/study/levels.py measured it: levels.csv beside the stage
 file."""
 
 from __future__ import annotations

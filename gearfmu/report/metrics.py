@@ -78,11 +78,6 @@ def level(amplitude: np.ndarray | float, reference: float = 1.0) -> np.ndarray:
     return 20 * np.log10(np.maximum(np.asarray(amplitude, dtype=float) / reference, FLOOR))
 
 
-def rms_ac(values: np.ndarray) -> float:
-    """Root mean square of the signal without its mean."""
-    return float(np.std(values))
-
-
 def sample_step(time: np.ndarray) -> float:
     """The even sampling interval of `time` (n,), s; raises MetricsError when steps differ by more than 1e-3 of it."""
     if time.size < 2:

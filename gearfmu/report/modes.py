@@ -21,7 +21,6 @@ from gearfmu.fem.surface import shape as face_shape
 from gearfmu.files import written_whole
 from gearfmu.modes import BodyModes, Mode
 from gearfmu.modes.shapes import cylindrical
-from gearfmu.report.scene3d import camera
 from gearfmu.report.style import INK, MUTED, styled
 
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
@@ -108,7 +107,7 @@ def _component(mode: Mode) -> tuple[int, str]:
 
 def _paint(axis: Axes, body: BodyModes, surface: _Surface, mode: Mode, view: int) -> None:
     moved, rest = surface.sample @ body.drawn(mode)[0], surface.sample @ body.points
-    axes = np.eye(3) if view == ALONG_AXIS else camera(ELEVATION, AZIMUTH)
+    axes = np.eye(3) if view == ALONG_AXIS else _camera(ELEVATION, AZIMUTH)
     drawn, normal = (rest + moved) @ axes.T, _normals((rest + moved) @ axes.T, surface.quads)
     value = np.linalg.norm(moved, axis=1)
     value = cylindrical(rest, moved)[:, _component(mode)[0]] if view == ALONG_AXIS else value
@@ -209,3 +208,11 @@ def mode_columns(modes: Sequence[Mode]) -> dict[str, np.ndarray]:
         "tangential_share": energy[:, 1],
         "axial_share": energy[:, 2],
     }
+
+
+def _camera(elevation: float, azimuth: float) -> np.ndarray:
+    """Rows: right, up and towards the eye, of a camera above and left of the axis (rad)."""
+    ce, se, ca, sa = np.cos(elevation), np.sin(elevation), np.cos(azimuth), np.sin(azimuth)
+    tilt = np.array([[1, 0, 0], [0, ce, -se], [0, se, ce]])
+    turn = np.array([[ca, 0, sa], [0, 1, 0], [-sa, 0, ca]])
+    return tilt @ turn

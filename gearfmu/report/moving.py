@@ -2,7 +2,7 @@
 the run.
 
 Angles are the recorded ones. A gear whose deformation was recorded moves by its modes; the others as under the recorded
-mesh force applied statically and split evenly over the tooth pairs in contact, as in `picture.deformed_pair`. The
+mesh force applied statically and split evenly over the tooth pairs in contact. The
 displacement under a load at any roll is interpolated between the stored unit loads of tooth 0 and turned to the tooth.
 """
 
@@ -18,8 +18,8 @@ from scipy.spatial import cKDTree
 
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
-from gearfmu.report.picture import SHOWN_FRACTION, mirrored, round_scale
 from gearfmu.report.structure import AROUND, parts, turned
+from gearfmu.report.style import round_scale
 from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_phases
@@ -27,6 +27,7 @@ from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 
 FRAMES, CONTACTS, PITCHES = 160, 4, 8
+SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
 STEPS = 127  # of a displacement, in the page
 BOLT_TONE = 1.45  # brighter than the plate behind it
 
@@ -215,8 +216,16 @@ def _unit_loads(display: Any) -> tuple[np.ndarray, np.ndarray]:
     """Rolls (R,) ascending and displacement (2, R, P, 3) m/N under unit loads on the flanks 0 and 1 of tooth 0."""
     order = np.argsort(np.asarray(display.load_roll, float))
     first, points = np.asarray(display.loads, float)[order], np.asarray(display.points, float)
-    second = np.stack([mirrored(points, unit) for unit in first])
+    second = np.stack([_mirrored(points, unit) for unit in first])
     return np.asarray(display.load_roll, float)[order], np.stack([first, second])
+
+
+def _mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """The field of flank 1 from that of flank 0 by half a turn about the tooth's middle line, the x axis: it leaves
+    spur and helical gears as they are."""
+    mirror = np.array([1.0, -1.0, -1.0])
+    _, index = cKDTree(points).query(points * mirror)
+    return unit[index] * mirror
 
 
 def _record(body: Body, gear: DeformedGear, times: np.ndarray, window: tuple[float, float]) -> None:

@@ -9,7 +9,7 @@ from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_li
 from gearfmu.report.names import shown
 from gearfmu.report.plots import RPM
 from gearfmu.report.plots_nvh import heat_of
-from gearfmu.report.runup import PICKUP, RunUp, Signal
+from gearfmu.report.runup import RunUp, Signal
 
 SHOWN_DB = 60
 BINS = 160  # windows of the frequency map over the run
@@ -44,7 +44,7 @@ def frequency_maps(run: RunUp) -> Plot:
     caption = (
         f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. {_rays(run)} "
         f"Horizontal lines are resonances."
-        f"{CROSSED if run.resonances else ''}{_about_pickup(run)}"
+        f"{CROSSED if run.resonances else ''}"
     )
     data = {"speed_[rpm]": np.repeat(speed, kept.sum()), "frequency_[Hz]": np.tile(first.frequency[kept], speed.size)}
     data |= {_column(run, name): found.amplitude[:, kept].ravel() for name, found in maps.items()}
@@ -110,13 +110,6 @@ def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
 def _column(run: RunUp, name: str) -> str:
     own = run.signals[name]
     return f"{name}{'_mean' if own.averaged else ''}_rms_[{own.unit}]"
-
-
-def _about_pickup(run: RunUp) -> str:
-    about = (
-        " Pickup: radial velocity of the rim on +x, made of the forces of the ring's meshes by the ring's own modes."
-    )
-    return about if PICKUP in run.signals else ""
 
 
 def _heat(x: np.ndarray, y: np.ndarray, amplitude: np.ndarray, own: Signal) -> Heat:

@@ -81,7 +81,7 @@ class Run:
         """The run-up within the window, that of a pair or train with its resonances where the stage is at hand; None
         where no shaft gathers speed (or loses it) steadily."""
         if self.planets is not None:
-            return run_up_of_set(self.trace, self.planets, self.window, self.spec, self.bodies)
+            return run_up_of_set(self.trace, self.planets, self.window)
         found = run_up_of_meshes(self.trace, self.known, self.window) if self.known else None
         first = next(iter(self.known), "")
         if found is None or self.stage is None or f"{first}.force" not in found.signals:

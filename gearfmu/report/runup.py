@@ -15,7 +15,6 @@ from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
-from gearfmu.report.ring_pickup import rim_velocity
 from gearfmu.report.signals import GEAR_SPEED, Window, bearings
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
@@ -30,7 +29,6 @@ SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
 SET_ORDERS, PAIR_ORDERS, TRAIN_ORDERS = 3, 6, 4  # mesh orders shown
 TRAIN_BEARINGS = 2  # directions of bearings shown
-PICKUP = "pickup on the ring"
 LEAST_LOAD = 0.01  # of torque_max: below it flanks may part, and there is nothing to linearise
 MODES = 30  # of the linearised stage, the lowest
 
@@ -144,11 +142,8 @@ class RunUp:
         }
 
 
-def run_up_of_set(
-    trace: Trace, own: PlanetSet, window: Window, spec: Any = None, bodies: Sequence[Any] | None = None
-) -> RunUp | None:
-    """The run-up of a set within `window`; None where its carrier does not gather speed (or lose it) steadily. spec and
-    bodies: for the pickup on the ring."""
+def run_up_of_set(trace: Trace, own: PlanetSet, window: Window) -> RunUp | None:
+    """The run-up of a set within `window`; None where its carrier does not gather speed (or lose it) steadily."""
     part, names = trace.window(window.start, window.end), (own.meshing.rotor, own.carrier)
     if any(f"{name}{GEAR_SPEED}" not in part for name in names) or f"{own.carrier}{GEAR_PHI}" not in part:
         return None
@@ -160,10 +155,6 @@ def run_up_of_set(
     each = float(np.mean(np.abs(own.meshing.relative(speeds)))) / carrier * own.meshing.teeth
     each = round(each) if abs(each - round(each)) < WHOLE else each
     signals = _signals(part, own, each)
-    velocity = None if spec is None or not bodies else rim_velocity(part, own, spec, bodies)
-    if velocity is not None:
-        beside = {k: passing_orders(k * each, len(own.planets)) for k in range(1, SET_ORDERS + 1)}
-        signals = {PICKUP: Signal(velocity, "m/s", 1e-9, beside)} | signals
     return RunUp(part, own.carrier, turning, {"": each}, signals) if signals else None
 
 
@@ -239,10 +230,3 @@ def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:
     }
     meshes = [next(iter(meshes.values())) for meshes in own.meshes.values()]
     return found | {f"{mesh}.force": _force(part, f"{mesh}.force") for mesh in meshes if f"{mesh}.force" in part}
-
-
-def passing_orders(order: float, planets: int) -> tuple[float, ...]:
-    """Orders of the carrier beside a mesh order that equal planets make at a place on the ring: the nearest ones that
-    the number of planets divides (the mesh order itself is not among them)."""
-    below, above = np.ceil(order / planets) - 1, np.floor(order / planets) + 1
-    return float(below * planets), float(above * planets)

@@ -244,7 +244,7 @@ def accuracy(run: Run) -> list[str]:
         parts.append(
             page.note(
                 "The error of the fidelity levels of this stage with these bodies has not been measured "
-                "(evidence/levels.py does it)."
+                "(evidence/study/levels.py does it)."
             )
         )
     return parts + [page.note(_frf_words(body)) for body in bodies or () if hasattr(body, "frf")]

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 from cycler import cycler
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
 
 from gearfmu.files import written_whole
 
 COLOURS = ("#1f5a92", "#c8642b", "#3f8f5f", "#8a5a9e", "#9a8a2f", "#4c4f56", "#b23a48", "#2f9aa0")
+STEEL = LinearSegmentedColormap.from_list("steel", ["#d6dce3", "#a3bfd8", "#4f88b8", "#e2a63e", "#bb3a26"])
 INK, MUTED, GRID = "#23262b", "#6a7079", "#e3e6ea"
 WIDTH = 9.6
 RC = {
@@ -79,3 +82,9 @@ def saved(figure: Any, path: Path) -> list[Path]:
             metadata = {"Date": None} if target.suffix == ".svg" else {}
             figure.savefig(temporary, format=target.suffix[1:], dpi=160, metadata=metadata)
     return written
+
+
+def round_scale(scale: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten below `scale`."""
+    power = 10 ** math.floor(math.log10(scale))
+    return float(next(step * power for step in (5, 2, 1) if step * power <= scale))

@@ -1,1 +1,1 @@
-"""Shipped scenes (TOML files of this folder) and builders of scenes that tests and benchmarks share."""
+"""Shipped scenes: the TOML files of this folder."""

@@ -25,7 +25,7 @@ TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}
 SPEED = "start.pinion_speed"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
-Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
+Integrator = Literal["dg4", "em", "rk45", "central"]
 Contact = Literal["by_level", "line", "nodal"]
 
 

@@ -1,6 +1,6 @@
 """The effects that a scene may call for: one table. docs/effects.md, `gearfmu effects` and the tests are made from it.
 
-What an effect costs is measured (evidence/effects_cost.py) and lies beside this file in effects_cost.csv.
+What an effect costs is measured (evidence/price/effects_cost.py) and lies beside this file in effects_cost.csv.
 """
 
 from __future__ import annotations
@@ -125,8 +125,8 @@ EFFECTS: tuple[Effect, ...] = (
         off="truncated modes, as in the paper",
         code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
         switch="level `paper` alone",
-        off_setting={"level": 4.0, "integrator": 2.0},
-        on_setting={"level": 3.0, "integrator": 2.0},
+        off_setting={"level": 4.0, "integrator": 1.0},
+        on_setting={"level": 3.0, "integrator": 1.0},
         build="residual",
         test="tests/stage/test_effects.py::test_residual",
         kept="it is a static part of the stiffness",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from gearfmu.spec.forms.members import carriers
 from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point
 
@@ -11,6 +13,7 @@ SLICES = (1, 3, 5, 10)
 SLICED = ("fast", "full")
 QUICK_STEPS = (10e-6, 5e-6)
 QUICK_SETTLE, QUICK_DURATION = 0.01, 0.03  # s
+SET_SETTLE, SET_DURATION = 5e-3, 15e-3  # s: a step of a planetary set costs some 200 µs
 RK45_OUTER = 1.25e-6  # s: rk45 records the mean force from samples this far apart; it limits no step of its own
 
 
@@ -30,7 +33,7 @@ def points(scene: SceneSpec, quick: bool = False) -> list[Point]:
     wishes = QUICK_STEPS if quick else STEPS
     steps = sorted({fitting(scene.coupling.step, h) for h in wishes}, reverse=True)
     found = [Point(level, h=h, slices=own) for level in LEVELS for h in (0.0, *steps)]
-    if has_clutch(scene):
+    if has_clutch(scene) or of_set(scene):
         found += [Point("paper", slices=own)]
     else:
         found += [Point("paper", h=RK45_OUTER, slices=own), Point("full", "rk45", RK45_OUTER, own)]
@@ -45,7 +48,16 @@ def has_clutch(scene: SceneSpec) -> bool:
     return scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
 
 
-def quick_scene(scene: SceneSpec) -> SceneSpec:
-    """A short window of the scene, for tests and a first look."""
-    settle = min(scene.settle, QUICK_SETTLE)
-    return scene.model_copy(update={"settle": settle, "duration": min(scene.duration, QUICK_DURATION)})
+def of_set(scene: SceneSpec) -> bool:
+    """Whether the scene's stage has a carrier."""
+    return bool(carriers(load_stage(scene.stage.name)))
+
+
+def window(scene: SceneSpec, quick: bool = False) -> SceneSpec:
+    """The part of the scene that is run: all of it, of a planetary set its first milliseconds; quick: a short window,
+    for tests and a first look."""
+    settle, duration = (SET_SETTLE, SET_DURATION) if of_set(scene) else (scene.settle, scene.duration)
+    if quick:
+        settle, duration = (0.2 * settle, 0.2 * duration) if of_set(scene) else (QUICK_SETTLE, QUICK_DURATION)
+    update = {"settle": min(scene.settle, settle), "duration": min(scene.duration, duration)}
+    return scene.model_copy(update=update)

@@ -40,7 +40,8 @@ class Signals:
     def trace(self, meta: dict) -> Trace:
         """The signals as a Trace, to be kept in a file."""
         time = self.start + self.interval * np.arange(self.te.size)
-        channels = {"te": Channel(self.te, "m"), "force": Channel(self.force, "N")}
+        channels = {"te": Channel(self.te, "m")}
+        channels |= {f"force_{k}": Channel(column, "N") for k, column in enumerate(np.atleast_2d(self.force.T))}
         channels |= {f"bearing_{k}": Channel(column, "N") for k, column in enumerate(self.bearing.T)}
         if self.locked is not None:
             channels["locked"] = Channel(self.locked)
@@ -73,10 +74,14 @@ def set_signals(trace: Trace, stage: Stage, settle: float) -> Signals:
 
 def kept_signals(trace: Trace) -> Signals:
     """The signals of a Trace made by `Signals.trace`."""
-    bearing = np.stack([trace[f"bearing_{k}"] for k in range(4)], 1)
+    force, bearing = (_columns(trace, name) for name in ("force", "bearing"))
     locked = trace["locked"].astype(bool) if "locked" in trace else None
-    meta = trace.meta
-    return Signals(trace["te"], trace["force"], bearing, locked, meta["interval"], meta["start"], meta["steady"])
+    place = (trace.meta[name] for name in ("interval", "start", "steady"))
+    return Signals(trace["te"], force if force.shape[1] > 1 else force[:, 0], bearing, locked, *place)
+
+
+def _columns(trace: Trace, name: str) -> np.ndarray:
+    return np.stack([trace[channel] for channel in trace.channels if channel.startswith(f"{name}_")], 1)
 
 
 @dataclass(frozen=True)
@@ -141,9 +146,10 @@ def band_levels(values: np.ndarray, interval: float) -> dict[float, float]:
 
 
 def band_error(found: Signals, wanted: Signals, window: slice) -> float:
-    """Largest difference (dB) of the octave-band levels of the mesh force over these samples; NaN when there are
-    none."""
-    if found.force.size != wanted.force.size or wanted.force[window].size < 32:
+    """Largest difference (dB) of the octave-band levels of the mesh force, of a set of the sum, over these samples; NaN
+    when there are none."""
+    if found.force.size != wanted.force.size or len(wanted.force[window]) < 32:
         return float("nan")
-    levels = [band_levels(signals.force[window], signals.interval) for signals in (found, wanted)]
+    both = (found, wanted)
+    levels = [band_levels(s.force.reshape(len(s.force), -1).sum(axis=1)[window], s.interval) for s in both]
     return max((abs(20 * np.log10(levels[0][band] / levels[1][band])) for band in levels[1]), default=float("nan"))

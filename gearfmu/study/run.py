@@ -22,9 +22,8 @@ from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
-from gearfmu.study.ladder import base_point, points, quick_scene
+from gearfmu.study.ladder import base_point, points, window
 from gearfmu.study.norm import band_error, errors, lock_time
-from gearfmu.study.notes import notes
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
 from gearfmu.study.table import KeptTable, ReferenceRow, Row, TransientRow
 
@@ -68,7 +67,7 @@ class Job:
     @property
     def window(self) -> SceneSpec:
         """The scene as it is run."""
-        return quick_scene(self.scene) if self.quick else self.scene
+        return window(self.scene, self.quick)
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,7 @@ class _Study:
             self._keep(point, found, references[point.slices])
         kinds = (Row, ReferenceRow, TransientRow)
         rows, against, transients = (tuple(self.tables[kind].of(self.scene.name)) for kind in kinds)
-        return Study(self.scene, rows, against, transients, (*notes(rows, against), *self.said))
+        return Study(self.scene, rows, against, transients, tuple(self.said))
 
     def wanted(self) -> list[Point]:
         """Points with their default steps as numbers, each once."""

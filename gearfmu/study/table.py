@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import asdict, astuple, dataclass, fields
+from collections.abc import Collection, Iterable
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -89,16 +89,6 @@ def write_rows(path: Path, kind: type[AnyRow], rows: Iterable[AnyRow]) -> None:
         writer.writerows(map(_plain, (astuple(row) for row in rows)))
 
 
-def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
-    """A table for the terminal: one row a line, numbers with three digits, columns aligned."""
-    if not rows:
-        return "(no rows)"
-    names = list(columns or asdict(rows[0]))
-    cells = [names] + [[_shown(getattr(row, name)) for name in names] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells)
-
-
 class KeptTable:
     """A CSV file of rows, written after every change."""
 
@@ -132,12 +122,6 @@ def _value(kind: str, text: str) -> Any:
 def _plain(values: tuple) -> list[Any]:
     texts = {True: "true", False: "false"}
     return [texts[v] if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _order(row: Row | ReferenceRow | TransientRow) -> tuple:

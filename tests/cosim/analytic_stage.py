@@ -3,6 +3,7 @@ and once whole."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
@@ -80,3 +81,13 @@ class Plant:
         )
         sources = (Source("combustion", "engine", self.torque), Source("load", "vehicle", self.load))
         return Network(nodes, sources=sources, torque_ports={"pinion": "engine", "wheel": "vehicle"})
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A continuous function of time."""
+
+    function: Callable[[float], float]
+
+    def ends(self, t0: float, t1: float) -> tuple[float, float]:
+        return self.function(t0), self.function(t1)

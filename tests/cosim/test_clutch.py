@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from analytic_stage import Smooth
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.cosim.friction import sticking_torques
 from gearfmu.cosim.network import Clutch, Inertia, Network, Source, Spring
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.signals import Constant, Ramp, Smooth
+from gearfmu.cosim.signals import Constant, Ramp
 
 J1, J2 = 0.2, 0.7
 

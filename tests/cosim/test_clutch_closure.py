@@ -1,5 +1,5 @@
 """Clutch closure as shipped: what the cut costs, against the same kernel and drivetrain coupled at every internal
-step. The whole table: python evidence/coupling.py."""
+step. The whole table: python -m evidence.accuracy.coupling."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from evidence.pages.drivetrain import page
 from gearfmu.cosim.drivetrain import (
     Shafts,
     build,
@@ -22,7 +23,6 @@ from gearfmu.cosim.drivetrain import (
 )
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.table import page
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig, table
 
@@ -37,7 +37,7 @@ def closure(**changes) -> SceneSpec:
 
 def test_docs_show_the_table():
     assert (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8") == page(), (
-        "run: python -m gearfmu.cosim.table > docs/drivetrain.md"
+        "run: make docs"
     )
 
 

@@ -39,7 +39,7 @@ def test_fmu_and_kernel_give_the_same_bits(tmp_path):
     for name, channel in through_fmu.channels.items():
         other = through_kernel.channels[name]
         assert np.array_equal(channel.values, other.values) and channel.values.dtype == other.values.dtype, name
-        assert (channel.unit, channel.description) == (other.unit, other.description)
+        assert channel.unit == other.unit and channel.description.endswith(other.description)  # an FMU's names its part
 
 
 def test_a_run_leaves_trace_and_summary_with_the_promised_fields(tmp_path):

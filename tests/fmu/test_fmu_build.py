@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gearfmu.fmu.symbols import exported_symbols
-from gearfmu.fmu.validate import exchange_functions, fmi_functions
+from evidence.fmu_probes.everything import exchange_functions, fmi_functions
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.kernel import build, library_path
 from gearfmu.kernel.build import BuildError
 

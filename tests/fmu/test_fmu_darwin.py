@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from evidence.fmu_probes.symbols import exported_symbols, load_commands, mach_slices
 from gearfmu.fmu import export
-from gearfmu.fmu.symbols import exported_symbols, load_commands, mach_slices
 from gearfmu.kernel import library_path
 from gearfmu.kernel.build import build_library
 

@@ -15,7 +15,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from gearfmu.fmu.probes import Subject
+from evidence.fmu_probes.probes import Subject
 
 STEPS, H = 200, 1e-4
 TURN, RATIO = 2e-2, 16 / 24  # rad per step; the wheel turns the other way
@@ -30,7 +30,7 @@ SIDE_BY_SIDE = """
 import ctypes, json, sys
 mode, folders = getattr(ctypes, sys.argv[1]), sys.argv[2:]
 ctypes.cdll.LoadLibrary = lambda path: ctypes.CDLL(path, mode=mode)
-from gearfmu.fmu.probes import Subject
+from evidence.fmu_probes.probes import Subject
 subjects = [Subject(folder).initialized() for folder in folders]
 runs = [b"" for _ in folders]
 for _ in range(20):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from builds import sanitized_host, sanitized_library
+from builds import plain_host, sanitized_host, sanitized_library
 from fmpy import read_model_description
 from small_stage import unpack
 
@@ -44,8 +44,8 @@ def sanitized() -> Host:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory) -> Host:
-    return Host(compile_program(SOURCE, tmp_path_factory.mktemp("plain") / "host"), library_path())
+def plain() -> Host:
+    return Host(plain_host(SOURCE), library_path())
 
 
 def references(folder: str, causality: str) -> list[int]:
@@ -71,8 +71,8 @@ def fuzz(host: Host, folder: str, seed: int, calls: int) -> dict[str, int]:
 
 @pytest.mark.needs("gcc")
 def test_random_calls_under_sanitizers(sanitized, unpacked_other):
-    answers = fuzz(sanitized, unpacked_other, seed=1, calls=1500)
-    assert min(answers["ok"], answers["error"]) > 100, "the sequence reached both good and bad calls"
+    answers = fuzz(sanitized, unpacked_other, seed=1, calls=500)
+    assert min(answers["ok"], answers["error"]) > 50, "the sequence reached both good and bad calls"
 
 
 @pytest.mark.full

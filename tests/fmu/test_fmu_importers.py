@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from gearfmu.fmu.probes import Subject
+from evidence.fmu_probes.probes import Subject
 
 STEPS, H = 200, 1e-4
 NAMES = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from small_stage import unpack
 
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
-from gearfmu.fmu import export, validate
-from gearfmu.fmu.probes import Subject
+from gearfmu.fmu import export
 from gearfmu.fmu.terminals import shafts
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -120,4 +121,4 @@ def test_a_set_names_its_ports_planets_and_pins(planetary: StageModel) -> None:
 
 @pytest.mark.parametrize("kind", ["torque", "spring"])
 def test_the_fmu_of_a_set_passes_every_probe(kind: str, tmp_path: Path) -> None:
-    assert validate(export(model(kind), tmp_path / "planetary54.fmu")) == []
+    assert findings(export(model(kind), tmp_path / "planetary54.fmu")) == []

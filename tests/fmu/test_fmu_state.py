@@ -12,11 +12,11 @@ import sys
 import pytest
 from fmpy.fmi2 import fmi2FMUstate
 
-from gearfmu.fmu.probes import DISCARD, ERROR, OK, Subject
+from evidence.fmu_probes.probes import DISCARD, ERROR, OK, Subject
 
 FRESH = """
 import json, sys
-from gearfmu.fmu.probes import Subject
+from evidence.fmu_probes.probes import Subject
 subject = Subject(sys.argv[1])
 state = subject.fmu.deSerializeFMUstate(bytes.fromhex(sys.stdin.readline().strip()))
 subject.fmu.setFMUstate(state)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from small_stage import unpack
 
+from evidence.fmu_probes.everything import findings
+from evidence.fmu_probes.probes import Subject
 from gearfmu.body import load_bodies
-from gearfmu.fmu import export, validate
-from gearfmu.fmu.probes import Subject
+from gearfmu.fmu import export
 from gearfmu.fmu.terminals import shafts
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
@@ -56,7 +57,7 @@ def test_the_fmu_of_a_train_is_its_kernel_bit_for_bit(train: StageModel, fmu: Pa
 
 @pytest.mark.full
 def test_the_fmu_of_a_train_is_valid(fmu: Path) -> None:
-    assert validate(fmu) == []
+    assert findings(fmu) == []
 
 
 def test_the_fmu_of_a_train_names_ports_and_meshes(train: StageModel) -> None:

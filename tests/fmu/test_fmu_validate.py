@@ -1,4 +1,5 @@
-"""validate finds what is wrong, and only that: each damage to a good FMU gives the finding that names it."""
+"""`gearfmu validate` and the probes of evidence/fmu_probes find what is wrong, and only that: each damage to a good FMU
+gives the finding that names it."""
 
 from __future__ import annotations
 
@@ -8,20 +9,24 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from builds import leaky_library
 
+from evidence.fmu_probes.everything import findings
 from gearfmu.body import load_body
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
-from gearfmu.kernel.build import PORTABLE, build_library, host_platform
+from gearfmu.kernel.build import host_platform
 from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 
 
 @pytest.fixture(scope="module")
-def members(native) -> dict[str, bytes]:
-    with zipfile.ZipFile(native) as archive:
+def members(model, tmp_path_factory) -> dict[str, bytes]:
+    """Of an FMU with all that is looked at."""
+    fmu = export(model, tmp_path_factory.mktemp("members") / "stage.fmu", platforms=("host",), terminals=True)
+    with zipfile.ZipFile(fmu) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
@@ -29,10 +34,15 @@ def binary_of(members: dict[str, bytes]) -> str:
     return next(name for name in members if name.startswith(f"binaries/{host_platform()}/"))
 
 
-def findings(members: dict[str, bytes], changes: dict[str, bytes | None], folder: Path) -> list[Problem]:
-    """Problems of the FMU with these members replaced, or left out where None."""
+def damaged(members: dict[str, bytes], changes: dict[str, bytes | None], folder: Path) -> Path:
+    """The FMU with these members replaced, or left out where None."""
     changed = {name: content for name, content in {**members, **changes}.items() if content is not None}
-    return validate(write_archive(folder / "damaged.fmu", changed))
+    return write_archive(folder / "damaged.fmu", changed)
+
+
+def problems_of(members: dict[str, bytes], changes: dict[str, bytes | None], folder: Path) -> list[Problem]:
+    """What `gearfmu validate` says of it."""
+    return validate(damaged(members, changes, folder))
 
 
 def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDescription.xml") -> dict[str, bytes]:
@@ -42,7 +52,7 @@ def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDesc
 
 
 def test_good_fmus_have_no_problems(native, python, other):
-    assert [validate(fmu) for fmu in (native, python, other)] == [[], [], []]
+    assert [findings(fmu) for fmu in (native, python, other)] == [[], [], []]
 
 
 def test_shipped_stage_has_no_problems(tmp_path):
@@ -54,53 +64,62 @@ def test_shipped_stage_has_no_problems(tmp_path):
 @pytest.mark.parametrize(
     "old, new, expected",
     [
-        ('name="mesh.te"', 'name="mesh.tee"', "mesh.te = only in the binary"),
-        ('unit="N.m"', 'unit="N"', "unit = N: the binary says N.m"),
-        ('start="0.0"', 'start="0.5"', "modelDescription.xml declares start=0.5"),
         ('<BaseUnit kg="1" m="1" s="-2" />', "", "declare a unit with its SI base units"),
         ('guid="', 'guid="0', "Failed to instantiate model"),
         ('<Unknown index="', '<Unknown index="9', "modelDescription.xml"),
-        ('causality="output"', 'causality="local"', "causality = local: the binary says output"),
     ],
 )
 def test_changes_of_the_description(members, tmp_path, old, new, expected):
-    problems = findings(members, edited(members, old, new), tmp_path)
+    problems = problems_of(members, edited(members, old, new), tmp_path)
     assert any(expected in str(problem) for problem in problems), "\n".join(map(str, problems))
     assert all(problem.file.endswith("damaged.fmu") and problem.remedy for problem in problems)
 
 
+@pytest.mark.parametrize(
+    "old, new, expected",
+    [
+        ('name="mesh.te"', 'name="mesh.tee"', "mesh.te: only in the binary"),
+        ('unit="N.m"', 'unit="N"', "unit: N: the binary says N.m"),
+        ('start="0.0"', 'start="0.5"', "modelDescription.xml declares start=0.5"),
+        ('causality="output"', 'causality="local"', "ModelStructure"),
+    ],
+)
+def test_a_description_that_is_not_the_binarys(members, tmp_path, old, new, expected):
+    found = findings(damaged(members, edited(members, old, new), tmp_path), ("kernel_table", "start_values"))
+    assert any(expected in text for text in found), found
+
+
 def test_terminals_are_looked_at(members, tmp_path):
     name = "terminalsAndIcons/terminalsAndIcons.xml"
-    unknown = findings(members, edited(members, '"pinion.phi"', '"pinion.psi"', name), tmp_path)
+    unknown = problems_of(members, edited(members, '"pinion.phi"', '"pinion.psi"', name), tmp_path)
     assert [problem.value for problem in unknown] == ["is no variable of the FMU"]
-    shapeless = findings(members, edited(members, "matchingRule=", "matching=", name), tmp_path)
+    shapeless = problems_of(members, edited(members, "matchingRule=", "matching=", name), tmp_path)
     assert any("matching" in problem.value for problem in shapeless)
 
 
 def test_missing_and_misnamed_binaries(members, tmp_path):
     name = binary_of(members)
-    gone = findings(members, {name: None}, tmp_path)
+    gone = problems_of(members, {name: None}, tmp_path)
     assert [problem.value for problem in gone] == ["no binary for a platform known here"]
-    moved = findings(members, {name: None, name + "x.so": members[name]}, tmp_path)
+    moved = problems_of(members, {name: None, name + "x.so": members[name]}, tmp_path)
     assert any("is missing" in problem.value for problem in moved)
 
 
 def test_damaged_model_is_refused_by_the_binary(members, tmp_path):
-    problems = findings(members, {"resources/model.gkb": members["resources/model.gkb"][:-1]}, tmp_path)
-    assert problems and all("export" in p.remedy or "check" in p.remedy for p in problems)
+    problems = problems_of(members, {"resources/model.gkb": members["resources/model.gkb"][:-1]}, tmp_path)
+    assert problems and all("export" in p.remedy for p in problems)
 
 
 @pytest.mark.needs("gcc")
 def test_leaked_symbols_are_found(members, tmp_path):
-    one_more = ("gcc", "-O0", PORTABLE, "-Wl,--defsym=leaked=fmi2GetVersion")
-    leaky = build_library(out=tmp_path / "leaky.so", compiler=one_more)
-    problems = findings(members, {binary_of(members): leaky.read_bytes()}, tmp_path)
-    assert [problem.value for problem in problems] == ["leaked is exported"]
+    leaky = leaky_library().read_bytes()
+    found = findings(damaged(members, {binary_of(members): leaky}, tmp_path), ())
+    assert len(found) == 1 and "leaked is exported" in found[0]
 
 
 @pytest.mark.needs("gcc")
 def test_a_crash_is_a_finding(members, tmp_path):
-    """A binary whose fmi2DoStep holds an invalid instruction: every check that steps is named, the others still run."""
+    """A binary whose fmi2DoStep holds an invalid instruction."""
     library = tmp_path / "library.so"
     library.write_bytes(members[binary_of(members)])
     listed = subprocess.run(["nm", "-D", str(library)], capture_output=True, text=True, check=True).stdout
@@ -108,10 +127,8 @@ def test_a_crash_is_a_finding(members, tmp_path):
     data = bytearray(library.read_bytes())
     place = file_offset(data, address)
     data[place : place + 2] = b"\x0f\x0b"
-    problems = findings(members, {binary_of(members): bytes(data)}, tmp_path)
-    crashed = {problem.field for problem in problems}
-    assert {"bad_steps", "saved_state", "instances", "clocks"} <= crashed and "start_values" not in crashed
-    assert all("brings its process down" in problem.remedy for problem in problems)
+    (problem,) = problems_of(members, {binary_of(members): bytes(data)}, tmp_path)
+    assert problem.field == "a run of 10 steps" and "ended with code -" in problem.value
 
 
 def file_offset(data: bytearray, address: int) -> int:

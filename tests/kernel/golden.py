@@ -3,8 +3,8 @@ beside each hash show how far it went.
 
 Every integrator, kind of stage, effect and calculation once (golden_stages.py), in single and double build:
 
-    python tests/kernel/golden.py            what moved, by how much
-    python tests/kernel/golden.py --write    stores what this kernel gives, in a commit that says why
+    PYTHONPATH=. python tests/kernel/golden.py            what moved, by how much
+    PYTHONPATH=. python tests/kernel/golden.py --write    stores what this kernel gives, in a commit that says why
 
 The stored models of golden_stages.py are written by --write-models (golden_models.py), which changes their runs too.
 """

@@ -1,7 +1,7 @@
 """Small models of every kind of stage for the golden digests: the shipped stages with few modes, width functions and
 lengths of roll, rounded, and stored, so that a digest depends on the kernel alone.
 
-    python tests/kernel/golden.py --write-models
+    PYTHONPATH=. python tests/kernel/golden.py --write-models
 
 makes them anew from the shipped bodies; all digests of these models change with that.
 """

@@ -19,7 +19,7 @@ from gearfmu.stage.build.blob import read_blob, write_blob
 
 STEP = 2e-5  # s, communication step
 RIGID, FAST, STANDARD, FULL, PAPER, EXPLICIT = map(float, range(6))
-DG4, MIX4, EM, RK45, CENTRAL = map(float, range(5))
+DG4, EM, RK45, CENTRAL = map(float, range(4))
 FRICTION = {"effect.friction": 1.0}
 FILM = {"effect.film": 1.0}
 BARE = {f"effect.{name}": 0.0 for name in ("coriolis", "centrifugal", "gyroscopic")}
@@ -166,7 +166,6 @@ RUNS: dict[str, tuple[str, Parameters]] = {
     "pair/jammed": ("jammed", {"level": FULL}),
     "pair/rattle": ("rattle", {"level": FAST}),
     "pair/rattle_em": ("rattle", {"level": FAST, "integrator": EM}),
-    "pair/rattle_mix4": ("rattle", {"level": FAST, "integrator": MIX4}),
     "pair/clutch": ("clutch", {"level": RIGID}),
     "pair/plain": ("reversing", {"level": FAST} | PLAIN),
     "pair/film": ("pair", {"level": FAST, "contact_damping": 0.0} | FILM),

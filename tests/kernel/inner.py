@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import reuse
 
 from gearfmu.kernel import Kernel
 
@@ -45,6 +46,13 @@ class Inner:
         rows = [out[12 * i : 12 * i + 12] for i in range(count)]
         return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
 
+    def rows(self, engagement: int, pose: np.ndarray, reach: float = 1e-3) -> np.ndarray:
+        """(k, 27) per place and slice: flank, slice, share of it on both flanks; gap and sliding per motion of the pose
+        (12,): of either gear x, y, φ, z, and tilt about x and y."""
+        full, out = (ctypes.c_double * 12)(*pose), (ctypes.c_double * (8 * 64 * 27))()
+        count = self._lib.probe_rows(*self._handles(), engagement, full, ctypes.c_double(reach), out)
+        return np.array(out[: 27 * count]).reshape(count, 27)
+
     def law(self, force: float, curvature: float) -> tuple[float, float, float]:
         """Approach (m), slope (m/N) and energy (J) of one slice."""
         out = (ctypes.c_double * 3)()
@@ -77,6 +85,7 @@ class Inner:
 
     def force_gamma(self, gamma: float) -> None:
         """Keep this γ whatever the limit of the step says; after `kernel.initialize`."""
+        reuse.keep(self.kernel)
         self._lib.probe_set_gamma(self._handles()[1], ctypes.c_double(gamma))
 
     def runout(self, pose: np.ndarray, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

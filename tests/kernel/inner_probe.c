@@ -23,12 +23,30 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
     return found;
 }
 
+/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, share, gradient[12], slide[12]} */
+GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const double *pose, double reach,
+                      double *out)
+{
+    gk_place place[MAX_PAIRS];
+    gk_position position[2];
+    int rows = 0;
+    const int found = gk_flank_find(model, setup, &setup->mesh[e], pose, reach, position, place);
+    for (int i = 0; i < found; i++)
+        for (int strip = 0; strip < setup->strips; strip++, rows++, out += 3 + 2 * POSE) {
+            const gk_point *point = gk_point_of(setup, &place[i], strip);
+            out[0] = place[i].flank, out[1] = strip, out[2] = point->share;
+            memcpy(out + 3, point->gradient, sizeof point->gradient);
+            memcpy(out + 3 + POSE, point->slide, sizeof point->slide);
+        }
+    return rows;
+}
+
 /* out: {approach, slope, energy} of one slice at `force` */
 GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curvature, double force, double *out)
 {
     gk_system s;
     memset(&s, 0, sizeof s);
-    s.contacts = 1;
+    s.contacts = s.n = 1, s.stride = 4;
     s.curvature[0] = curvature, s.force[0] = force;
     s.width[0] = model->engagement[0].width / setup->slices;
     s.per_width[0] = 1.0 / s.width[0];
@@ -85,9 +103,9 @@ GK_API void probe_set_gamma(gk_setup *setup, double gamma)
     for (int i = 0; i < GAMMAS; i++) setup->gamma_at[i] = gamma;
 }
 
-/* coefficient of friction of a law (1: Benedict and Kelley, 2: ISO/TR 14179-2), viscosity, roughness, sum of the rolling
- * speeds at the pitch point per speed of gear A and relative radius there, width; load per length, total force, sliding
- * speed, sum of the rolling speeds, speed of gear A */
+/* coefficient of friction; given: law (1: Benedict and Kelley, 2: ISO/TR 14179-2), viscosity, roughness, sum of the
+ * rolling speeds at the pitch point per speed of gear A and relative radius there, width; load per length, total force,
+ * sliding speed, sum of the rolling speeds, speed of gear A */
 GK_API double probe_friction(const double *given)
 {
     const gk_friction law = {.law = (gk_friction_law)(int)given[0],

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 from exact_bars import Bar
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.spec.tables.ports import LevelSpec
 from gearfmu.stage.build.assembly import (
     MODEL_VERSION,
@@ -26,7 +27,6 @@ from gearfmu.stage.build.blob import read_blob, write_blob
 from gearfmu.stage.build.fields import gear_numbers, order_sections
 from gearfmu.stage.build.free import FreeBody, free_gear
 from gearfmu.stage.build.groups import Group, Layout, Support, mount
-from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 NAMES = ("pinion", "wheel")
 OFFSETS = np.arange(-3, 4)

@@ -4,6 +4,7 @@ GK_ASSERT, of which none fails."""
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 import re
 import struct
@@ -33,7 +34,7 @@ def bits(library: Path) -> str:
     """SHA-256 over states and outputs of short runs: every integrator through reversals of torque,
     dg4 with a slipping clutch."""
     digest = hashlib.sha256()
-    for integrator in range(4):
+    for integrator in range(3):
         digest.update(run(library, ("torque", "spring"), integrator, 200))
     digest.update(run(library, ("chain", "spring"), 0, 300))
     return digest.hexdigest()
@@ -41,7 +42,7 @@ def bits(library: Path) -> str:
 
 def run(library: Path, ports: tuple[str, str], integrator: int, steps: int) -> bytes:
     """Outputs and last state of a run with a swinging input; the contact opens and closes."""
-    kernel = Kernel(pair_blob(ports), {"integrator": integrator, "h": 2e-6 if integrator == 3 else 7.5e-6}, library)
+    kernel = Kernel(pair_blob(ports), {"integrator": integrator, "h": 2e-6 if integrator == 2 else 7.5e-6}, library)
     if ports[0] == "chain":
         kernel.set("pinion.w", 30.0)
         kernel.set("pinion.clutch.capacity", 120.0)
@@ -106,7 +107,7 @@ def apart(*arguments: object) -> subprocess.CompletedProcess[str]:
     """A Python program of this folder in a process of its own, which a check that fails ends."""
     here = Path(__file__).parent
     line = [sys.executable, str(here / str(arguments[0])), *map(str, arguments[1:])]
-    return subprocess.run(line, capture_output=True, text=True)
+    return subprocess.run(line, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(here.parents[1])})
 
 
 def test_no_check_fails_in_runs_of_the_pair() -> None:

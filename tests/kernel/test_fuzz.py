@@ -95,28 +95,22 @@ def check(found: Findings, first: int, count: int) -> None:
     assert not wrong, wrong[:20]
 
 
-def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path) -> None:
-    found = feed(fuzzer, sound, range(200))
+@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.full)])
+def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path, count: int) -> None:
+    found = feed(fuzzer, sound, range(count))
+    check(found, 0, count)
+    assert found.outcomes[REFUSED] == 0 and found.outcomes["step", "0"] > count / 2
+
+
+def test_some_damaged_blobs(fuzzer: Path) -> None:
+    found = feed(fuzzer, damaged, range(200))
     check(found, 0, 200)
-    assert found.outcomes[REFUSED] == 0 and found.outcomes["step", "0"] > 100
+    assert found.outcomes[REFUSED] > 60 and found.outcomes["step", "0"] > 20
 
 
-def test_a_thousand_damaged_blobs(fuzzer: Path) -> None:
-    found = feed(fuzzer, damaged, range(1000))
-    check(found, 0, 1000)
-    assert found.outcomes[REFUSED] > 300 and found.outcomes["step", "0"] > 100
-
-
-@pytest.mark.parametrize(
-    ("case", "end"),
-    [
-        pytest.param(6172, ("step", "8"), id="rk45 goes down to picoseconds that are never refused one by one"),
-        pytest.param(71842, ("initialize", "7"), id="energy at rest overflows"),
-    ],
-)
-def test_cases_that_were_wrong_once(fuzzer: Path, case: int, end: tuple[str, str]) -> None:
-    check(found := feed(fuzzer, damaged, [case]), case, 1)
-    assert found.outcomes == {end: 1}
+def test_energy_at_rest_that_overflows_is_refused(fuzzer: Path) -> None:
+    check(found := feed(fuzzer, damaged, [71842]), 71842, 1)
+    assert found.outcomes == {("initialize", "7"): 1}
 
 
 @pytest.mark.full

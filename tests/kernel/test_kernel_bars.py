@@ -15,7 +15,7 @@ from small_model import bar_bodies, bars_blob
 from gearfmu.kernel import Kernel
 
 STEPS_PER_CELL = 5
-INTEGRATORS = {"dg4": 0, "em": 2}
+INTEGRATORS = {"dg4": 0, "em": 1}
 GAMMA = {"dg4": 1.0, "em": 0.0}
 
 
@@ -45,7 +45,7 @@ class Case:
 
     @property
     def local_compliance(self) -> float:
-        """Secant at 100 N (LOAD of gearfmu.study.flat) of the line contact law of both bars, m/N:
+        """Secant at 100 N (LOAD of evidence.study.flat) of the line contact law of both bars, m/N:
         Σ local [ln(4w/b) − 1]."""
         half_width = np.sqrt(2 * 2 * self.local * 100.0)
         return 2 * self.local * (np.log(4 * 1e-3 / half_width) - 1)

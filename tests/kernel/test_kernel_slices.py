@@ -11,14 +11,14 @@ import pytest
 from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
 
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
-from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 H, STEPS, SPEED = 5e-6, 600, 0.2
 BLOCK = FlatContact(slices=6, degrees=(0, 2), gap=1.3e-6, local=2.8e-12)
 SEED = 2
 PATH_SHARE = 0.95  # of the residual, what a dashpot is parallel to (docs/theory.md, 2.5)
-REFERENCE_LOAD = 100.0  # N over the width: LOAD of gearfmu.study.flat
+REFERENCE_LOAD = 100.0  # N over the width: LOAD of evidence.study.flat
 
 
 def bodies(zeta: float) -> tuple[FlatBody, FlatBody]:
@@ -130,7 +130,7 @@ def test_mirrored_slices_as_one_row_change_nothing(slices: int, damping: float) 
     np.testing.assert_allclose(forces[1], forces[0], rtol=0, atol=1e-11 * forces[0].max())
 
 
-@pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (2, 0.0)], ids=["dg4", "em"])
+@pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (1, 0.0)], ids=["dg4", "em"])
 @pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 1e4)])
 @pytest.mark.parametrize("slices", [1, 4, 5, 6])
 def test_slices_step_by_step(

@@ -74,8 +74,3 @@ def test_laws_of_friction_are_in_one_order() -> None:
     laws = re.search(r"enum gk_friction_law \{([^}]*)\}", text)
     assert laws is not None
     assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == friction.LAWS
-
-
-def test_the_benchmark_of_nodal_rows_has_the_kernels_points() -> None:
-    text = (ROOT / "evidence" / "nodal_rows.py").read_text(encoding="utf-8")
-    assert re.search(rf"^POINTS = {said('gk_grid.h', 'POINTS')} ", text, re.M)

@@ -11,13 +11,12 @@ from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
 
-STEP, STEPS, MIX4 = 7e-6, 6, 1
-RIGID = {"level": 0, "slices": 1, "integrator": MIX4, "effect.elastic": 0, "effect.bearings": 0}
+STEP, STEPS, EM = 7e-6, 6, 1
+RIGID = {"level": 0, "slices": 1, "integrator": EM, "effect.elastic": 0, "effect.bearings": 0}
 
 
 def after_a_jump(library: Path | None, torques: tuple[float, float], damping: float) -> np.ndarray:
-    """Mesh force (N) and transmission error (m) of every step after a jump of the torque (N·m); the balance of energy,
-    of which mix4 knows nothing, would solve the step more than once."""
+    """Mesh force (N) and transmission error (m) of every step after a jump of the torque (N·m)."""
     kernel = Kernel(pair_blob(("torque", "fixed")), {**RIGID, "contact_damping": damping}, library)
     kernel.set("pinion.tau", torques[0])
     kernel.initialize()

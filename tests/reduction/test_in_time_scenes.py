@@ -1,5 +1,5 @@
-"""Scenes of the time-domain comparison (evidence/in_time): contact points, ranking of reductions, CalculiX and the
-kernel beside the finite elements."""
+"""Scenes of the time-domain comparison (evidence/reduction/in_time): contact points, ranking of reductions, CalculiX
+and the kernel beside the finite elements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import importlib
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,14 +19,18 @@ from gearfmu.femesh.mesh import rotated
 from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.spec.stage import load_stage
 
-FOLDER = Path(__file__).resolve().parents[2] / "evidence" / "in_time"
+FOLDER = Path(__file__).resolve().parents[2] / "evidence" / "reduction" / "in_time"
+
+
+def module(name: str) -> ModuleType:
+    """A module of the comparison."""
+    return importlib.import_module(f"evidence.reduction.in_time.{name}")
 
 
 @pytest.fixture
-def modules(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
-    monkeypatch.syspath_prepend(str(FOLDER))
+def modules() -> SimpleNamespace:
     names = ("contact_points", "scenes")
-    return SimpleNamespace(**{name: importlib.import_module(name) for name in names})
+    return SimpleNamespace(**{name: module(name) for name in names})
 
 
 def test_rows_of_contact_points_are_derivatives_of_their_gaps(modules: SimpleNamespace) -> None:
@@ -67,14 +71,14 @@ def test_backlash_is_shared_by_both_flanks(modules: SimpleNamespace) -> None:
 @lru_cache
 def scene_of(name: str) -> tuple[Any, dict[Any, Any]]:
     """A scene of the comparison and the bodies reduced for it so far."""
-    study = importlib.import_module("compare").STUDIES[name]
+    study = module("compare").STUDIES[name]
     return study.make(study.meshes), {}
 
 
 @lru_cache
 def run_of(scene: str, carrier: str, gears: str) -> dict[str, np.ndarray]:
     """Channels of a scene whose bodies are reduced like this, or "whole"."""
-    compare, (made_scene, made) = importlib.import_module("compare"), scene_of(scene)
+    compare, (made_scene, made) = module("compare"), scene_of(scene)
     return compare.integrated(made_scene, compare.STUDIES[scene].scheme, compare.Run(carrier, gears), made)
 
 
@@ -82,7 +86,7 @@ def error_of(scene: str, carrier: str, gears: str, channel: str) -> float:
     """Error of a channel, over its rms, against the unreduced scene."""
     reference, found = run_of(scene, "whole", "whole"), run_of(scene, carrier, gears)
     (name,) = [name for name in reference if name.startswith(channel)]
-    return float(importlib.import_module("channels").errors(reference[name], found[name])[0])
+    return float(module("channels").errors(reference[name], found[name])[0])
 
 
 @pytest.mark.full
@@ -110,7 +114,10 @@ def test_eigenmodes_of_gears_suffice_for_speeds_and_not_for_forces(modules: Simp
 def test_calculix_goes_the_same_way(modules: SimpleNamespace) -> None:
     """CalculiX's columns of both windows, our side integrated here: every channel within 1e-4 of its rms (CalculiX
     prints as many digits)."""
-    window, tables = importlib.import_module("window"), importlib.import_module("tables")
+    window, tables = (
+        module("window"),
+        module("tables"),
+    )
     count = 0
     for name, make in window.SCENES.items():
         scene, mark = make(window.MESHES), " | CalculiX"
@@ -127,7 +134,10 @@ def test_calculix_goes_the_same_way(modules: SimpleNamespace) -> None:
 @pytest.mark.full
 def test_kernel_carries_the_impact_of_the_finite_elements(modules: SimpleNamespace, tmp_path: Path) -> None:
     """Level full against the stored force of the unreduced gears: peak within 5 %, impulse within 1 %."""
-    kernel, tables = importlib.import_module("kernel"), importlib.import_module("tables")
+    kernel, tables = (
+        module("kernel"),
+        module("tables"),
+    )
     reference = tables.read_columns(FOLDER / "curves_kernel.csv")["finite elements"]
     spec = load_stage(FOLDER / "pair" / "stage.toml")
     bodies = reduce_bodies(spec, tmp_path)

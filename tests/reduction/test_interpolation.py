@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small_body import ring_body, web_body
 
+from evidence.reduction.methods import METHODS
+from evidence.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
-from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, relative_error, transfer
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from small_body import mounted, small, tiny
 
+from evidence.reduction.methods import METHODS, snapshots
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
-from gearfmu.reduction.methods import METHODS, snapshots
-from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.moments import expansion_points, input_loads
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
 
@@ -144,18 +144,10 @@ def test_a_full_basis_is_the_full_model(name, ground):
         assert np.linalg.norm(h - exact) < 1e-8 * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("name", ["modal", "craig_bampton", "rubin", "krylov", "snapshots"])
-def test_a_tolerance_is_met(name):
-    tolerance = {"modal": 0.2, "snapshots": 0.05}.get(name, 1e-3)
-    basis = METHODS[name](HELD, Size(tolerance=tolerance, band=(100.0, 8e3)))
-    lines = Judging.over((100.0, 8e3), 77)
-    error = relative_error(reference(HELD, lines).matrix, transfer(oscillators(HELD, basis, 0.01), lines, HELD.ground))
-    assert 1e-3 * tolerance < error.max() <= 1.02 * tolerance or name == "krylov" and error.max() <= tolerance
-
-
-def test_a_tolerance_out_of_reach_is_refused_with_the_best_error():
-    with pytest.raises(BodyError, match="does not reach 1e-06"):
-        METHODS["static"](HELD, Size(tolerance=1e-6))
+def test_expansion_points_are_chebyshev_points_of_the_second_kind():
+    """Three in 0 … 100 Hz: 0, half and all of it in Ω; σ = Ω² = (2π·50)² and (2π·100)²."""
+    assert expansion_points(3, (0.0, 100.0)) == pytest.approx([0.0, 98696.044, 394784.176], rel=1e-8)
+    assert expansion_points(1, (0.0, 100.0)) == [0.0]
 
 
 def test_a_shift_on_an_eigenvalue_moves():
@@ -187,7 +179,7 @@ def test_snapshots_reproduce_their_training_and_the_run_its_equation():
 
 
 def test_bad_sizes_say_what_to_do():
-    for wrong in ({}, {"count": 3, "tolerance": 0.1}, {"count": 0}, {"tolerance": 2.0}, {"count": 3, "band": (5, 1)}):
+    for wrong in ({"count": 0}, {"count": 3, "band": (5, 1)}):
         with pytest.raises(BodyError, match="size"):
             Size(**wrong)
     for name in ("krylov", "rubin", "craig_bampton"):

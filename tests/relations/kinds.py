@@ -81,23 +81,49 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Drawn(Kind):
-    """A stage of one of the kinds with drawn numbers: supports, backlash, pin errors, runout, pitch errors."""
+    """A stage of one of the kinds with drawn numbers: supports, backlash, pin errors, runout, pitch errors; `even`:
+    without those of the last two."""
 
     seed: int = 0
+    even: bool = False
 
     @property
     def stage(self) -> Stage:
-        return _drawn(self.file, self.seed)
+        stage = _drawn(self.file, self.seed)
+        return even(stage) if self.even else stage
 
     def model(self, change: Change | None = None) -> StageModel:
         """The assembled model, of the stage as drawn or as `change` returns it."""
         return assembled((change or (lambda stage: stage))(self.stage), bodies_of(self.file))
 
 
-def drawn(seed: int) -> Drawn:
+def drawn(seed: int, even: bool = False) -> Drawn:
     """The same stage for every run of the tests."""
     kind = list(KINDS.values())[seed % len(KINDS)]
-    return Drawn(f"{kind.name}-{seed}", kind.file, kind.torque, kind.speed, kind.step, kind.duration, seed)
+    return Drawn(f"{kind.name}-{seed}", kind.file, kind.torque, kind.speed, kind.step, kind.duration, seed, even)
+
+
+def even(stage: Stage) -> Stage:
+    """Every tooth of a gear like the others."""
+    nominal = {"eccentricity": None, "deviations": None}
+    plain = {
+        name: body.model_copy(update=nominal) if isinstance(body, ToothedBody) else body
+        for name, body in stage.bodies.items()
+    }
+    return stage.model_copy(update={"bodies": plain})
+
+
+def held_as(stage: Stage, other: Callable[[str], str]) -> tuple[SupportSpec, ...]:
+    """Supports of a stage, each of a carried body with the springs of the body `other`."""
+    fields = ("radial", "axial", "tilt", "torsion", "damping_ratio")
+    carried = {support.body: support for support in stage.supports if support.to is not None}
+
+    def own(support: SupportSpec) -> SupportSpec:
+        if support.to is None or other(support.body) == support.body:
+            return support
+        return support.model_copy(update={name: getattr(carried[other(support.body)], name) for name in fields})
+
+    return tuple(map(own, stage.supports))
 
 
 @cache
@@ -183,7 +209,7 @@ def family(name: str) -> str:
 @cache
 def _stage(file: str) -> Stage:
     if file == "internal":
-        spec = load_stage(ROOT / "evidence" / "calculix" / "internal" / "stage.toml")
+        spec = load_stage(ROOT / "evidence" / "peers" / "calculix" / "internal" / "stage.toml")
         coarse = {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}
         spring = {"kind": "spring", "k": 2e4, "c": 1.0}
         ports = {name: port.model_copy(update=spring) for name, port in spec.ports.items()}

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kinds import KINDS, Change, Kind, channels, differences, drawn, family, level_number, loaded
+from kinds import KINDS, Change, Kind, channels, differences, drawn, even, family, level_number, loaded
 
 from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.stage.build.meshes import tooth_phases
@@ -24,6 +24,7 @@ from gearfmu.stage.run.simulate import simulate
 
 # tolerances, of a channel's family
 ALONE = 1e-8  # one engagement: found up to 2e-10
+DRAWN = 5e-6  # one engagement with pitch errors and runout: found up to 4e-7
 COUPLED = 5e-4  # several, which are solved in turns to 1e-7 of their gaps: found up to 1.3e-4, the tilt of spur gears
 OTHER_TEETH = 3e-6  # rows in single precision, turned by other teeth: found up to 5e-7
 SHORT = 2e-4  # s
@@ -93,16 +94,6 @@ def everything(stage: Stage) -> Stage:
     return stage
 
 
-def even(stage: Stage) -> Stage:
-    """Every tooth of a gear like the others, so that it does not matter which of them is tooth 0."""
-    nominal = {"eccentricity": None, "deviations": None}
-    plain = {
-        name: body.model_copy(update=nominal) if isinstance(body, ToothedBody) else body
-        for name, body in stage.bodies.items()
-    }
-    return stage.model_copy(update={"bodies": plain})
-
-
 @cache
 def run(kind: Kind, change: Change | None = None, shift: float = 0.0, **parameters: float) -> dict[str, np.ndarray]:
     """A short run, driven as the unchanged stage is: the order of the ports says which one is the input. shift: s."""
@@ -148,7 +139,7 @@ def test_the_order_of_one_table_does_not_matter(name: str, change: Change) -> No
 @pytest.mark.parametrize("seed", range(20))
 def test_the_order_of_the_tables_of_a_drawn_stage_does_not_matter(seed: int) -> None:
     kind = drawn(seed)
-    compare(kind, run(kind), run(kind, everything))
+    compare(kind, run(kind), run(kind, everything), DRAWN if len(kind.stage.engagements) == 1 else COUPLED)
 
 
 @pytest.mark.parametrize("effect", ["friction", "film"])

@@ -182,7 +182,7 @@ def test_numbers_are_scaled_by_the_dimension_of_their_unit() -> None:
 # ---- bodies, statics, motion -----------------------------------------------------------------------------------------
 DEAR = [pytest.param(name, marks=pytest.mark.full) for name in ("set", "helical_set")]
 NAMES = ["pair", "helical", "internal", "train", *DEAR]
-BODIES = [pytest.param(name, marks=pytest.mark.full) if name == "train" else name for name in NAMES]
+BODIES = [pytest.param(name, marks=pytest.mark.full) if name in ("internal", "train") else name for name in NAMES]
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gearfmu.report.frf import write_cost_chart
+from evidence.reduction.methods.charts import write_cost_chart
 
 
 def test_a_line_a_method_and_a_tick_a_mesh(tmp_path: Path) -> None:

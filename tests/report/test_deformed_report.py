@@ -17,10 +17,7 @@ from PIL import Image
 
 from gearfmu import report
 from gearfmu.body import load_bodies
-from gearfmu.report.picture import deformed_pair
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.observed import gear_bodies
 from gearfmu.stage.run.deformation import Deformation, GearMotion
 from gearfmu.stage.run.trace import Channel, Trace
 
@@ -102,24 +99,3 @@ def test_what_cannot_be_drawn_is_said(
     assert not images(page) and "gearfmu reduce STAGE --force" in page
     page = report.write(run, run.meta, tmp_path, deformation=deformation).read_text(encoding="utf-8")
     assert "bodies are not at hand" in page
-
-
-def test_the_sun_is_drawn_with_a_planet_in_the_axes_of_the_carrier(spec: Any, bodies: list[Any]) -> None:
-    """Turned as a whole, sun and carrier by the same angle, the pair is the same picture; turned against each other it
-    is another."""
-    stage, gears = as_general(spec), list(gear_bodies(spec, bodies).values())
-
-    def drawn(sun: float, carrier: float) -> np.ndarray:
-        values = {
-            "sun_planet2.force": (-1800.0, "N"),
-            "sun.gear.phi": (sun, "rad"),
-            "carrier.gear.phi": (carrier, "rad"),
-        }
-        channels = {name: Channel(np.full(3, value), unit) for name, (value, unit) in values.items()}
-        plot = deformed_pair(Trace(np.arange(3.0), channels), stage, "sun_planet2", gears)
-        assert plot is not None and "coast flanks" in plot.caption and "other meshes" in plot.caption
-        return np.column_stack([plot.columns[f"drawn_{axis}_[m]"] for axis in "xyz"])
-
-    first, turned = drawn(0.1, 0.0), drawn(1.3, 1.2)
-    assert np.abs(turned - first).max() < 1e-9
-    assert np.abs(drawn(0.2, 0.0) - first).max() > 1e-4

@@ -13,15 +13,26 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack, unpacked
 from gearfmu.report.structure import AROUND, parts, turned
+from gearfmu.report.style import round_scale
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.observed import gear_bodies
-from gearfmu.stage.run.touching import contacts_at, meshing_angles
+from gearfmu.stage.run.touching import contacts_at
 from gearfmu.stage.run.trace import Channel, Trace
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N
 TIME = np.linspace(0.0, 0.02, 2001)
+
+
+def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
+    """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
+    the rolls of docs/theory eq. 4 add up to L."""
+    a, b = pair.gears
+    t = -sg * pair.alpha_wt
+    roll = a.r_b * sg * (phi + sg * a.psi_b - t)
+    beta = t + math.pi + sg * (pair.length - roll) / b.r_b
+    return phi, beta - sg * b.psi_b
 
 
 def turning_pair(sign: float = 1.0) -> tuple[Trace, Any, dict[str, Any]]:
@@ -147,3 +158,26 @@ def test_shafts_and_carriers_of_the_stage_are_drawn_with_its_measures() -> None:
 def test_a_pair_without_shafts_has_its_gears_alone(view: View) -> None:
     assert [body.name for body in view.bodies] == ["pinion", "wheel"]
     assert "shafts" not in view.caption
+
+
+@pytest.mark.parametrize("sg", [1, -1])
+@pytest.mark.parametrize("phi", np.linspace(0, 2 * math.pi / 16, 7))
+def test_teeth_touch_where_both_flanks_are(sg: int, phi: float) -> None:
+    """The flank points of both gears at the rolls found coincide in space, to rounding."""
+    pair = PairGeometry.of(load_stage("fzg_c/stage_relief"))
+    angles = meshing_angles(pair, phi, sg)
+    contacts = contacts_at(pair, angles, sg)
+    assert 1 <= len(contacts) <= 2
+    for contact in contacts:
+        spots = []
+        for g, gear in enumerate(pair.gears):
+            roll, base = contact.rolls[g], angles[g] + 2 * math.pi * contact.teeth[g] / gear.z + sg * gear.psi_b
+            polar = base - sg * (roll / gear.r_b - math.atan2(roll, gear.r_b))
+            radius = math.hypot(roll, gear.r_b)
+            spots.append(np.array([g * pair.a + radius * math.cos(polar), radius * math.sin(polar)]))
+        assert np.linalg.norm(spots[0] - spots[1]) < 1e-9
+
+
+@pytest.mark.parametrize(("wish", "scale"), [(1.0, 1), (4.9, 2), (5.0, 5), (87.0, 50), (0.7, 0.5)])
+def test_scale_is_a_round_number(wish: float, scale: float) -> None:
+    assert round_scale(wish) == pytest.approx(scale)

@@ -1,4 +1,4 @@
-"""The report of a run-up: order maps of made-up sweeps, and the pickup on a ring."""
+"""The report of a run-up: order maps of made-up sweeps."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from gearfmu.cli import outcome
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.plots_set import planet_set
-from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
-from gearfmu.report.runup import PICKUP, Turning, passing_orders, resonances, run_up_of_meshes, run_up_of_set
+from gearfmu.report.runup import Turning, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
@@ -98,38 +97,7 @@ def test_the_report_of_a_run_up_has_its_maps_instead_of_a_spectrum(tmp_path: Pat
     made = {path.stem for path in (tmp_path / "data").glob("*.csv")}
     assert {"spectrogram_speed", "orders_map", "orders_speed"} <= made and "spectrum" not in made
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Campbell diagram of the run-up" in text and "mesh orders k × 54" in text and PICKUP in text
-
-
-def test_equal_planets_make_orders_at_a_place_on_the_ring_that_their_number_divides() -> None:
-    """At 54 orders of the carrier and four planets in alternating phase: 52 and 56, nothing at 54 (McFadden and Smith,
-    Proc. IMechE 199 (1985) 65); the ring's oval is loudest where an order meets it."""
-    assert passing_orders(54, 4) == (52.0, 56.0) and passing_orders(108, 4) == (104.0, 112.0)
-    ring = load_bodies(load_stage("planetary54"))[2]
-    forces = {f"p{k}": 1000.0 + 50.0 * (-1) ** k * np.cos(54.0 * ANGLE) for k in range(4)}
-    angles = {f"p{k}": ANGLE + 0.5 * np.pi * k for k in range(4)}
-    found = order_map(TIME, velocity_of(ring, STEP, forces, angles), ANGLE, 60.0)
-    steady = (found.speed > 180.0) & (found.speed < 220.0)
-    level = {order: found.amplitude[np.ix_(steady, found.order == order)].mean() for order in (52, 53, 54, 55, 56)}
-    assert min(level[52], level[56]) > 30.0 * max(level[53], level[54], level[55]), level
-    oval = ring.frequency[(ring.nodal_diameter == 2) & (ring.parity == 1)].min()
-    for order in (52, 56):
-        at = found.speed[np.argmax(found.amplitude[:, found.order == order].ravel())] * order / (2 * np.pi)
-        assert at == pytest.approx(oval, rel=0.06), "within a window of four revolutions"
-
-
-class _Mode:
-    damping_ratio = np.array([0.02])
-
-
-def test_a_mode_under_a_ramp_moves_as_the_closed_form_says() -> None:
-    """q'' + 2ζω q' + ω² q = t: q' = (1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t))/ω²."""
-    omega, zeta = 700.0, 0.02
-    damped, t = omega * np.sqrt(1 - zeta**2), TIME[:2000]
-    exact = (
-        1 - np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
-    ) / omega**2
-    assert np.allclose(_modal_velocity(t, STEP, omega, _Mode, 0), exact, rtol=0.0, atol=1e-12 * np.abs(exact).max())
+    assert "Campbell diagram of the run-up" in text and "mesh orders k × 54" in text
 
 
 def pair_sweep(swing: float = 0.0) -> Trace:

@@ -316,6 +316,14 @@ def test_backlash_is_judged_after_the_allowance(write: Write) -> None:
     assert not problems_or_none(write({"pair.backlash": "0 mm"}))
 
 
+@pytest.mark.parametrize(("share", "fine"), [(0.099, True), (0.101, False)])
+def test_teeth_are_thinned_by_a_tenth_of_the_module_at_most(write: Write, share: float, fine: bool) -> None:
+    stage = load_stage("fzg_c")
+    backlash = PairGeometry.of(stage).nominal_backlash + share * stage.pair.normal_module
+    found = problems_or_none(write({"pair.backlash": f"{1e3 * backlash:.9f} mm"}))
+    assert ("pair.center_distance" not in found) == fine
+
+
 def test_a_variant_names_the_file_that_holds_the_problem(tmp_path: Path) -> None:
     (tmp_path / "stage.toml").write_text(toml(changed({"gears.pinion.teeth": "x"})), encoding="utf-8")
     variant = tmp_path / "stage_b.toml"

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evidence.stability.checks import common
+from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import GearfmuError, SimulationError, SpecError
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import load_stage
-from gearfmu.stability.checks import common
-from gearfmu.stability.record import Inputs, Record, Stopped, Watched, run_times
 from gearfmu.stage import StageModel, Steady, assemble
 
 PAIRS, TRAINS, SETS = ("fzg_c/stage_relief", "helical_demo"), ("two_stage",), ("planetary54", "helical_set")

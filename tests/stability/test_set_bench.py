@@ -8,38 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfmu.stability.case import Case
-from gearfmu.stability.motion import Constant
-from gearfmu.stability.record import Record
-from gearfmu.stability.set_bench import (
-    CENTRALS,
-    MESHES,
-    NOMINAL,
-    PLAIN_SET,
-    SPEED,
-    Carried,
-    SetVariant,
-    set_finding,
-    set_overlap,
-    set_run,
-    steady,
-    sun_torque,
-)
+from evidence.stability.case import Case
+from evidence.stability.motion import Constant
+from evidence.stability.planetary import CENTRALS, MESHES, SPEED, PlanetSet, set_overlap, sun_torque
+from evidence.stability.record import Record
 
 APPROACH = {"sun": (7.0e-9, 8.8e-9), "ring": (12e-9, 15.5e-9)}  # m/N under 600 N·m
 
 
-def short(variant: SetVariant, speed: float, duration: float) -> Record:
-    return set_run(variant, Case("fast"), Carried(Constant(speed), steady(NOMINAL)), duration)
+def short(bench: PlanetSet, speed: float, duration: float) -> Record:
+    return bench.loaded(Case("fast"), Constant(speed), bench.nominal, duration)
 
 
 @pytest.fixture(scope="module")
 def turning() -> Record:
     """A quarter of a turn of the carrier, so that axes that stand and axes that turn differ."""
-    return short(PLAIN_SET, SPEED, 0.5 * math.pi / SPEED)
+    return short(PlanetSet(), SPEED, 0.5 * math.pi / SPEED)
 
 
-def approach(variant: SetVariant, record: Record, central: str) -> np.ndarray:
+def approach(variant: PlanetSet, record: Record, central: str) -> np.ndarray:
     """(N, n) overlap over force, m/N."""
     rows = []
     for number, mesh in enumerate(MESHES[central]):
@@ -52,7 +39,7 @@ def approach(variant: SetVariant, record: Record, central: str) -> np.ndarray:
 def test_overlap_under_load_is_the_elastic_approach(turning: Record, central: str) -> None:
     """Of all planets, at rest and in the mean of a run over a quarter of a turn, though pins stand out of place."""
     low, high = APPROACH[central]
-    found = approach(PLAIN_SET, turning, central)
+    found = approach(PlanetSet(), turning, central)
     assert np.all((low < found[:, 0]) & (found[:, 0] < high)), found[:, 0]
     late = found[:, turning.time > 0.01].mean(axis=1)
     assert np.all((low < late) & (late < high)), late
@@ -60,7 +47,7 @@ def test_overlap_under_load_is_the_elastic_approach(turning: Record, central: st
 
 def test_overlap_does_not_know_how_far_planets_give_way() -> None:
     """Pins of 1e7 N/m, which give way by 0.33 mm: the carrier's axes turn on by two fifths of it."""
-    soft = SetVariant(pin=1e7)
+    soft = PlanetSet(pin=1e7)
     record = short(soft, 0.0, 2e-5)
     for central, (low, high) in APPROACH.items():
         found = approach(soft, record, central)[:, 0]
@@ -68,12 +55,12 @@ def test_overlap_does_not_know_how_far_planets_give_way() -> None:
 
 
 def test_judges_hear_what_is_wrong(turning: Record) -> None:
-    assert not set_finding(PLAIN_SET, turning).complaints
-    assert 4 * sun_torque(turning, 0.01) == pytest.approx(NOMINAL, rel=0.02)
+    assert not PlanetSet().finding(turning).complaints
+    assert 4 * sun_torque(turning, 0.01) == pytest.approx(600.0, rel=0.02)
     values = dict(turning.values)
     values["sun_planet2.te"] = values["sun_planet2.te"] - np.where(turning.time > 0.017, 30e-6, 0.0)
-    sunk = set_finding(PLAIN_SET, replace(turning, values=values)).complaints
+    sunk = PlanetSet().finding(replace(turning, values=values)).complaints
     assert len(sunk) == 1 and "flanks of sun_planet2 overlap" in sunk[0]
     leak = 1e-3 * turning.throughput[-1] * turning.time / turning.time[-1]
     leaking = dict(turning.values) | {"energy.stored": turning["energy.stored"] + leak}
-    assert "energy" in set_finding(PLAIN_SET, replace(turning, values=leaking)).complaints[0]
+    assert "energy" in PlanetSet().finding(replace(turning, values=leaking)).complaints[0]

@@ -1,30 +1,30 @@
-"""The suite as a program: table, going on with it, counting of failures; and its judges against known signals."""
+"""The suite as a program: table, counting of failures; and its judges against known signals."""
 
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gearfmu import cli
+from evidence.stability import checks, record, suite
+from evidence.stability.__main__ import main as program
+from evidence.stability.bench import internal_step
+from evidence.stability.case import CASES, Case, Finding
+from evidence.stability.motion import RPM, Constant, Step, Swinging, Turn, UpAndDown
+from evidence.stability.pair import Pair, overlap
+from evidence.stability.scenes import PAIR, SCENES, Scene, what
+from evidence.stability.suite import Row, Task, tasks
 from gearfmu.errors import GearfmuError, SimulationError
-from gearfmu.stability import bench, checks, loads, record, suite
-from gearfmu.stability.case import Case, Finding
-from gearfmu.stability.motion import RPM, Constant, Step, UpAndDown, loaded, winding
-from gearfmu.stability.scenes import SCENES, what
-from gearfmu.stability.suite import Row, Task, run_suite, tasks
 from gearfmu.stage import loaded_te
 
 GOOD = Finding("completed", 5e-6, 1e-6, 1e-5, 1.0)
-SHORT = ["--scene", "start_in_mid_backlash", "--level", "fast", "--jobs", "1"]
 
 
 def row(finding: Finding, step: str = "default", h: float = 0.0) -> Row:
-    return Row("jammed", Case("fast", step, h), finding, "")
+    return Row("pair_jammed", Case("fast", step, h), finding)
 
 
 def test_what_counts_as_a_failure() -> None:
@@ -36,149 +36,104 @@ def test_what_counts_as_a_failure() -> None:
 
 
 def test_scenes_are_listed_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.outcome(["stability", "--list"]) == 0
+    assert program(["--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(": ")[0] for line in lines] == list(SCENES)
+    assert all(len(what(name)) > 20 for name in SCENES)
 
 
-def test_a_table_is_written_and_gone_on_with(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Rows of the same kernel, bodies and scenes stay; others are run again."""
+def test_a_table_is_written_and_read_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "hard.csv"
-    assert cli.outcome(["stability", *SHORT, "--h", "20 us", "--out", str(out)]) == 0
+    short = ["--scene", "pair_mid_backlash", "--level", "fast", "--jobs", "1"]
+    assert program([*short, "--h", "20 us", "--out", str(out)]) == 0
     rows = list(csv.reader(out.open()))
-    assert rows[0] == list(suite.COLUMNS) and len(rows) == 2
-    assert rows[1][:2] == ["start_in_mid_backlash", "fast"] and float(rows[1][2]) == 2e-5 and rows[1][3] == "completed"
     assert rows == list(csv.reader(capsys.readouterr().out.splitlines()))
-    facts = json.loads(out.with_suffix(".json").read_text())
-    facts[0]["finding"]["penetration"] = 0.125
-    out.with_suffix(".json").write_text(json.dumps(facts))
-    assert cli.outcome(["stability", *SHORT[:-1], "2", "--h", "20 us", "--h", "25 us", "--out", str(out)]) == 0
-    rows = list(csv.DictReader(out.open()))
-    assert {float(r["h_s"]): float(r["penetration_m"]) == 0.125 for r in rows} == {2e-5: True, 2.5e-5: False}
-    facts = [entry | {"key": "other kernel"} for entry in facts]
-    out.with_suffix(".json").write_text(json.dumps(facts))
-    assert cli.outcome(["stability", *SHORT, "--h", "20 us", "--out", str(out)]) == 0
-    assert float(next(csv.DictReader(out.open()))["penetration_m"]) < 1e-3
-
-
-def test_a_row_is_of_its_kernel_its_stage_and_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Contact damping changes no body, and yet the rows are others; a check of sets is none of pairs."""
-    (tmp_path / "stage.toml").write_text(
-        f'base = "{bench.model(bench.Variant(bench.PLAIN)).spec.source}"\n[contact]\ndamping = "100e3 N*s/m^2"\n'
-    )
-    scenes = ("jammed", "set_jammed", "train_reversal")
-
-    def moved(before: list[str]) -> list[str]:
-        return [scene for scene, key in zip(scenes, before, strict=True) if suite.key_of(scene) != key]
-
-    before = [suite.key_of(scene) for scene in scenes]
-    assert not moved(before)
-    with monkeypatch.context() as changed:
-        changed.setattr(suite, "PLAIN", str(tmp_path / "stage.toml"))
-        assert "jammed" in moved(before)
-    sources = suite._source
-    for file, touched in {"set_loads": ["set_jammed"], "trains": ["train_reversal"], "checks": list(scenes)}.items():
-        with monkeypatch.context() as changed:
-            changed.setattr(suite, "_source", lambda name, file=file: sources(name) + "#" * (name == file))
-            assert moved(before) == touched
-    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "golden runs+those with friction")
-    assert moved(before) == list(scenes)
-    before, rubbing = [suite.key_of(scene) for scene in scenes], suite.key_of("set_rubbing_reversal")
-    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "golden runs+others with friction")
-    assert not moved(before) and suite.key_of("set_rubbing_reversal") != rubbing
+    assert rows[0] == list(suite.COLUMNS) and len(rows) == 2
+    assert rows[1][:2] == ["pair_mid_backlash", "fast"] and float(rows[1][2]) == 2e-5 and rows[1][3] == "completed"
+    assert suite.table(suite.read(out)) == out.read_text()
+    out.with_suffix(".json").write_text('[{"scene": 1}]')
+    with pytest.raises(GearfmuError, match="make it again"):
+        suite.read(out)
 
 
 def test_failures_are_counted_and_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     bad = replace(GOOD, outcome="failed", complaints=("the mesh sings",))
     monkeypatch.setattr(suite, "run_suite", lambda *_: [row(bad), row(GOOD), row(bad)])
-    assert cli.outcome(["stability"]) == 2
+    assert program([]) == 2
     assert "the mesh sings" in capsys.readouterr().err
     monkeypatch.setattr(suite, "run_suite", lambda *_: [row(bad)] * 120)
-    assert cli.outcome(["stability"]) == 99
+    assert program([]) == 99
 
 
-def test_an_unknown_scene_and_a_damaged_table_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.outcome(["stability", "--scene", "jamed"]) == 1
-    assert "jamed" in capsys.readouterr().err
-    assert cli.outcome(["stability", "--h", "5"]) == 100
-    (tmp_path / "a.csv").write_text("")
-    (tmp_path / "a.json").write_text('[{"scene": 1}]')
-    with pytest.raises(GearfmuError, match="remove the file"):
-        run_suite([], tmp_path / "a.csv", 1)
-
-
-def test_tasks_are_every_combination() -> None:
-    wanted = tasks(tuple(SCENES), ("fast", "full"), ("default", 5e-6))
-    assert len(wanted) == 4 * len(SCENES) == len(set(wanted))
-    assert wanted[1] == Task("ten_million_steps", Case("fast", "given", 5e-6))
-    assert all(len(what(name)) > 20 for name in SCENES)
+def test_tasks_are_every_scene_in_five_cases() -> None:
+    wanted = tasks()
+    assert len(wanted) == 5 * len(SCENES) == len(set(wanted)) and CASES[-1] == Case("full")
+    with pytest.raises(GearfmuError, match="jamed"):
+        tasks(["jamed"])
 
 
 def test_what_the_kernel_refuses_is_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(case: Case) -> Finding:
+    def none(bench: Pair, case: Case) -> Finding:
         raise SimulationError("no equilibrium", "no_equilibrium", 0.0)
 
-    monkeypatch.setitem(SCENES, "jammed", none)
-    at_default, at_half = (suite.judge(Task("jammed", Case("fast", step))) for step in ("default", "half"))
+    monkeypatch.setitem(SCENES, "pair_jammed", Scene(none, PAIR))
+    at_default, at_half = (suite.judge(Task("pair_jammed", Case("fast", step))) for step in ("default", "half"))
     assert at_default.outcome == at_half.outcome == "no_equilibrium@0"
     assert at_default.complaints and not at_half.complaints
-    refused = suite.judge(Task("start_in_mid_backlash", Case("fast", "given", 9e-4)))
+    refused = suite.judge(Task("pair_mid_backlash", Case("fast", "given", 9e-4)))
     assert refused.outcome == "refused"
 
 
 @pytest.fixture(scope="module")
 def calm() -> record.Record:
     """302 N·m at rest for 10 ms."""
-    inputs = loaded(loads.RELIEVED, Constant(0.0), loads.NOMINAL)
-    return record.run(bench.kernel(bench.model(loads.RELIEVED), Case("fast")), inputs, 0.01, 1e-4)
+    return PAIR.loaded(Case("fast"), Constant(0.0), 302.0, 0.01)
 
 
 def test_half_and_quarter_are_of_the_kernels_own_step(calm: record.Record) -> None:
-    stage = bench.model(loads.RELIEVED)
-    own = bench.internal_step(stage, Case("fast", "half")) * 2
+    own = internal_step(PAIR.model, Case("fast", "half")) * 2
     assert calm.h <= own <= 7.5e-6 and own > 0.99 * 7.5e-6
-    assert bench.internal_step(stage, Case("fast", "quarter")) == own / 4
+    assert internal_step(PAIR.model, Case("fast", "quarter")) == own / 4
 
 
 def test_overlap_at_rest_is_the_elastic_approach(calm: record.Record) -> None:
     """On rigid bearings the transmission error is all approach of the involutes."""
-    pair = bench.geometry(loads.RELIEVED)
-    approach = loaded_te(bench.model(loads.RELIEVED), [loads.NOMINAL], 16, rigid_bearings=True).te[0]
-    depth = record.overlap(calm, pair)
+    approach = loaded_te(PAIR.model, [302.0], 16, rigid_bearings=True).te[0]
+    depth = overlap(calm, PAIR.geometry)
     assert approach.min() * 0.98 < depth[0] < approach.max() * 1.02 and np.ptp(depth) < 1e-9
 
 
 def test_judges_hear_what_is_wrong(calm: record.Record) -> None:
-    pair = bench.geometry(loads.RELIEVED)
-    assert checks.finding(calm, pair).outcome == "completed" and not checks.finding(calm, pair).complaints
+    assert PAIR.finding(calm).outcome == "completed" and not PAIR.finding(calm).complaints
     values = dict(calm.values)
     values["mesh.te"] = np.where(calm.time > 0.005, np.nan, values["mesh.te"])
-    assert "mesh.te is not finite" in checks.finding(replace(calm, values=values), pair).complaints
+    assert "mesh.te is not finite" in PAIR.finding(replace(calm, values=values)).complaints
     leak = 2e-4 * calm["energy.stored"].max() * calm.time / calm.time[-1]
     leaking = dict(calm.values) | {"energy.stored": calm["energy.stored"] + leak}
-    assert "energy" in checks.finding(replace(calm, values=leaking), pair).complaints[0]
-    deeper = calm["pinion.gear.phi"] + np.where(calm.time > 0.00995, 60e-6 / pair.gears[0].r_b, 0.0)
+    assert "energy" in PAIR.finding(replace(calm, values=leaking)).complaints[0]
+    deeper = calm["pinion.gear.phi"] + np.where(calm.time > 0.00995, 60e-6 / PAIR.geometry.gears[0].r_b, 0.0)
     sunk = dict(calm.values) | {"pinion.gear.phi": deeper}
-    assert "overlap by 102.0 µm at 0.01 s" in checks.finding(replace(calm, values=sunk), pair).complaints[0]
+    assert "overlap by 102.0 µm at 0.01 s" in PAIR.finding(replace(calm, values=sunk)).complaints[0]
     unsolved = dict(calm.values) | {"solver.retried_steps": np.where(calm.time > 0.005, 1.0, 0.0)}
-    assert "left unsolved is 1" in checks.finding(replace(calm, values=unsolved), pair).complaints[0]
-    assert checks.finding(calm, pair, ["too quiet"]).outcome == "failed"
-    assert checks.finding(replace(calm, outcome="diverged"), pair).outcome == "diverged@0.01"
+    assert "left unsolved is 1" in PAIR.finding(replace(calm, values=unsolved)).complaints[0]
+    assert PAIR.finding(calm, ["too quiet"]).outcome == "failed"
+    assert PAIR.finding(replace(calm, outcome="diverged")).outcome == "diverged@0.01"
 
 
 def test_a_run_that_stops_is_named_with_its_last_good_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """From 3 ms on the pinion's shaft end turns by 100 rad a step: no scene, but what a scene would make of it."""
-    calm = loaded(loads.RELIEVED, Constant(100.0), loads.NOMINAL)
 
-    def mad(case: Case) -> Finding:
+    def mad(bench: Pair, case: Case) -> Finding:
+        calm = bench.turning(Constant(100.0), (Step(0.0, 1.0, 302.0, 302.0),))
+
         def inputs(time: float) -> dict[str, float]:
             return dict(calm(time)) | ({"pinion.phi": 1e6 * time} if time > 3e-3 else {})
 
-        made = record.run(bench.kernel(bench.model(loads.RELIEVED), case), inputs, 0.02, 1e-4)
+        made = bench.run(case, inputs, 0.02)
         raise AssertionError(f"this cannot run to its end: {made.time[-1]}")
 
-    monkeypatch.setitem(SCENES, "jammed", mad)
-    found = suite.judge(Task("jammed", Case("fast")))
+    monkeypatch.setitem(SCENES, "pair_jammed", Scene(mad, PAIR))
+    found = suite.judge(Task("pair_jammed", Case("fast")))
     outcome, _, time = found.outcome.partition("@")
     assert outcome in {"diverged", "penetration", "energy"} and 0.003 <= float(time) < 0.02
     assert found.realtime_factor > 0 and found.penetration > 0 and row(found).failed
@@ -193,8 +148,10 @@ def test_levels_of_a_sine() -> None:
     assert found["level_200_1000_Hz_dB"] == pytest.approx(20.0, abs=0.05) and found["level_1000_4000_Hz_dB"] < -20
 
 
-@pytest.mark.parametrize("motion", [UpAndDown(500.0, 1800.0, 2.0), Step(0.3, 0.9, -0.1, 0.4), Constant(3.0)])
-def test_speed_and_acceleration_are_derivatives(motion: UpAndDown | Step | Constant) -> None:
+@pytest.mark.parametrize(
+    "motion", [UpAndDown(500.0, 1800.0, 2.0), Step(0.3, 0.9, -0.1, 0.4), Constant(3.0), Swinging(3.0, 40.0, 2.0)]
+)
+def test_speed_and_acceleration_are_derivatives(motion: Turn) -> None:
     d = 1e-4
     for time in (0.31, 0.5, 0.88, 1.5, 2.5, 3.9):
         before, now, after = (motion(time + k * d) for k in (-1, 0, 1))
@@ -205,8 +162,5 @@ def test_speed_and_acceleration_are_derivatives(motion: UpAndDown | Step | Const
 def test_winding_carries_the_torque_on_either_side() -> None:
     """At rest under the winding of ±T the wheel's shaft holds T times the ratio."""
     for torque in (302.0, -302.0):
-        stage = bench.model(loads.RELIEVED)
-        inputs = loaded(loads.RELIEVED, Constant(100 * RPM), torque)
-        made = record.run(bench.kernel(stage, Case("fast")), inputs, 0.05, 1e-4)
+        made = PAIR.loaded(Case("fast"), Constant(100 * RPM), torque, 0.05)
         assert made["wheel.tau_mean"][100:].mean() == pytest.approx(-torque * 1.5, rel=0.02)
-        assert np.sign(winding(loads.RELIEVED, torque)) == np.sign(torque)

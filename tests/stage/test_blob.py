@@ -11,8 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
+from evidence.sources import rounded_hash
 from gearfmu.errors import ModelError
-from gearfmu.stage.build.blob import ENTRY, HEADER, blob_hash, read_blob, rounded_hash, seal, write_blob
+from gearfmu.stage.build.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
 
 SAMPLE = {
     "name": "fzg_c µm",

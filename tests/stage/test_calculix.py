@@ -1,13 +1,12 @@
 """Tooth pair and loaded transmission error against CalculiX, an independent finite-element code with its own contact.
 
 The goldens come from static contact solutions of the whole gears with a fine mesh where the teeth touch
-(evidence/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
+(evidence/peers/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
 """
 
 from __future__ import annotations
 
 import csv
-import importlib
 import json
 import os
 import subprocess
@@ -17,12 +16,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evidence.peers.calculix import positions, rigid_bores, section, solid, sun_planet
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 ROOT = Path(__file__).resolve().parents[2]
-TABLES = ROOT / "evidence" / "calculix"
+TABLES = ROOT / "evidence" / "peers" / "calculix"
 GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))
 SECANT = GOLDEN["pitch_point_secant_N_per_mm_um"]
 LINE_LOAD = 1e3 * GOLDEN["line_load_N_per_mm"]  # N/m
@@ -56,11 +56,10 @@ def test_transmission_error_over_one_pitch(plain: StageModel, torque: str) -> No
 
 
 @pytest.mark.full
-def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_transmission_error_on_rigid_bores(spec: StageSpec) -> None:
     """Bores clamped node by node there, rigid here, all positions and loads: mean and peak to peak within 3 %, as for
     averaged bores, which are 4 % softer; in truth single positions stay within 1 %."""
-    monkeypatch.syspath_prepend(str(TABLES))
-    bodies = importlib.import_module("rigid_bores").rigid_bore_bodies(spec)
+    bodies = rigid_bores.rigid_bore_bodies(spec)
     golden, count = GOLDEN["te_um_with_clamped_bores"], GOLDEN["positions_per_pitch"]
     result = loaded_te(assemble(spec, bodies), [float(t) for t in golden], count, rigid_bearings=True)
     for curve, (torque, theirs) in zip(1e6 * result.te, golden.items(), strict=True):
@@ -72,12 +71,10 @@ def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.
         assert np.allclose(here, values, rtol=0.015)
 
 
-def test_sun_and_planet_within_3_percent_at_two_loads(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sun_and_planet_within_3_percent_at_two_loads() -> None:
     """The shipped bodies of `planetary54` as a pair: mean and peak to peak, and single positions but where a tooth pair
     begins or ends at a tip edge: 3.3 and 7.3 % there at the smaller load, where CalculiX hardly settles."""
-    monkeypatch.syspath_prepend(str(TABLES))
-    positions, of_set = (importlib.import_module(name) for name in ("positions", "sun_planet"))
-    ours, rows = positions.te_of_gearfmu(of_set.sun_planet(), "averaged"), positions.read(TABLES / "sun_planet.csv")
+    ours, rows = positions.te_of_gearfmu(sun_planet.sun_planet(), "averaged"), positions.read(TABLES / "sun_planet.csv")
     for curve, torque in zip(1e6 * ours.te, ours.torque, strict=True):
         here = [row for row in rows if float(row["torque_Nm"]) == torque]
         theirs = np.array([float(row["te_um"]) for row in here])
@@ -105,11 +102,9 @@ def test_goldens_are_those_of_the_tables() -> None:
             assert GOLDEN[name][row["torque_Nm"]][place] == float(row["te_um"])
 
 
-def test_meshes_are_whole_and_bore_weights_are_areas(pair: PairGeometry, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_meshes_are_whole_and_bore_weights_are_areas(pair: PairGeometry) -> None:
     """Section with every tooth: its area is the gear's but for the tip chamfers, every inner edge has two elements;
     bore weights find the bore's middle."""
-    monkeypatch.syspath_prepend(str(TABLES))
-    section, solid = (importlib.import_module(name) for name in ("section", "solid"))
     gear, roll = pair.gears[0], pair.path["C"]
     plane = section.gear_plane(gear, {0: roll}, range(-8, 8), section.Fineness(toothed=8))
     corners = plane.nodes[plane.quads[:, [0, 4, 1, 5, 2, 6, 3, 7]]]

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import Steady, assemble
-from gearfmu.stage.run.dashpot import own_path, same_loss
 
 SPEED, LOAD = 628.0, 80.0  # rad/s, N·m on the pinion: near the mesh mode
 STEP, SETTLED, SAMPLES = 30e-6, 700, 1400

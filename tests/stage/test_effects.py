@@ -13,7 +13,6 @@ from by_hand import DRIVE, Pair, bore_angle
 
 from gearfmu import cli
 from gearfmu.body import ReducedBody
-from gearfmu.commands.effects import effects_page
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.scene import Effects
@@ -328,7 +327,3 @@ def test_the_verb_prints_the_table_with_the_numbers_of_a_stage(capsys: pytest.Ca
     assert all(f"{effect.name}: {effect.title}\n" in out for effect in EFFECTS)
     assert out.count("\n  in the stage  ") == len(EFFECTS) + 2  # and what is left out, of both gears
     assert "15 µm and 15 µm" in out and "5 over 14 mm" in out
-
-
-def test_the_page_is_that_of_the_table() -> None:
-    assert (ROOT / "docs" / "effects.md").read_text(encoding="utf-8") == effects_page()

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import math
 import shutil
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -13,7 +12,6 @@ import pytest
 
 from gearfmu.stage.effects import EFFECTS, costs
 
-ROOT = Path(__file__).resolve().parents[2]
 MOST = 0.05
 
 
@@ -27,11 +25,8 @@ def test_every_effect_has_its_measured_cost() -> None:
 
 @pytest.fixture(scope="module")
 def benchmark_() -> ModuleType:
-    """evidence/effects_cost.py as a module."""
-    spec = importlib.util.spec_from_file_location("effects_cost", ROOT / "evidence" / "effects_cost.py")
-    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """evidence/price/effects_cost.py as a module."""
+    return importlib.import_module("evidence.price.effects_cost")
 
 
 @pytest.mark.full

@@ -1,4 +1,4 @@
-"""A spinning elastic gear against Exudyn's floating frame of reference (evidence/exudyn_rotor.py)."""
+"""A spinning elastic gear against Exudyn's floating frame of reference (evidence/peers/exudyn_rotor.py)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import csv
 import json
 from pathlib import Path
 
-import exudyn_rotor
 import numpy as np
 import pytest
+
+from evidence.peers import exudyn_rotor
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -13,11 +13,11 @@ import pytest
 from scipy.optimize import brentq
 
 import gearfmu as gf
+from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
@@ -26,7 +26,7 @@ from gearfmu.stage.build.fields import GEAR_NUMBERS
 from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
-EM = 2.0
+EM = 1.0
 
 
 @pytest.fixture(scope="module")
@@ -396,7 +396,7 @@ def test_bodies_that_do_not_know_their_profile_are_refused(spec: StageSpec, bodi
         assemble(spec, bare).kernel(**{"effect.friction": 1.0}).prepare()
 
 
-@pytest.mark.parametrize("integrator", [1.0, 3.0, 4.0])
+@pytest.mark.parametrize("integrator", [2.0, 3.0])
 def test_other_integrators_refuse_friction(helical: StageModel, integrator: float) -> None:
     with pytest.raises(ModelError, match="integrator dg4 or em"):
         helical.kernel(**{"effect.friction": 1.0, "integrator": integrator}).prepare()

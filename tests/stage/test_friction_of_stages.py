@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from evidence.stability.planetary import ALL_MESHES, RATIO, SPEED, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.stability.set_bench import ALL_MESHES, PLAIN_SET, RATIO, SPEED, set_bodies, set_spec
 from gearfmu.stage import assemble
 
 TORQUE, STEP, RUN, SETTLED = -150.0, 2e-5, 350, 100  # N·m on the sun, s, communication steps
@@ -29,7 +29,7 @@ class Powers:
 
 @pytest.fixture(scope="module")
 def blob() -> bytes:
-    return assemble(set_spec(PLAIN_SET), set_bodies()).blob
+    return assemble(set_spec(PlanetSet()), set_bodies()).blob
 
 
 def driven(blob: bytes, coefficient: float) -> Powers:

@@ -1,14 +1,15 @@
-"""Helical pairs beside an independent finite-element program: CalculiX's columns of evidence/calculix/helical.csv,
-our side computed here."""
+"""Helical pairs beside an independent finite-element program: CalculiX's columns of
+evidence/peers/calculix/helical.csv, our side computed here."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import helical
 import numpy as np
 import pytest
-from positions import read
+
+from evidence.peers.calculix import helical
+from evidence.peers.calculix.positions import read
 
 pytestmark = pytest.mark.full  # four reductions
 

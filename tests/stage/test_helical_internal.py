@@ -21,7 +21,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
-STAGE = Path(__file__).parents[2] / "evidence" / "calculix" / "internal" / "stage.toml"
+STAGE = Path(__file__).parents[2] / "evidence" / "peers" / "calculix" / "internal" / "stage.toml"
 TORQUE, WIDTH, MODULE, ANGLE = 100.0, 20e-3, 2.5e-3, math.radians(20)  # N·m on the pinion; m, m, rad: of the section
 WHOLE = math.atan(math.pi * MODULE / WIDTH)  # rad: overlap ratio one
 COARSE = BodySpec(

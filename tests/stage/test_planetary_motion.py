@@ -112,7 +112,7 @@ def test_two_integrators_see_the_same_set(model: StageModel) -> None:
     methods = {}
     for name, settings in {
         "dg4": {"h": 5e-7},
-        "central": {"h": 5e-7, "integrator": 4.0},
+        "central": {"h": 5e-7, "integrator": 3.0},
         "without": {"h": 5e-7, "effect.coriolis": 0.0},
     }.items():
         kernel = started(model, 600.0, 300.0, 1200.0, **{"effect.contact_damping": 0.0, **settings})

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from gearfmu import cli
-from gearfmu.commands.study import set_table
+from evidence.study.__main__ import main as program
+from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
-from gearfmu.study.sets import DURATION, SETTLE, SetRow, at_speed, ladder, window, with_planets
+from gearfmu.study import Job, study
+from gearfmu.study.ladder import SET_DURATION, SET_SETTLE, window
 from gearfmu.study.table import read_rows, write_rows
 
 LIST = Path(__file__).parents[2] / "evidence" / "study" / "sets.csv"
@@ -23,8 +24,19 @@ ROW = SetRow("s", 4, 85.0, "fast", 5e-6, 5, "", 248, "full, 0.312 µs", 0.02, -0
 
 def test_the_window_is_the_beginning_of_the_scene() -> None:
     scene = load_scene("planetary_paper")
-    assert (window(scene).settle, window(scene).duration) == (SETTLE, DURATION)
-    assert window(scene, quick=True).duration < DURATION < scene.duration
+    assert window(scene, quick=True).duration < window(scene).duration == SET_DURATION < scene.duration
+    assert window(scene).settle == SET_SETTLE
+
+
+@pytest.mark.full
+def test_a_set_is_studied_like_a_pair(tmp_path: Path) -> None:
+    """`gearfmu study` of a set: levels at their default steps, kept; forces of all meshes are read back with it."""
+    scene = load_scene("planetary_paper").model_copy(update={"duration": 1e-3, "settle": 0.4e-3})
+    rows = study(Job(scene, tmp_path, defaults=True)).rows
+    by_level = {row.level: row for row in rows}
+    assert sorted(by_level) == ["fast", "full", "rigid", "standard"]
+    assert by_level["rigid"].force_error > by_level["fast"].force_error > 0
+    assert study(Job(scene, tmp_path, defaults=True)).rows == rows
 
 
 def test_another_speed_keeps_the_loads_in_balance() -> None:
@@ -53,15 +65,8 @@ def test_only_levels_and_steps_are_drawn(tmp_path: Path) -> None:
     assert ladder([ROW, *others, finer], 4) == [ROW, finer]
     svg, _ = write_chart(ladder([ROW, finer], 4), 5, tmp_path / "set.svg")
     assert "fast" in svg.read_text(encoding="utf-8")
-    text = set_table([ROW, others[1]]).splitlines()
-    assert len(text) == 3 and "coriolis" in text[2] and "248" in text[1]
     write_rows(tmp_path / "sets.csv", SetRow, [ROW, finer])
     assert read_rows(tmp_path / "sets.csv", SetRow) == [ROW, finer]
-
-
-def test_other_tables_are_for_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.outcome(["study", "planetary_paper", "--out", str(tmp_path), "--table", "cuts"]) != 0
-    assert "is a planetary set" in " ".join(capsys.readouterr().err.replace("│", " ").split())
 
 
 def test_the_list_in_the_repository_says_what_the_page_says() -> None:
@@ -74,11 +79,12 @@ def test_the_list_in_the_repository_says_what_the_page_says() -> None:
 
 
 @pytest.mark.full
-def test_the_verb_makes_a_quick_list_and_keeps_it(tmp_path: Path) -> None:
-    arguments = ["study", "planetary_paper", "--quick", "--out", str(tmp_path)]
-    assert cli.outcome(arguments) == 0
+def test_the_program_makes_a_quick_list_and_keeps_it(tmp_path: Path) -> None:
+    arguments = ["sets", "planetary_paper", "--quick", "--out", str(tmp_path)]
+    program(arguments)
     made = (tmp_path / "sets.csv").read_bytes()
-    assert cli.outcome(arguments) == 0 and (tmp_path / "sets.csv").read_bytes() == made
+    program(arguments)
+    assert (tmp_path / "sets.csv").read_bytes() == made
     with open(tmp_path / "sets.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert {row["level"] for row in rows} == {"rigid", "fast"} and (tmp_path / "planetary_paper.svg").is_file()

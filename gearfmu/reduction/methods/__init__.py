@@ -1,7 +1,6 @@
 """Reduction methods, one file each; every one is `reduce(body: FullOrder, size: Size) -> Basis`.
 
-What each matches stands at the head of its file; equations in docs/theory.md, section 7. `interpolation` works on
-bodies that another method has reduced.
+What each matches stands at the head of its file; equations in docs/theory.md, section 7.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from collections.abc import Callable
 
 from gearfmu.reduction.basis import Basis, Size
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods import craig_bampton, krylov, modal, rubin, snapshots, static
+from gearfmu.reduction.methods import craig_bampton, krylov, modal, rubin
 
 Method = Callable[[FullOrder, Size], Basis]
 METHODS: dict[str, Method] = {
@@ -18,6 +17,4 @@ METHODS: dict[str, Method] = {
     "craig_bampton": craig_bampton.reduce,
     "rubin": rubin.reduce,
     "krylov": krylov.reduce,
-    "static": static.reduce,
-    "snapshots": snapshots.reduce,
 }

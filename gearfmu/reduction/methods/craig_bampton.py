@@ -16,25 +16,20 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 from gearfmu.reduction.moments import input_loads, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
     """Constraint modes first, then fixed-interface modes up to n. Raises BodyError when n is less than the former."""
-    return sized(body, size, _build)
-
-
-def _build(body: FullOrder, size: Size) -> Basis:
     space, basis = elastic(body), Growing(elastic(body))
     basis.add(static_response(body) @ balanced(space, input_loads(body)))
     constraint = basis.size
-    if size.vectors < constraint:
+    if size.count < constraint:
         raise BodyError(
             f"{body.name}: Craig–Bampton starts with {constraint} constraint modes of this body's interfaces: "
-            f"n = {size.vectors} is too small; give at least that"
+            f"n = {size.count} is too small; give at least that"
         )
-    wanted = min(size.vectors, space.elastic) - constraint
+    wanted = min(size.count, space.elastic) - constraint
     if wanted:
         inside = Elastic(body.held(body.rows()), twin=space)
         basis.add(inside.modes(min(wanted, inside.elastic))[1])

@@ -15,7 +15,6 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 from gearfmu.reduction.moments import Expansion, expansion_points
 
 _POINTS = 3  # expansion points; more blocks than that become higher powers at the same points
@@ -23,10 +22,6 @@ _POINTS = 3  # expansion points; more blocks than that become higher powers at t
 
 def reduce(body: FullOrder, size: Size) -> Basis:
     """Krylov basis with as many whole blocks as `size` allows. Raises BodyError when that is less than one block."""
-    return sized(body, size, _blocks)
-
-
-def _blocks(body: FullOrder, size: Size) -> Basis:
     inputs = body.rows().shape[0]
     blocks = size.count // inputs
     if not blocks:

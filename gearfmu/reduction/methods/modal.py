@@ -10,14 +10,9 @@ from __future__ import annotations
 from gearfmu.reduction.basis import Basis, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
-    """The lowest elastic modes. Raises BodyError when a tolerance cannot be met, ModesError."""
-    return sized(body, size, _lowest)
-
-
-def _lowest(body: FullOrder, size: Size) -> Basis:
-    squared, shapes = elastic(body).modes(size.vectors)
+    """The lowest elastic modes. Raises ModesError."""
+    squared, shapes = elastic(body).modes(size.count)
     return Basis("modal", shapes, {"modes": len(squared)})

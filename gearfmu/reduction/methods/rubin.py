@@ -16,16 +16,11 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.methods.sizing import sized
 from gearfmu.reduction.moments import static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
     """One attachment mode per input and free modes up to n. Raises BodyError when n is less than the inputs."""
-    return sized(body, size, _build)
-
-
-def _build(body: FullOrder, size: Size) -> Basis:
     space, inputs = elastic(body), body.rows().shape[0]
     if size.count < inputs:
         raise BodyError(

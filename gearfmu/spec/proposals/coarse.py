@@ -18,8 +18,8 @@ from gearfmu.spec.stage import load_stage
 FOLDER = "coarse"
 SCALE = 0.5  # on all element counts
 STATED_ERROR = (
-    "Measured on a helical pair z 31/73 (evidence/coarse.csv): free frequencies to 20 kHz within 0.7 %, own-tooth "
-    "compliance 1.4 % low at mid flank and within 6.2 % at its ends."
+    "Measured on a helical pair z 31/73 (evidence/bodies/coarse.csv): free frequencies to 20 kHz within 0.7 %, "
+    "own-tooth compliance 1.4 % low at mid flank and within 6.2 % at its ends."
 )
 
 _HEAD = """# The coarse sister of {file}: half the element counts, made anew by every `gearfmu reduce --coarse`.

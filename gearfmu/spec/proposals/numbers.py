@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, flank_length
+from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, distance_of_shifts, flank_length
 from gearfmu.ranges import range_of, range_problems
 from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, rounded_down, rounded_up
 from gearfmu.spec.proposals.draft import (
@@ -33,6 +34,8 @@ from gearfmu.spec.stage import load_stage
 
 GIVEN = "given"
 _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the shipped stages
+INCH = 25.4e-3  # m
+_SAME = 1e-4  # of the module: centre distances that agree
 _LEAST_FILLET = 0.05  # of the module
 _PATCH_PER_HERTZ = 2.0  # slices of tilted or helical teeth carry more than the mean
 
@@ -44,7 +47,8 @@ class Wish:
     teeth: of pinion and wheel, or of sun, planet and ring (in ISO 21771 that of a ring is negative; both are read).
     module, width: normal module and common face width. planets: their number, None of a pair. unequal: planets stand
     at the places nearest to even ones at which their teeth fit. helix: of pinion or sun. torque, speed: the largest,
-    of the pinion or the carrier.
+    of the pinion or the carrier. shifts, bores: profile shifts and bore diameters of both gears, of sun and planet.
+    relief: tip relief of these gears, parabolic from the outer point of single contact.
     """
 
     teeth: tuple[int, ...]
@@ -57,6 +61,9 @@ class Wish:
     pressure_angle: float = math.radians(20)
     torque: float | None = None
     speed: float | None = None
+    shifts: tuple[float, ...] = ()
+    bores: tuple[float, ...] = ()
+    relief: float = 0.0
 
     @property
     def rack(self) -> Rack:
@@ -67,6 +74,19 @@ class Wish:
     def shown(self) -> str:
         """The numbers of teeth as a person writes them."""
         return " ".join(str(abs(z)) for z in self.teeth)
+
+
+def wish_of(given: Mapping[str, Any]) -> Wish:
+    """The numbers as a `Wish`, a diametral pitch (1/inch) in place of the module. SpecError where both are given."""
+    numbers = {"teeth": (), **given}
+    pitch = numbers.pop("diametral_pitch", None)
+    if pitch is not None:
+        if "module" in numbers or not pitch > 0:
+            raise SpecError(
+                [Problem("", "diametral_pitch", f"{pitch:g}", "a positive number, or the module, not both")]
+            )
+        numbers["module"] = INCH / pitch
+    return Wish(**numbers)
 
 
 def new_from_numbers(name: str, wish: Wish, folder: str | os.PathLike[str] = ".") -> Path:
@@ -111,6 +131,11 @@ def _missing(wish: Wish) -> Iterator[Problem]:
         yield Problem("", "module", "", 'this number is missing: give the normal module, such as "2.5 mm"')
     if wish.width is None:
         yield Problem("", "width", "", 'this number is missing: give the common face width, such as "20 mm"')
+    for field, given in (("shifts", wish.shifts), ("bores", wish.bores)):
+        if len(given) not in (0, 2):
+            yield Problem(
+                "", field, str(len(given)), f"give two: of {'sun and planet' if wish.planets else 'both gears'}"
+            )
     if wish.unequal and not wish.planets:
         yield Problem("", "unequal", "", "this is about the places of planets: give their number")
 
@@ -135,7 +160,10 @@ def _beyond(wish: Wish) -> list[Problem]:
             "pressure_angle": (wish.pressure_angle, range_of("pressure_angle")),
             "torque": (wish.torque, range_of("torque_max")),
             "speed": (wish.speed, range_of("speed_max")),
+            "relief": (wish.relief or None, range_of("relief")),
         }
+        | {f"bores ({bore:g} m)": (bore, range_of("bore")) for bore in wish.bores}
+        | {f"shifts ({shift:g})": (shift, range_of("profile_shift")) for shift in wish.shifts}
     )
 
 
@@ -154,6 +182,28 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
         for part in ("tip_relief", "lead"):
             draft.drop(f"{gear}.{part}")
     return draft
+
+
+def distance_of(wish: Wish, usual: float) -> float:
+    """Centre distance (m) of the first two gears: as given, that of the given profile shifts, else `usual`. SpecError
+    where both are given and disagree."""
+    if not wish.shifts:
+        return wish.center or usual
+    rack, teeth, total = wish.rack, sum(wish.teeth[:2]), sum(wish.shifts)
+    found = distance_of_shifts(rack.m, rack.alpha, rack.beta, teeth, total)
+    if wish.center is not None and abs(wish.center - found) > _SAME * rack.m:
+        remedy = f"the profile shifts, {total:g} together, belong to {millimetres(found)}: leave one of both away"
+        raise SpecError([Problem("", "center", millimetres(wish.center), remedy)])
+    return wish.center or found
+
+
+def put_wishes(draft: Draft, wish: Wish, places: tuple[str, str]) -> None:
+    """Bores and tip relief that were asked for, of both external gears."""
+    for place, bore in zip(places, wish.bores, strict=False):
+        draft.put(f"{place}.bore_diameter", millimetres(bore), GIVEN)
+    for place in places if wish.relief else ():
+        relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
+        draft.put(f"{place}.tip_relief", relief, GIVEN)
 
 
 def put_gear(draft: Draft, place: str, gear: GearGeometry, shift: str) -> None:

@@ -10,7 +10,17 @@ from gearfmu.geometry.pair import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.spec.forms.pair_checks import rounded_down, rounded_up
 from gearfmu.spec.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
-from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, put_gear, put_load, put_patch, put_slices
+from gearfmu.spec.proposals.numbers import (
+    GIVEN,
+    Wish,
+    begun,
+    distance_of,
+    put_gear,
+    put_load,
+    put_patch,
+    put_slices,
+    put_wishes,
+)
 
 NAMES = ("pinion", "wheel")
 SHIFT_RULE = "equal specific sliding at both ends of the path of contact"
@@ -19,20 +29,23 @@ SHIFT_RULE = "equal specific sliding at both ends of the path of contact"
 def draft_pair(wish: Wish) -> Draft:
     """The draft of a pair; SpecError where the centre distance is out of reach."""
     rack, teeth, width = wish.rack, (wish.teeth[0], wish.teeth[1]), wish.width or 0.0
-    distance = wish.center or reference_distance(rack, sum(teeth))
+    distance = distance_of(wish, reference_distance(rack, sum(teeth)))
     pair = OpenPair(rack, teeth, distance)
-    shift = None if math.isnan(pair.total) else pair.balanced()
+    shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
     if shift is None:
         raise SpecError([Problem("", "center", millimetres(distance), out_of_reach(pair))])
     geometry = pair.at(shift)
     draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in NAMES))
     if wish.center is None:
-        draft.assume("pair.center_distance", millimetres(distance), "no sum of profile shifts")
+        why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
+        draft.assume("pair.center_distance", millimetres(distance), why)
     else:
         draft.put("pair.center_distance", millimetres(distance), GIVEN)
     rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
+    rules = (GIVEN, GIVEN) if wish.shifts else rules
     for name, gear, rule in zip(NAMES, geometry.gears, rules, strict=True):
         put_gear(draft, f"gears.{name}", gear, rule)
+    put_wishes(draft, wish, ("gears.pinion", "gears.wheel"))
     _put_loads(draft, wish, geometry, width)
     put_slices(draft, rack, width)
     return draft

@@ -20,7 +20,17 @@ from gearfmu.geometry.shifts import (
 from gearfmu.ranges import range_of
 from gearfmu.spec.forms.pair_checks import rounded_up
 from gearfmu.spec.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
-from gearfmu.spec.proposals.numbers import GIVEN, Wish, begun, put_gear, put_load, put_patch, put_slices
+from gearfmu.spec.proposals.numbers import (
+    GIVEN,
+    Wish,
+    begun,
+    distance_of,
+    put_gear,
+    put_load,
+    put_patch,
+    put_slices,
+    put_wishes,
+)
 from gearfmu.spec.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
 
 NAMES = ("sun", "planet", "ring")
@@ -32,10 +42,10 @@ def draft_set(wish: Wish) -> Draft:
     """The draft of a planetary set. SpecError lists everything that is wrong with the numbers."""
     rack, (sun, planet, ring) = wish.rack, wish.teeth
     distances = [reference_distance(rack, teeth) for teeth in (sun + planet, max(ring - planet, 1))]
-    distance = wish.center or max(distances)
+    distance = distance_of(wish, max(distances))
     pair = OpenPair(rack, (sun, planet), distance)
     problems, mesh = [*_assembly(wish)], None
-    shift = None if math.isnan(pair.total) else pair.balanced()
+    shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
     if shift is None:
         problems.append(Problem("", "center", millimetres(distance), f"of sun and planet {out_of_reach(pair)}"))
     else:
@@ -54,6 +64,7 @@ def draft_set(wish: Wish) -> Draft:
     _put_planets(draft, wish)
     put_gear(draft, "sun", pair.at(shift).gears[0], SHIFT_RULE)
     put_gear(draft, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
+    put_wishes(draft, wish, ("sun", "planet"))
     _put_ring(draft, mesh)
     _put_carrier(draft, wish, mesh)
     _put_loads(draft, wish, pair, shift, mesh)
@@ -141,7 +152,8 @@ def _put_ring(draft: Draft, mesh: RingMesh) -> None:
 
 
 def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
-    bolt = math.floor(0.75e4 * mesh.planet.r_f) / 1e4
+    bore = wish.bores[1] if wish.bores else mesh.planet.r_f
+    bolt = math.floor(0.75e4 * bore) / 1e4
     draft.assume("carrier.bolt_diameter", millimetres(bolt), "three quarters of the planets' bore")
     draft.assume("carrier.bore_diameter", millimetres(rounded_up(mesh.a, 2)), "the centre distance")
     outer = rounded_up(2 * mesh.a + 2 * bolt, 3)

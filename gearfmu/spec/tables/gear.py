@@ -82,7 +82,7 @@ class MeshSpec(Spec):
     """Element counts of the sector mesh (20-node hexahedra; half a tooth) and how they are graded.
 
     The defaults are the counts on which the loaded transmission error of the shipped pair is converged to 1 %
-    (evidence/body_convergence.csv).
+    (docs/decisions/bodies.md).
     """
 
     flank: Annotated[Count, Whole("elements_two")] = Field(

@@ -20,7 +20,6 @@ HEADER = struct.Struct("<4sI32sQI12x")
 ENTRY = struct.Struct("<24sIIQQ")
 ALIGNMENT = 64
 HASHED_FROM = 40
-SMALL = 64  # numbers of an array
 MOST_SECTIONS = 1024
 LONGEST_NAME = 23
 REPEATED_FROM = 4096  # bytes: a section at least as long that is there already is stored once
@@ -69,21 +68,6 @@ def seal(blob: bytes) -> bytes:
 def blob_hash(blob: bytes) -> str:
     """The SHA-256 (64 hex digits) a blob carries: the model's identity."""
     return blob[8:HASHED_FROM].hex()
-
-
-def rounded_hash(blob: bytes) -> str:
-    """12 hex digits that tell models apart, whatever the processor and the number of threads that made them: of small
-    arrays five digits of every float, of large ones type, shape and norm (modes of equal frequency are any of many)."""
-    said = []
-    for name, value in read_blob(blob).items():
-        if isinstance(value, str):
-            said.append(f"{name} {value}")
-            continue
-        large = value.dtype.kind == "f" and value.size > SMALL
-        numbers = [float(np.linalg.norm(value.astype(float)))] if large else value.ravel().tolist()
-        rounded = [f"{number:.4e}" if isinstance(number, float) else number for number in numbers]
-        said.append(f"{name} {value.dtype} {value.shape} {rounded}")
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:12]
 
 
 def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:

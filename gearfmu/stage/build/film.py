@@ -38,15 +38,6 @@ def film_starts(stage: Stage) -> dict[str, float]:
     return starts
 
 
-def film_resistance(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:
-    """c of f = −c ḋ (N·s/m) at a gap (m) of two flanks of relative radius of curvature and width (m), docs/theory.md
-    (8q); 0 from REACH on."""
-    if gap >= REACH:
-        return 0.0
-    ends = (gap + roughness) ** -1.5 - (REACH + roughness) ** -1.5
-    return 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5 * ends
-
-
 def film_stop(stage: Stage, mesh: EngagementSpec) -> float:
     """`film_impulse` of an engagement with a film from REACH on, spur teeth at the pitch point."""
     assert mesh.film is not None

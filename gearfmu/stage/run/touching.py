@@ -42,16 +42,6 @@ def position_of(trace: Trace, stage: Stage, mesh: EngagementSpec) -> np.ndarray 
     return None if angle is None else np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
 
 
-def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
-    """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
-    the rolls of docs/theory eq. 4 add up to L."""
-    a, b = pair.gears
-    t = -sg * pair.alpha_wt
-    roll = a.r_b * sg * (phi + sg * a.psi_b - t)
-    beta = t + math.pi + sg * (pair.length - roll) / b.r_b
-    return phi, beta - sg * b.psi_b
-
-
 def contacts_at(pair: MeshShape, angles: Sequence[float], sg: int) -> list[Contact]:
     """The tooth pairs whose contact point lies on both flanks `sg`, from gear A's root outward. angles (rad) of the
     bodies from the line of their centres, A to B; of a ring, B, from its axis to A's."""

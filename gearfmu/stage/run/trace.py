@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -97,6 +98,11 @@ class Trace(Shown):
             label = f"{name} in {unit}" if len(chosen) <= OWN_PANELS else unit
             panels.setdefault(label, {})[name] = part[name]
         return plot_over(("time in s", part.time), panels, figure)
+
+    def show(self, folder: str | os.PathLike[str] | None = None) -> object:
+        """The report of the run: as the last line of a notebook's cell it appears there, `show().open()` opens it in
+        the browser. folder : of the report's files, which stay; a temporary one when None."""
+        return import_module("gearfmu.api.results").shown(self, folder)  # reports are made of traces
 
     @property
     def _of_meshes(self) -> list[str]:

@@ -69,9 +69,6 @@ static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *
     for (int i = 0; i < n; i += pairs)
         if (turned < pairs) predict_modes(&setup->modal[g], w, state, i + turned, work->qp[g], work->vp[g]);
     work->y[g] = work->qp[g];
-    if (!k->curved_read) return;
-    for (int i = 0; i < n; i++) work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];
-    work->y[g] = work->reading[g];
 }
 
 /* the ground group; its speeds have contracted by half a step of the dashpots. Returns what those take. */
@@ -94,10 +91,6 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
         QUADS(work->ground_v)[i] = v4[i] + (a21[i] * x4[i] + d22[i] * v4[i] + b0v[i] * f4[i]);
     }
     work->ground_y = work->ground_q;
-    if (!k->curved_read) return taken;
-    for (int i = 0; i < n; i++)
-        work->ground_reading[i] = w->read_q[i] * work->ground_q[i] + w->read_v[i] * work->ground_v[i];
-    work->ground_y = work->ground_reading;
     return taken;
 }
 
@@ -110,7 +103,7 @@ double gk_advance_predict(const gk_model *model, const gk_setup *setup, gk_work 
     for (int g = 0; g < model->gears; g++) predict_gear(model, setup, work, data, k, g);
     for (int d = 0; d < setup->spins; d++) {
         const double acceleration = GK_OF(data, f)[d] * setup->inverse_inertia[d];
-        work->spin[d] = GK_OF(data, x)[d] + k->h * GK_OF(data, v)[d] + k->rigid_b0 * acceleration;
+        work->spin[d] = GK_OF(data, x)[d] + k->h * GK_OF(data, v)[d] + k->rigid_mobility * acceleration;
         work->speed[d] = GK_OF(data, v)[d] + 0.5 * k->h * acceleration;
     }
     return predict_ground(model, setup, work, data, k);
@@ -234,7 +227,7 @@ static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work 
     }
     for (int d = 0; d < setup->spins; d++) {
         const double before = GK_OF(data, x)[d];
-        GK_OF(data, x)[d] = work->spin[d] + k->rigid_bq * setup->inverse_inertia[d] * z[d];
+        GK_OF(data, x)[d] = work->spin[d] + k->rigid_mobility * setup->inverse_inertia[d] * z[d];
         GK_OF(data, v)[d] = work->speed[d] + 0.5 * k->h * setup->inverse_inertia[d] * z[d];
         GK_OF(data, f_rate)[d] = (force[d] - GK_OF(data, f)[d]) / k->h;
         GK_OF(data, f)[d] = force[d];
@@ -247,11 +240,9 @@ void gk_advance_correct(const gk_model *model, const gk_setup *setup, gk_work *w
                         const gk_coefficients *k)
 {
     GK_ASSERT(work->ground_y && k->h > 0.0);
-    const int linear = gk_scheme_of(setup->integrator)->linear_force;
     for (int e = 0; e < model->engagements; e++) {
         gk_system *s = &work->engaged[e].system;
         memcpy(s->last, s->force, (size_t)s->stride * sizeof *s->last);
-        for (int i = 0; linear && i < s->stride; i++) s->last[i] += s->end[i];
         if (GK_ON(setup, friction)) work->engaged[e].glide->taken = gk_friction_settle(work->engaged[e].glide, s);
     }
     gk_exchange_scatter(model, setup, work, gk_step_z, force_with_dampers);

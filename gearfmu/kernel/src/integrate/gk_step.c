@@ -53,9 +53,8 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
 
 /* A torque that is given anew acts from the start of the step: its mean in the step is the new value, so that the force
  * at the end that a prediction with the old one needs is as far beyond it (docs/theory.md, 3.3) */
-static void find_jumps(const gk_setup *setup, const gk_work *work, gk_system *s)
+static void find_jumps(const gk_work *work, gk_system *s)
 {
-    if (gk_scheme_of(setup->integrator)->linear_force) return; /* mix4: forces are linear in the step */
     for (int i = s->contacts; i < s->n; i++)
         if (s->kind[i] == ROW_TORQUE) s->jump[i] = work->torque[s->port_of[i]] - s->force0[i];
 }
@@ -87,15 +86,11 @@ static int all_finite(const gk_system *s)
 static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                             const gk_coefficients *k)
 {
-    const int balanced = !gk_scheme_of(setup->integrator)->linear_force;
     for (int i = 0; i < setup->islands; i++) {
         gk_coupled coupled = {model, setup, work, k, i, 0, 0, 1.0};
         const gk_island island = gk_couple_island(&coupled);
         if (island.count > 1) gk_couple_recall(&coupled);
-        if (balanced)
-            gk_balance_solve(&island);
-        else
-            gk_balance_plain(&island);
+        gk_balance_solve(&island);
     }
     for (int e = 0; e < model->engagements; e++) {
         gk_system *s = &work->engaged[e].system;
@@ -130,7 +125,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
         if (!gk_engage(model, setup, work, data, &how, e)) return GK_DIVERGED;
         if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
-        find_jumps(setup, work, &work->engaged[e].system);
+        find_jumps(work, &work->engaged[e].system);
         gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
         GK_LAP(work, PHASE_SYSTEM);

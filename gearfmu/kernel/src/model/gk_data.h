@@ -18,7 +18,7 @@ enum { PLANE = 3, SPACE = 6, POSE = 2 * SPACE };
 enum { XA, YA, PHIA, ZA, RXA, RYA, XB, YB, PHIB, ZB, RXB, RYB };
 
 typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER, LEVEL_EXPLICIT } gk_level;
-typedef enum { DG4, MIX4, EM, RK45, CENTRAL } gk_integrator;
+typedef enum { DG4, EM, RK45, CENTRAL } gk_integrator;
 typedef enum { CONTACT_BY_LEVEL, CONTACT_LINE, CONTACT_NODAL } gk_contact_law;
 /* bits of solver.status */
 enum {

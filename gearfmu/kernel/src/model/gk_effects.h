@@ -11,7 +11,7 @@ typedef struct gk_effects {
 } gk_effects;
 
 /* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
- * measured against it (evidence/effects_cost.py) */
+ * measured against it (evidence/price/effects_cost.py) */
 #ifndef GK_WITHOUT
 #define GK_WITHOUT nothing
 #endif

@@ -62,8 +62,8 @@ int gk_engage_overlaps(const gk_model *model, const gk_work *work, int e)
 }
 
 /* ---- memory ------------------------------------------------------------------------------------------------------ */
-/* λ0 without dashpots: quasi-static deflection and energy at the start; linear: forces of the step are (mix4) */
-static void recall_forces(const gk_data *data, gk_system *s, int linear)
+/* λ0 without dashpots: quasi-static deflection and energy at the start */
+static void recall_forces(const gk_data *data, gk_system *s)
 {
     const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
     s->limit_reached = s->iterations = s->dashpots = s->dashpots_stand = 0;
@@ -73,10 +73,6 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     gk_clear(s->yield + 4 * whole, joints);
     gk_clear(s->potential + 4 * whole, joints);
     memcpy(s->force, s->force0, (size_t)quads * sizeof(gk_quad));
-    if (linear)
-        memcpy(s->begin, s->end0, (size_t)quads * sizeof(gk_quad));
-    else
-        gk_clear(s->begin, quads);
     for (int i = s->n - s->clutches; i < s->n; i++) {
         s->active[i] = (unsigned char)GK_OF(data, locked)[s->port_of[i]];
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
@@ -99,7 +95,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
     s->rubs = GK_ON(setup, friction) && s->contacts > 0;
     s->rubbing = s->rubbed = s->unbalanced = 0.0;
-    recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
+    recall_forces(data, s);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->damper0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
         s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;

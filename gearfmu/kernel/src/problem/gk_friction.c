@@ -177,7 +177,7 @@ static void express_limits(gk_glide *glide, const gk_system *s)
         glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
         glide->end_by_z[j] = by_z;
         glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
-                          : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
+                          : glide->rolls                      ? 0.5 * ratio * s->force0[j]
                                                               : 0.5 * (glide->start_end[j] + end);
         const double by_mean = glide->rolls ? glide->share[j] : 1.0 / (0.5 + glide->damps[j]);
         const double by_start = glide->rolls ? 0.0 : (glide->damps[j] - 0.5) * by_mean;

@@ -104,7 +104,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
         [q] = OF(gain)[q] * (OF(approach)[q] - OF(approach0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
         OF(end)[q] = OF(late)[q] * OF(damper)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(damper)[q];
-        OF(z)[q] = force + OF(eta)[q] - OF(begin)[q] + OF(jump)[q];
+        OF(z)[q] = force + OF(eta)[q] + OF(jump)[q];
     }
 #undef OF
     for (int i = s->n - s->clutches; i < s->n; i++)
@@ -137,7 +137,7 @@ void gk_solve_begin(gk_system *s)
     for (int q = 0; q < quads; q++) {
         ((gk_quad *)s->approach)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->delta)[q];
         ((gk_quad *)s->approach0)[q] = ((gk_quad *)s->approach)[q];
-        ((gk_quad *)s->z)[q] = ((gk_quad *)s->force)[q] - ((gk_quad *)s->begin)[q];
+        ((gk_quad *)s->z)[q] = ((gk_quad *)s->force)[q];
         ((gk_quad *)s->damper)[q] = ((gk_quad *)s->end)[q] = ((gk_quad *)s->lag)[q] = (gk_quad){0};
     }
     for (int i = s->n - s->clutches; i < s->n; i++)

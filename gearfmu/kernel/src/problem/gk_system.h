@@ -62,9 +62,7 @@ typedef struct gk_system {
     int dashpots;            /* any of them */
     double direction[MAX_STRIDE], alpha;
     double last[MAX_STRIDE]; /* forces at the end that the next prediction is made with */
-    double end[MAX_STRIDE],
-        begin[MAX_STRIDE]; /* f_d; mix4, whose forces are linear in the step: f_d at its start, which
-                                                  the prediction contains; else 0 */
+    double end[MAX_STRIDE];  /* f_d */
     double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];                 /* D z, Aλ, A f_d */
     double linear[MAX_STRIDE], approach[MAX_STRIDE], approach0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
@@ -185,7 +183,7 @@ static inline double gk_solve_end_gap(const gk_system *s, int i)
 static inline double gk_solve_mean(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
-    return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
+    return 0.5 * (s->force0[i] + s->z[i]);
 } /* force of a row in the step */
 /* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
 static inline double gk_solve_static_mean(const gk_system *s, int i)

@@ -103,8 +103,8 @@ struct gk_work {
     double *ground_q, *ground_v, *ground_force, *ground_next, *ground_reading,
         *ground_start;           /* speeds after half a step of the supports' dashpots and of turning axes */
     double pressed;              /* work of centrifugal loads in the first half */
-    gk_real *reading[MAX_GEARS]; /* read_q q + read_v v where that is not q */
-    const gk_real *y[MAX_GEARS]; /* displacement that the rows read: qp, reading, or zero */
+    gk_real *reading[MAX_GEARS]; /* scratch: how far the modes move by the forces of the last step alone */
+    const gk_real *y[MAX_GEARS]; /* displacement that the rows read: qp or zero */
     const double *ground_y;
     gk_real *turned, *turned_next, *scaled,
         *zero; /* states in the frame of a reference tooth; row times coefficients */

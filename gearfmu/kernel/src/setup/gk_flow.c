@@ -12,7 +12,7 @@ static const double MESH_STIFFNESS = 0.1125; /* over 2(1 − ν²)/(πE) of both
 static const double STRETCHED_MOST = 0.6;    /* of ½Ωh */
 
 typedef struct oscillator {
-    double a11, a12, a21, a22, b0q, b0v, bq, bv, mobility, read_q, read_v, kappa, inverse_s2;
+    double a11, a12, a21, a22, b0q, b0v, bq, bv, mobility, kappa, inverse_s2;
 } oscillator;
 
 static oscillator free_flow(double omega, double zeta, double h)
@@ -28,8 +28,6 @@ static oscillator free_flow(double omega, double zeta, double h)
                     0,
                     0,
                     0,
-                    0,
-                    1.0,
                     0,
                     0,
                     1.0};
@@ -53,25 +51,7 @@ static oscillator trapezoidal(double omega, double zeta, double h)
 {
     double c = zeta * omega * h, k = 0.25 * omega * omega * h * h, d = 1.0 + c + k, bq = 0.25 * h * h / d,
            bv = 0.5 * h / d;
-    oscillator o = {
-        (1.0 + c - k) / d, h / d, -omega * omega * h / d, (1.0 - c - k) / d, bq, bv, bq, bv, bq, 1.0, 0, 0, 1.0};
-    return o;
-}
-
-/* mix4: force linear in the step, gap at q − (h²/12) q̈ (the scheme before dg4, for comparison) */
-static oscillator linear_force(double omega, double zeta, double h)
-{
-    oscillator o = free_flow(omega, zeta, h);
-    double omega2 = omega * omega, twelfth = h * h / 12.0, loss = 2.0 * zeta * omega;
-    double q0 = -loss / (h * omega2 * omega2),
-           v0 = 1.0 / (h * omega2); /* particular solution of the ramp at its start */
-    o.bq = q0 + 1.0 / omega2 - o.a11 * q0 - o.a12 * v0;
-    o.bv = v0 - o.a21 * q0 - o.a22 * v0;
-    o.b0q = (1.0 - o.a11) / omega2 - o.bq;
-    o.b0v = o.a12 - o.bv;
-    o.read_q = 1.0 + omega2 * twelfth;
-    o.read_v = loss * twelfth;
-    o.mobility = o.read_q * o.bq + o.read_v * o.bv - twelfth;
+    oscillator o = {(1.0 + c - k) / d, h / d, -omega * omega * h / d, (1.0 - c - k) / d, bq, bv, bq, bv, bq, 0, 1.0};
     return o;
 }
 
@@ -103,7 +83,7 @@ static void store(gk_flow *f, int i, const oscillator *o)
     if (o->a12 != 0.0) round_flow(o, a);
     f->d11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->d22[i] = a[3];
     f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
-    f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
+    f->mobility[i] = (gk_real)o->mobility;
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
 }
 
@@ -146,12 +126,11 @@ static double stretched(const gk_model *model, const gk_setup *setup, double h)
 
 static oscillator oscillator_of(const gk_setup *setup, const gk_coefficients *k, double omega, double zeta)
 {
-    const oscillator nothing = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    const oscillator nothing = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     if (!GK_ON(setup, modal_damping)) zeta = 0.0;
     if (!(omega > 0.0)) return nothing;
     if (omega * k->h >= EXPONENTIAL_BELOW * gk_max(k->gamma, 0.5)) return trapezoidal(omega, zeta, k->stretched_h);
-    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h)
-                                     : exponential(omega, zeta, k->h, gk_correction(k->gamma));
+    return exponential(omega, zeta, k->h, gk_correction(k->gamma));
 }
 
 static void fill_gear(const gk_setup *setup, gk_coefficients *k, int g)
@@ -213,7 +192,7 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coeffic
         f->d11[i] = there ? o.a11 - 1.0 : 0.0, f->a12[i] = o.a12, f->a21[i] = o.a21,
         f->d22[i] = there ? o.a22 - 1.0 : 0.0;
         f->b0q[i] = o.b0q, f->b0v[i] = o.b0v, f->bq[i] = o.bq, f->bv[i] = o.bv;
-        f->mobility[i] = o.mobility, f->read_q[i] = o.read_q, f->read_v[i] = o.read_v;
+        f->mobility[i] = o.mobility;
         f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
     }
     fill_dampers(model, setup, k);
@@ -236,11 +215,8 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->h = h;
     oldest->gamma = gamma;
     oldest->timeless = 0;
-    oldest->stretched_h = setup->integrator == MIX4 ? h : stretched(model, setup, h);
-    oldest->curved_read = setup->integrator == MIX4;
-    oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
-    oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
-    oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
+    oldest->stretched_h = stretched(model, setup, h);
+    oldest->rigid_mobility = 0.25 * h * h;
     oldest->rigid_kappa = gk_correction(gamma) * h * h / 6.0;
     for (int g = 0; g < model->gears; g++) fill_gear(setup, oldest, g);
     fill_ground(model, setup, oldest);

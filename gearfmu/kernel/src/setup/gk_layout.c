@@ -176,8 +176,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
 }
 
 #define FLOW_ARRAYS(f)                                                                                                 \
-    {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,                                  \
-     &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2}
+    {&f->d11, &f->a12, &f->a21, &f->d22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->kappa, &f->inverse_s2}
 
 static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {

@@ -312,8 +312,8 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
 {
     gk_coefficients *k = &work->explicit_rows;
     const size_t ground = (size_t)setup->base.n * sizeof(double);
-    k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0;
-    k->curved_read = 0, k->timeless = 1;
+    k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = 0.0;
+    k->timeless = 1;
     for (int g = 0; g < model->gears; g++) {
         const size_t size = (size_t)setup->modal[g].n * sizeof(gk_real);
         memset(k->flow[g].mobility, 0, size);

@@ -168,15 +168,15 @@ typedef struct gk_joint {
 
 typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
     gk_real *d11, *a12, *a21, *d22, *b0q, *b0v, *bq,
-        *bv;                             /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at
+        *bv;           /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at
                                                              the start and at the end of the step */
-    gk_real *mobility, *read_q, *read_v; /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
+    gk_real *mobility; /* what a force at the end does to a gap */
     gk_real *kappa, *inverse_s2;
     int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
 } gk_flow;
 
 typedef struct gk_ground_flow { /* the same of the ground group */
-    double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
+    double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *pulls;          /* (supports, n) s²e/n of a dashpot */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
@@ -184,10 +184,9 @@ typedef struct gk_ground_flow { /* the same of the ground group */
 } gk_ground_flow;
 
 typedef struct gk_coefficients {
-    double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
-    double stretched_h;                                               /* step of the trapezoidal ones */
-    int timeless;                                                     /* forces move nothing in the step: D = 0 */
-    int curved_read;                                                  /* mix4: the gap reads more than q */
+    double h, gamma, rigid_mobility, rigid_kappa; /* the same of a free mass, whose b0q = bq = mobility */
+    double stretched_h;                           /* step of the trapezoidal ones */
+    int timeless;                                 /* forces move nothing in the step: D = 0 */
     gk_flow flow[MAX_GEARS];
     gk_ground_flow ground;
     uint64_t age;
@@ -198,18 +197,14 @@ static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamm
 
 /* what an integrator is: the one place where they differ in more than their own file */
 typedef struct gk_scheme {
-    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
-    int corrected;    /* γ > 0: corrected for time within the step */
-    int linear_force; /* forces are linear in the step, else constant */
+    int is_explicit; /* forces follow from positions; limited by stability; no account of work; knows no clutch */
+    int corrected;   /* γ > 0: corrected for time within the step */
 } gk_scheme;
 static inline const gk_scheme *gk_scheme_of(gk_integrator integrator)
 {
     GK_ASSERT(integrator >= DG4 && integrator <= CENTRAL);
-    static const gk_scheme schemes[] = {[DG4] = {.corrected = 1},
-                                        [MIX4] = {.linear_force = 1},
-                                        [EM] = {0},
-                                        [RK45] = {.is_explicit = 1},
-                                        [CENTRAL] = {.is_explicit = 1}};
+    static const gk_scheme schemes[] = {
+        [DG4] = {.corrected = 1}, [EM] = {0}, [RK45] = {.is_explicit = 1}, [CENTRAL] = {.is_explicit = 1}};
     return &schemes[integrator];
 }
 

@@ -1,0 +1,250 @@
+"""What it costs to cut the clutch closure in two: error of the input shaft's torque by master, communication step H and
+what the importer connects.
+
+    python -m evidence.accuracy.coupling
+
+Reference: the same drivetrain and the same kernel coupled by gs_mean at every internal step (H = h). That it is the
+solution of the uncut equations shows in the rows with H = 2h: two masters of different kind, and what is left.
+Errors: rms of the difference over the whole scene, over the rms of the AC part (reference minus its 10 ms moving
+average: ringing and tooth mesh alone) and over the standard deviation of the torque. predicted_over_true: Richardson's
+estimate from H and H/2 (`gearfmu run --verify`) over the true error. lock_shift_s: of the communication point at which
+the clutch is seen locked. All runs of a group have the same internal step h.
+Prints the table, writes evidence/accuracy/coupling.csv, docs/pictures/coupling.svg and the table of docs/coupling.md;
+with the argument `page` the last two from the committed table.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.cosim.accuracy import Window, coupling_errors, distance
+from gearfmu.cosim.coupled import OK, Result
+from gearfmu.cosim.masters import Wiring
+from gearfmu.cosim.scene_run import run_once, stage_model
+from gearfmu.cosim.source import Source
+from gearfmu.files import write_text, written_whole
+from gearfmu.report.style import panels, styled
+from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.stage.run.trace import Trace
+
+ROOT = Path(__file__).resolve().parents[2]
+FILE, PICTURE = Path(__file__).with_suffix(".csv"), ROOT / "docs" / "pictures" / "coupling.svg"
+PAGE, BEGIN, END = ROOT / "docs" / "coupling.md", "<!-- begin: evidence/accuracy/coupling.py -->\n", "<!-- end -->"
+STEPS = (25e-6, 50e-6, 100e-6, 200e-6, 250e-6, 500e-6, 1e-3)
+WHOLE = Window(0.0, steady=False)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs that share a reference: level, internal step h, and where the clutch is (cut at soft springs or at
+    shafts)."""
+
+    level: str
+    h: float
+    chain: bool
+
+    @property
+    def torque(self) -> str:
+        """Channel of the input shaft's torque."""
+        return "pinion.shaft.tau" if self.chain else "pinion.tau"
+
+    def scene(self, master: str, step: float) -> SceneSpec:
+        """The clutch closure in this group."""
+        scene = load_scene("clutch_closure")
+        locked = "pinion.clutch.locked" if self.chain else "drive.clutch.locked"
+        changed = {
+            "record": (self.torque, locked),
+            "passenger_car": scene.passenger_car.model_copy(update={"chain_in_fmu": self.chain}),
+            "stage": scene.stage.model_copy(update={"level": self.level, "h": self.h}),
+            "coupling": scene.coupling.model_copy(update={"step": step, "master": master}),
+        }
+        return scene.model_copy(update=changed)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A master and what is connected."""
+
+    master: str
+    wiring: Wiring = Wiring()
+
+    @property
+    def unconnected(self) -> str:
+        """Inputs that stay as they are."""
+        names = [f".{key}" for key in ("w", "a") if key not in self.wiring.motion]
+        return " ".join(names + ([] if self.wiring.rates else ["capacity_rate"]))
+
+
+GS, NEXT = Line("gs_mean"), Line("jacobi", Wiring(held="tau_next"))
+INSIDE = (
+    GS,
+    Line("gs_mean", Wiring(rates=False)),
+    NEXT,
+    Line("jacobi", Wiring(("phi", "w"), held="tau_next")),
+    Line("jacobi", Wiring(rates=False, held="tau_next")),
+    Line("jacobi"),
+    Line("jacobi", Wiring(("phi", "w"))),
+    Line("jacobi", Wiring(rates=False)),
+    Line("jacobi", Wiring(("phi", "w"), rates=False)),
+    Line("jacobi", Wiring(("phi",))),
+    Line("jacobi", Wiring(("phi",), held="tau_mean")),
+)
+PLAN: tuple[tuple[Group, tuple[Line, ...], tuple[float, ...]], ...] = (
+    (Group("fast", 5e-6, True), INSIDE, STEPS),
+    (Group("fast", 5e-6, False), (GS, NEXT, Line("jacobi")), STEPS),
+    (Group("standard", 2.5e-6, True), (GS, NEXT, Line("jacobi")), (50e-6, 100e-6, 500e-6, 1e-3)),
+)
+
+
+def lock(trace: Trace) -> float:
+    """Time, s, from which the clutch is seen locked; NaN when it does not lock."""
+    name = next(name for name in trace.channels if name.endswith(".clutch.locked"))
+    return float(trace.time[np.argmax(trace[name] > 0)]) if trace[name].any() else float("nan")
+
+
+def rows(group: Group, lines: tuple[Line, ...], steps: tuple[float, ...]) -> Iterator[dict[str, object]]:
+    """Table of one group."""
+    source = Source(stage_model(group.scene("gs_mean", group.h)))
+    reference = run_once(group.scene("gs_mean", group.h), source).trace
+    for line in lines:
+        sizes = (2.0 * group.h, *steps) if line in (GS, NEXT) else steps
+        results: dict[float, Result] = {}
+        for step in sizes:
+            results[step] = run_once(group.scene(line.master, step), source, wiring=line.wiring)
+        for step in sizes:
+            yield row(group, line, results, step, reference)
+
+
+def row(group: Group, line: Line, results: dict[float, Result], step: float, reference: Trace) -> dict[str, object]:
+    """One line of the table; a run that did not reach the end has an outcome and no numbers."""
+    result, name = results[step], group.torque
+    found: dict[str, object] = {
+        "level": group.level,
+        "h_s": group.h,
+        "clutch": "inside" if group.chain else "outside",
+        "master": line.master,
+        "held": line.wiring.held if line.master == "jacobi" else "",
+        "unconnected": line.unconnected,
+        "H_s": step,
+        "outcome": result.outcome,
+    }
+    if result.outcome != OK:
+        return found
+    true = distance(result.trace, reference, name, WHOLE)
+    half = next((r for h, r in results.items() if abs(2 * h - step) < 1e-12 and r.outcome == OK), None)
+    estimate = coupling_errors(result.trace, half.trace, result.order, WHOLE)[name].rms if half else None
+    return found | {
+        "error_over_ac": true.over_ac,
+        "error_over_std": true.over_std,
+        "error_Nm": true.rms,
+        "predicted_over_true": estimate / true.rms if estimate else None,
+        "lock_shift_s": round(lock(result.trace) - lock(reference), 9),
+        "energy_residual": result.energy_residual,
+    }
+
+
+COLUMNS = (
+    *("level", "h_s", "clutch", "master", "held", "unconnected", "H_s", "outcome"),
+    *("error_over_ac", "error_over_std", "error_Nm", "predicted_over_true", "lock_shift_s", "energy_residual"),
+)
+
+
+def shown(value: object) -> str:
+    """A number with four digits, text as it is."""
+    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
+
+
+NAMED = {
+    ("inside", "gs_mean", "", ""): "gs_mean",
+    ("inside", "jacobi", "tau_next", ""): "jacobi, tau_next held",
+    ("inside", "jacobi", "tau", ""): "jacobi",
+    ("inside", "jacobi", "tau", "capacity_rate"): "jacobi, capacity held too",
+    ("outside", "gs_mean", "", ""): "gs_mean, cut at stiff shafts",
+    ("outside", "jacobi", "tau", ""): "jacobi, cut at stiff shafts",
+}
+Table = list[dict[str, str]]
+
+
+def line_of(row: dict[str, str]) -> tuple[str, ...]:
+    """What makes the line of a row."""
+    return tuple(row[key] for key in ("clutch", "master", "held", "unconnected"))
+
+
+def draw(table: Table) -> None:
+    """Error over H of the lines that have a name."""
+    with styled():
+        figure, (axes,) = panels((3.2,))
+        for line, label in NAMED.items():
+            points = [
+                (1e6 * float(row["H_s"]), 100 * float(row["error_over_std"]))
+                for row in table
+                if row["level"] == "fast" and line_of(row) == line and row["outcome"] == OK
+            ]
+            points = [point for point in points if point[1] < 100]
+            axes.loglog(*zip(*points, strict=True), "o--" if line[0] == "outside" else "o-", label=label)
+        axes.set(xlabel="communication step in µs", ylabel="input shaft torque, rms error in % of its std")
+        for axis, ticks in ((axes.xaxis, (10, 25, 50, 100, 200, 500, 1000)), (axes.yaxis, (1e-6, 1e-4, 1e-2, 1, 100))):
+            axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+            axis.set_ticks((), minor=True)
+        axes.set_ylim(5e-7, 200)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+        with written_whole(PICTURE) as temporary:
+            figure.savefig(temporary, format="svg")
+
+
+def page(table: Table) -> str:
+    """The table of docs/coupling.md: errors at 100 µs and 1 ms, line by line."""
+    steps = ("0.0001", "0.001")
+    head = "| clutch | master | torque held | not connected | 100 µs: std | AC | 1 ms: std | AC |\n"
+    lines = [head, "|---|---|---|---|---|---|---|---|\n"]
+    fast = [row for row in table if row["level"] == "fast"]
+    for line in dict.fromkeys(map(line_of, fast)):
+        rows = {row["H_s"]: row for row in fast if line_of(row) == line}
+        errors = [percent(rows[step], key) for step in steps for key in ("error_over_std", "error_over_ac")]
+        lines.append("| " + " | ".join([*(f"`{part}`" if part else "" for part in line), *errors]) + " |\n")
+    return "".join(lines).replace("`inside`", "inside").replace("`outside`", "outside")
+
+
+def percent(row: dict[str, str], key: str) -> str:
+    """An error in %, two digits, or how the run ended."""
+    if row["outcome"] != OK:
+        return "stopped"
+    value = 100 * float(row[key])
+    return f"{value:.2g} %" if value < 10 else f"{value:.0f} %"
+
+
+def measured() -> Table:
+    """All lines, printed as they come, written at the end."""
+    table = []
+    for group, lines, steps in PLAN:
+        for line in rows(group, lines, steps):
+            table.append({column: shown(line.get(column)) for column in COLUMNS})
+            print("  ".join(table[-1].values()), flush=True)
+    with written_whole(FILE) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(table)
+    return table
+
+
+def main() -> None:
+    """Measure (or read), print, write."""
+    if sys.argv[1:] == ["page"]:
+        with open(FILE, newline="", encoding="utf-8") as file:
+            table = list(csv.DictReader(file))
+    else:
+        table = measured()
+    draw(table)
+    text = PAGE.read_text(encoding="utf-8")
+    start, end = text.index(BEGIN) + len(BEGIN), text.index(END)
+    write_text(PAGE, text[:start] + page(table) + text[end:])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""Elastic frequencies of free bodies by CalculiX: our meshes, 20-node hexahedra (C3D20), all teeth or, where these are
+too many, one sector with CalculiX's own cyclic symmetry and every nodal diameter.
+
+    python -m evidence.peers.calculix.frequencies [CASE …] [--work DIR] [--out frequencies.csv] [--compare]
+
+A case whose deck is that of the table is not run again unless it is named. `--compare` runs nothing of CalculiX: it
+prints ours, from one sector of the same mesh and its cyclic symmetry, and from the mesh that the stage file asks for.
+Needs CalculiX's ccx (Debian: calculix-ccx); seconds to some minutes a case.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import re
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evidence.peers.calculix.ccx import require_ccx, run
+from evidence.peers.calculix.positions import read
+from gearfmu.body.sector import body_sector
+from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.files import written_whole
+from gearfmu.geometry import GearGeometry
+from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import Material
+
+COUNT, RIGID = 20, 6
+HERE = Path(__file__).parent
+FIELDS = ("case", "mode", "frequency_Hz", "nodes", "elements", "seconds", "deck_sha256")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body of a shipped stage. scale: of all element counts of its mesh. by_sector: CalculiX gets one sector."""
+
+    name: str
+    stage: str
+    body: str
+    scale: float
+    by_sector: bool = False
+
+
+CASES = {
+    case.name: case
+    for case in (
+        Case("pinion_coarse", "fzg_c", "pinion", 0.4),
+        Case("pinion", "fzg_c", "pinion", 0.7),
+        Case("ring_coarse", "planetary54", "ring", 0.2),
+        Case("ring", "planetary54", "ring", 0.4),
+        Case("carrier_coarse", "planetary54", "carrier", 0.5),
+        Case("carrier", "planetary54", "carrier", 1.0, by_sector=True),
+        Case("pinion_sector_coarse", "fzg_c", "pinion", 0.4, by_sector=True),
+        Case("pinion_file", "fzg_c", "pinion", 1.0, by_sector=True),
+        Case("ring_file", "planetary54", "ring", 1.0, by_sector=True),
+    )
+}
+
+
+def body_of(case: Case) -> tuple[Material, FeMesh]:
+    """The body's material and the finite elements of one of its sectors."""
+    spec = load_stage(case.stage)
+    if spec.kind == "planetary_set":
+        return getattr(spec, case.body).material, body_sector(spec, case.body, case.scale)
+    (gear,) = (gear for gear in spec.gears if gear.name == case.body)
+    counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
+    return gear.material, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)
+
+
+def ours(case: Case) -> np.ndarray:
+    """Our lowest elastic frequencies (COUNT,) Hz of a case."""
+    material, sector = body_of(case)
+    found = cyclic_modes(case.body, sector, material, COUNT)
+    return np.concatenate([[mode.frequency] * len(mode.numbers) for mode in found.modes])[:COUNT]
+
+
+def compare(rows: list[dict[str, Any]]) -> None:
+    """Print our frequencies against those of the table."""
+    for name, case in CASES.items():
+        theirs = np.array([float(row["frequency_Hz"]) for row in rows if row["case"] == name])
+        if len(theirs):
+            same = np.abs(ours(case) / theirs - 1)
+            shipped = 100 * (ours(replace(case, scale=1.0)) / theirs - 1)
+            print(f"{name}: same mesh {same.max():.1e}, the file's mesh {shipped.min():+.3f} … {shipped.max():+.3f} %")
+
+
+def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
+    """Free vibration of a body, whole or (`mesh.teeth` > 1) by one sector, in mm, N, tonnes and s."""
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{k}, {x:.14g}, {y:.14g}, {z:.14g}" for k, (x, y, z) in enumerate(1e3 * mesh.nodes, start=1)]
+    lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY"]
+    for k, row in enumerate(mesh.elements + 1, start=1):
+        text = [str(node) for node in row]
+        lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
+    lines += [
+        "*MATERIAL, NAME=STEEL",
+        "*ELASTIC",
+        f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}",
+    ]
+    lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
+    symmetry, choice = _symmetry(mesh) if mesh.teeth > 1 else ([], [])
+    lines += [*symmetry, "*STEP", "*FREQUENCY", f"{COUNT + RIGID}", *choice, "*END STEP"]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _symmetry(sector: FeMesh) -> tuple[list[str], list[str]]:
+    """CalculiX's cyclic symmetry about z: the tie of both cuts, and the choice of all nodal diameters in the step."""
+    lines = []
+    for name, cut in (("MINUS", sector.cut_minus), ("PLUS", sector.cut_plus)):
+        lines += [f"*NSET, NSET={name}", *(f"{node}," for node in cut + 1), f"*SURFACE, NAME=S{name}, TYPE=NODE", name]
+    lines += ["*TIE, NAME=CUT, CYCLIC SYMMETRY, POSITION TOLERANCE=1e-3", "SMINUS, SPLUS"]
+    lines += [f"*CYCLIC SYMMETRY MODEL, N={sector.teeth}, TIE=CUT", "0, 0, 0, 0, 0, 1"]
+    return lines, [f"*SELECT CYCLIC SYMMETRY MODES, NMIN=0, NMAX={sector.teeth // 2}"]
+
+
+def frequencies(path: Path) -> np.ndarray:
+    """Elastic frequencies (Hz) of a .dat file: the table of eigenvalues without the six rigid modes."""
+    text = path.read_text(encoding="ascii")
+    rows = re.findall(
+        r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE
+    )
+    values = np.array([float(row[1]) for row in rows[: COUNT + RIGID]])
+    assert len(values) == COUNT + RIGID and np.all(np.abs(values[:RIGID]) < 1e-4 * values[RIGID])
+    return np.sqrt(values[RIGID:]) / (2 * np.pi)
+
+
+def sector_frequencies(path: Path, teeth: int) -> np.ndarray:
+    """The same of a .dat file of one sector: a table for each nodal diameter. CalculiX lists real modes, those of
+    diameter 0 and half the teeth, twice as well."""
+    found = []
+    for diameter, table in enumerate(path.read_text(encoding="ascii").split("E I G E N V A L U E")[1:]):
+        rows = re.findall(rf"^ +{diameter} +\d+ +(\S+) +\S+ +\S+ +\S+\s*$", table, re.MULTILINE)
+        values = np.array([float(row) for row in rows])[:: 2 if 2 * diameter in (0, teeth) else 1]
+        rigid = {0: 2, 1: 4}.get(diameter, 0)
+        assert len(values) >= COUNT / 2 and np.all(np.abs(values[:rigid]) < 1e-4 * values[rigid])
+        found.append(values[rigid:])
+    assert len(found) == teeth // 2 + 1
+    return np.sqrt(np.sort(np.concatenate(found))[:COUNT]) / (2 * np.pi)
+
+
+def solved(case: Case, work: Path, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The table's rows of a case, made by running it; `known` ones that come from the same deck stay."""
+    material, sector = body_of(case)
+    mesh = sector if case.by_sector else sector.full()
+    folder = work / f"frequencies_{case.name}"
+    folder.mkdir(parents=True, exist_ok=True)
+    deck = folder / "free.inp"
+    write_deck(mesh, material, deck)
+    digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
+    if known and all(row["deck_sha256"] == digest for row in known):
+        return known
+    seconds = run(deck)
+    result = deck.with_suffix(".dat")
+    found = sector_frequencies(result, sector.teeth) if case.by_sector else frequencies(result)
+    size = {
+        "nodes": len(mesh.nodes),
+        "elements": len(mesh.elements),
+        "seconds": f"{seconds:.0f}",
+        "deck_sha256": digest,
+    }
+    return [{"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size} for k, f in enumerate(found, start=1)]
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The table in the order of CASES."""
+    rows = [row for name in CASES for row in rows if row["case"] == name]
+    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
+    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
+    parser.add_argument("--out", type=Path, default=HERE / "frequencies.csv")
+    parser.add_argument("--compare", action="store_true")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.cases if name not in CASES]:
+        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
+    if chosen.compare:
+        return compare(read(chosen.out))
+    require_ccx()
+    for name in chosen.cases or CASES:
+        known = [row for row in read(chosen.out) if row["case"] == name]
+        fresh = solved(CASES[name], chosen.work, [] if chosen.cases else known)
+        write(chosen.out, [row for row in read(chosen.out) if row["case"] != name] + fresh)
+        kept = " (of the same deck)" if fresh is known else ""
+        print(f"{name}: {fresh[0]['nodes']} nodes, {fresh[0]['seconds']} s{kept}", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

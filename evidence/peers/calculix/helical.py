@@ -1,0 +1,291 @@
+"""Helical gears against CalculiX: loaded transmission error, load over the width, one pair with a tilted axis.
+
+    python -m evidence.peers.calculix.helical [CASE …] [--work DIR] [--out helical.csv] [--compare]
+
+The pair is `helical_demo` with 12 mm of width, without modifications (overlap ratio 0.58), and the same teeth with a
+helix angle of 30° (0.85). CASES are helix angle, axes (`tilted`: the wheel's axis turned by 1 µm over 1 mm across the
+line of centres), torque on the pinion and positions. Both gears are whole and twisted, with quadratic elements in five
+layers across the width; fine zones follow the slanting lines of contact, and layers where a line ends at a tip edge
+have elements of 0.6 mm. Both codes have rigid bores that are held. The way to the torque asked is that of positions.py.
+Table: helical.csv beside this file, one row a solution with the load share of every layer in both codes. A row of the
+same mesh at nearly its torque is not solved again: its error is computed anew. The bodies are reduced into the work
+folder first (some minutes). `--compare` runs nothing. Needs CalculiX's ccx; four to nine minutes a solution.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evidence.accuracy.helical_overlap import bodies_of
+from evidence.peers.calculix.case import digest
+from evidence.peers.calculix.ccx import first_solved, require_ccx, run_deck
+from evidence.peers.calculix.deck import Problem
+from evidence.peers.calculix.helical_section import Zone, twisted
+from evidence.peers.calculix.positions import NUDGES, PENALTY, read, write
+from evidence.peers.calculix.section import Fineness
+from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_forces, write_spatial_deck
+from gearfmu.body import ReducedBody, load_body
+from gearfmu.body.store import save_body
+from gearfmu.geometry import PairGeometry, hertz
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.spec.tables.lead import Misalignment
+from gearfmu.stage import assemble
+from gearfmu.stage.run.te import TANGENT, place_of, statics_of
+
+WIDTH, LAYERS, SLICES = 12e-3, 5, 10
+POSITIONS = 4
+TILT = 1e-3  # rad, of the wheel's axis across the line of centres
+MARGIN = 0.4e-3  # m beyond the ends of the path where tooth pairs are still in the deck
+PATCH, ZONE = 1.5, Zone()  # half length of the fine zones in Hertz half-widths, elements
+MESH = MeshSpec(flank=14, thickness=4, root=5, rim=3, width=6)
+ROLLS, FUNCTIONS = 20, 6
+NEAR = 0.05  # parts of the torque asked, up to which a solution's torque is carried to it
+HERE = Path(__file__).parent
+WHOLE = (1,) * LAYERS
+FINE = {  # elements of each layer by helix angle (degrees) and position: fine where lines of contact end
+    (20, 0): (1, 2, 4, 4, 1), (20, 1): WHOLE, (20, 2): (1, 2, 4, 4, 1), (20, 3): (4, 3, 1, 2, 4),
+    (30, 0): (1, 2, 4, 4, 1), (30, 1): (2, 4, 2, 4, 2), (30, 2): (2, 4, 4, 2, 1), (30, 3): (4, 2, 1, 2, 4),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """helix: degrees. axes: "parallel" or "tilted". torque: N·m on the pinion. position: of POSITIONS in a pitch."""
+
+    helix: int
+    axes: str
+    torque: float
+    position: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.helix}_{self.axes}_{self.torque:g}_{self.position}"
+
+    @property
+    def divisions(self) -> tuple[int, ...]:
+        """Elements of each layer."""
+        return FINE[self.helix, self.position]
+
+
+SOLVED = {
+    (20, "parallel", 40.0): (0, 1, 2, 3),
+    (20, "parallel", 110.0): (0, 1, 2, 3),
+    (20, "tilted", 40.0): (1,),
+    (20, "tilted", 110.0): (0, 1, 2, 3),
+    (30, "parallel", 110.0): (0, 1, 2, 3),
+    (30, "tilted", 110.0): (0, 2),
+}
+CASES = {case.name: case for load, places in SOLVED.items() for case in (Case(*load, place) for place in places)}
+
+
+@dataclass(frozen=True)
+class Ours:
+    """What the kernel says: te (m), tangent dF/dte (N/m) with F in the transverse line of action, share (LAYERS,)."""
+
+    te: float
+    stiffness: float
+    share: np.ndarray
+
+
+def stage(helix: int = 20, axes: str = "parallel") -> StageSpec:
+    """The pair of this comparison. Another helix angle keeps the normal section: teeth, depths and profile shifts."""
+    demo = load_stage("helical_demo")
+    error = Misalignment(in_plane=0.0, out_of_plane=TILT * WIDTH, span=WIDTH) if axes == "tilted" else None
+    beta = math.radians(helix)
+    wider = demo.pair.normal_module * (1 / math.cos(beta) - 1 / math.cos(demo.pair.helix_angle))  # a tooth's diameter
+    gears = []
+    for gear in demo.gears:
+        body = gear.body.model_copy(update={"mesh": MESH, "roll_points": ROLLS, "width_functions": FUNCTIONS})
+        changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body, "bore_coupling": "rigid"}
+        gears.append(gear.model_copy(update=changes | {"tip_diameter": gear.tip_diameter + gear.teeth * wider}))
+    distance = demo.pair.center_distance + sum(gear.teeth for gear in gears) * wider / 2
+    pair = demo.pair.model_copy(update={"misalignment": error, "helix_angle": beta, "center_distance": distance})
+    return demo.model_copy(update={"gears": tuple(gears), "pair": pair})
+
+
+def bodies(work: Path, helix: int = 20) -> list[ReducedBody]:
+    """The reduced gears with rigid bores, kept in the work folder."""
+    files = [work / f"helical_{helix}_{name}.h5" for name in ("pinion", "wheel")]
+    if not all(file.exists() for file in files):
+        work.mkdir(parents=True, exist_ok=True)
+        for body, file in zip(bodies_of(stage(helix)), files, strict=True):
+            save_body(body, file)
+    return [load_body(file) for file in files]
+
+
+def ours(case: Case, gears: list[ReducedBody]) -> Ours:
+    """The kernel's answer with bores held."""
+    spec, torque = stage(case.helix, case.axes), case.torque
+    model = assemble(spec, gears)
+    kernel = statics_of(model, **{"effect.bearings": 0.0, "slices": float(SLICES)})
+    at = -case.position / POSITIONS * place_of(model, None).pitch
+    state = kernel.transmission(at, torque)
+    ends = [kernel.transmission(at, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
+    slices = np.sum(list(state.forces.values()), axis=0).reshape(LAYERS, -1).sum(axis=1)
+    lever = PairGeometry.of(spec).gears[0].r_b
+    return Ours(state.te, 2 * TANGENT * torque / lever / (ends[1] - ends[0]), slices / slices.sum())
+
+
+def touching(pair: PairGeometry, turn: float) -> dict[tuple[int, int], tuple[float, float]]:
+    """Rolls (m) at mid-width on pinion and wheel by (pinion tooth, wheel tooth), of the pairs that are near the path of
+    contact somewhere across the width."""
+    first = pair.gears[0].r_b * (turn + pair.gears[0].psi_b + pair.alpha_wt)
+    lean = WIDTH / 2 * abs(math.tan(pair.gears[0].beta_b)) + MARGIN
+    low, high = pair.path["A"] - lean, pair.path["E"] + lean
+    count = range(math.ceil((low - first) / pair.base_pitch), math.floor((high - first) / pair.base_pitch) + 1)
+    rolls = {k: first + k * pair.base_pitch for k in count}
+    return {(k, -k): (roll, pair.length - roll) for k, roll in rolls.items()}
+
+
+def levels_of(divisions: tuple[int, ...]) -> np.ndarray:
+    """Corner levels z (m) of the elements, each layer divided by its number."""
+    ends = np.linspace(-WIDTH / 2, WIDTH / 2, LAYERS + 1)
+    inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends, ends[1:], divisions, strict=False)]
+    return np.concatenate([*inner, ends[-1:]])
+
+
+def problem_at(case: Case, te: float) -> Problem:
+    """The contact problem of a case at the transmission error te (m)."""
+    spec = stage(case.helix, case.axes)
+    pair = PairGeometry.of(spec)
+    turn = 2 * math.pi / pair.gears[0].z * case.position / POSITIONS
+    contacts = touching(pair, turn)
+    steel = spec.gears[0].material
+    e_star = hertz.contact_modulus((steel.youngs_modulus,) * 2, (steel.poisson_ratio,) * 2)
+    radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    wide = hertz.half_width(case.torque / pair.gears[0].r_b / WIDTH, radius, e_star)
+    fine = Fineness(
+        patch=PATCH * wide, growth=2.0, thickness=2, depth_growth=2.6, rim=2, root=2, far_root=1, far_flank=1
+    )
+    levels = levels_of(case.divisions)
+    solids = [
+        twisted(gear, {teeth[g]: rolls[g] for teeth, rolls in contacts.items()}, levels, fine, ZONE).solid
+        for g, gear in enumerate(pair.gears)
+    ]
+    phase = pair.wheel_phase - turn * pair.gears[0].r_b / pair.gears[1].r_b
+    error = spec.pair.misalignment
+    tilt = (0.0, 0.0) if error is None else (-error.out_of_plane / error.span, error.in_plane / error.span)
+    return Problem(
+        gears=(
+            Tilted("P", solids[0], np.zeros(2), turn, "clamped", te / pair.gears[0].r_b),
+            Tilted("W", solids[1], np.array([pair.a, 0.0]), phase, "clamped", 0.0, tilt=tilt),
+        ),
+        pairs=list(contacts),
+        penalty=PENALTY,
+        element="C3D20R",
+    )
+
+
+def row(case: Case, gears: list[ReducedBody], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+    """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
+    2 % where ccx does not settle. RuntimeError when ccx gives up."""
+    mine, r_b = ours(case, gears), PairGeometry.of(stage(case.helix, case.axes)).gears[0].r_b
+    folder = work / f"helical_{case.name}"
+    folder.mkdir(parents=True, exist_ok=True)
+    deck = folder / "load_0.inp"
+    write_spatial_deck(problem_at(case, 0.0), deck)
+    mesh = digest(deck)
+    theirs = known if known and known["mesh_sha256"] == mesh and _near(known) else solution(case, mine.te, deck)
+    te, torque = 1e-6 * float(theirs["solved_te_um"]), float(theirs["solved_torque_Nm"])
+    found = {
+        "helix_deg": case.helix,
+        "axes": case.axes,
+        "torque_Nm": f"{case.torque:g}",
+        "position": f"{case.position / POSITIONS:.6f}",
+        "te_um": f"{1e6 * (te + (case.torque - torque) / r_b / mine.stiffness):.4f}",
+        "gearfmu_te_um": f"{1e6 * mine.te:.4f}",
+    }
+    found |= {f"gearfmu_share_{k + 1}": f"{value:.5f}" for k, value in enumerate(mine.share)}
+    return found | {name: value for name, value in theirs.items() if name not in found} | {"mesh_sha256": mesh}
+
+
+def _near(row: dict[str, Any]) -> bool:
+    return abs(float(row["solved_torque_Nm"]) / float(row["torque_Nm"]) - 1) < NEAR
+
+
+def solution(case: Case, te: float, deck: Path) -> dict[str, Any]:
+    """What ccx says at te (m) or, where it does not settle, near it."""
+
+    def attempt(nudge: float) -> tuple[float, Problem, float]:
+        problem = problem_at(case, nudge * te)
+        write_spatial_deck(problem, deck)
+        return nudge * te, problem, run_deck(deck)
+
+    te, problem, seconds = first_solved(NUDGES, attempt)
+    loads, layers = bore_loads(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
+    share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *case.divisions[:-1]))) / layers.sum()
+    return {f"share_{k + 1}": f"{value:.5f}" for k, value in enumerate(share)} | {
+        "solved_te_um": f"{1e6 * te:.4f}",
+        "solved_torque_Nm": f"{abs(loads[0, 5]):.3f}",
+        "axial_N": f"{loads[0, 2]:.2f}",
+        "pairs": len(problem.pairs),
+        "nodes": sum(len(gear.solid.nodes) for gear in problem.gears),
+        "seconds": f"{seconds:.0f}",
+    }
+
+
+def case_of(row: dict[str, Any]) -> Case:
+    """The case of a row."""
+    place = round(POSITIONS * float(row["position"]))
+    return Case(int(row["helix_deg"]), row["axes"], float(row["torque_Nm"]), place)
+
+
+def shares(row: dict[str, Any], who: str = "") -> np.ndarray:
+    """Load of each layer (LAYERS,), parts of the whole. who: "" CalculiX, "gearfmu_" ours."""
+    return np.array([float(row[f"{who}share_{k + 1}"]) for k in range(LAYERS)])
+
+
+def compare(rows: list[dict[str, Any]]) -> None:
+    """Print te (µm) of both codes, the largest difference of a layer's share, of the largest share; means and peak to
+    peak where all positions are there."""
+    print("helix_deg,axes,torque_Nm,position,calculix_um,gearfmu_um,difference_%,largest difference of a share_%")
+    loads: dict[tuple[int, str, float], list[tuple[float, float]]] = {}
+    for line in rows:
+        case, theirs = case_of(line), shares(line)
+        off = np.abs(shares(line, "gearfmu_") - theirs).max() / theirs.max()
+        a, b = float(line["te_um"]), float(line["gearfmu_te_um"])
+        loads.setdefault((case.helix, case.axes, case.torque), []).append((a, b))
+        print(f"{case.name.replace('_', ',')},{a:.3f},{b:.3f},{100 * (b / a - 1):+.2f},{100 * off:.1f}")
+    for (helix, axes, torque), pairs in loads.items():
+        if len(pairs) == POSITIONS:
+            (a, b), (p, q) = np.mean(pairs, axis=0), np.ptp(pairs, axis=0)
+            print(f"# {helix}°, {axes}, {torque:g} N·m: mean {a:.3f} and {b:.3f} µm, {100 * (b / a - 1):+.2f} %;"
+                  f" peak to peak {p:.3f} and {q:.3f} µm, {100 * (q / p - 1):+.1f} %")  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
+    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="bodies, decks, logs and results")
+    parser.add_argument("--out", type=Path, default=HERE / "helical.csv")
+    parser.add_argument("--compare", action="store_true")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.cases if name not in CASES]:
+        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
+    rows, failed = {case_of(row).name: row for row in read(chosen.out)}, []
+    if chosen.compare:
+        return compare(list(rows.values()))
+    require_ccx()
+    for name in chosen.cases or CASES:
+        case = CASES[name]
+        try:
+            rows[name] = row(case, bodies(chosen.work, case.helix), chosen.work, rows.get(name))
+        except RuntimeError as failure:
+            failed.append(f"{name}: {failure}")
+            continue
+        write(chosen.out, [rows[name] for name in CASES if name in rows])
+        print(", ".join(f"{key} {value}" for key, value in rows[name].items()), file=sys.stderr, flush=True)
+    if failed:
+        raise SystemExit("\n".join(failed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,182 @@
+"""What every effect costs: instructions of an internal step with the effect, without it (off), and in a kernel that was
+compiled without its code. Callgrind counts, which repeat exactly.
+
+    python -m evidence.price.effects_cost [EFFECT …]
+
+Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; what only sets have on planetary54
+under 600 N·m at 85 rad/s of the carrier; friction on helical_demo;
+settings of each effect in gearfmu/stage/effects.py. Needs valgrind and cc.
+Prints a table and writes gearfmu/stage/effects_cost.csv, where
+docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim: off costs at most 5 %
+more than without.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from gearfmu.body import load_bodies
+from gearfmu.files import write_text
+from gearfmu.kernel.build import build_library, source_hash, sources
+from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec
+from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLE = ROOT / "gearfmu" / "stage" / COSTS
+STAGE, SPEED = "fzg_c/stage_relief", 2000 * math.pi / 30
+TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else off is another motion
+H, WARM, STEPS = 50e-6, 10, 38  # communication steps; 38 are one mesh period
+BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
+OWN_DATA: dict[str, dict[str, Any]] = {  # of the pinion, where the stage does not have them
+    "pitch_errors": {"index_deviation": {0: 5e-6}},
+    "flank_deviations": {"profile": ProfileSpec(slope=2e-6, crowning=2e-6)},
+    "runout": {"eccentricity": Eccentricity(amount=5e-6)},
+}
+RUBBING = "helical_demo"
+SET, SET_WARM, SET_STEPS = "planetary54", 4, 10
+SET_START = {"carrier.w_start": 85.0, "sun.w_start": 340.0}
+SET_TORQUE = {"carrier.tau": 600.0, "sun.tau": -150.0}
+SET_WATCHED = ("sun_planet1.te", "sun_planet1.force", "energy.stored", "energy.dissipated")
+WATCHED = ("mesh.te", "mesh.force", "energy.stored", "energy.dissipated")
+
+
+@dataclass(frozen=True)
+class Count:
+    """Instructions of an internal step, and the watched outputs at the end, bit for bit."""
+
+    instructions: float
+    outputs: tuple[str, ...]
+
+
+class Bench:
+    """Models, the host program and kernels in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.host = folder / "host"
+        self.counts: dict[tuple[Any, ...], Count] = {}
+        program = Path(__file__).with_name("effects_host.c")
+        subprocess.run(
+            ["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"],
+            check=True,
+        )
+        spec = load_stage(STAGE)
+        bodies = load_bodies(spec)
+        self.plain = assemble(spec, bodies)
+        self.own = {
+            name: assemble(
+                spec.model_copy(update={"gears": (spec.gears[0].model_copy(update=data), spec.gears[1])}), bodies
+            )
+            for name, data in OWN_DATA.items()
+        }
+
+    def library(self, without: str) -> Path:
+        """A kernel of the sources of the moment, compiled without the code of one effect."""
+        path = self.folder / f"without_{without}_{source_hash(sources())[:8]}.so"
+        return path if path.exists() else build_library(out=path, compiler=("cc", f"-DGK_WITHOUT={without}"))
+
+    def count(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
+        """One run under callgrind, or the count of an equal one. CalledProcessError when it fails."""
+        key = (library, model.hash, tuple(sorted(settings.items())), torque)
+        if key not in self.counts:
+            self.counts[key] = self._counted(library, model, settings, torque)
+        return self.counts[key]
+
+    def _counted(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
+        blob = self.folder / f"{model.hash[:12]}.blob"
+        blob.write_bytes(model.blob)
+        of_set = model is self.turning
+        words = set_arguments(model, settings) if of_set else arguments(model, settings, torque)
+        command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--toggle-collect=measured",
+                   "--callgrind-out-file=/dev/null", self.host, library, blob,
+                   *((SET_WARM, SET_STEPS) if of_set else (WARM, STEPS)), H, *words]  # fmt: skip
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
+        collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
+        internal, *outputs = done.stdout.split()
+        return Count(int(collected[1]) / float(internal), tuple(outputs))
+
+    @cached_property
+    def turning(self) -> StageModel:
+        """A planetary set, which takes some seconds to assemble."""
+        spec = load_stage(SET)
+        return assemble(spec, load_bodies(spec))
+
+    @cached_property
+    def rubbing(self) -> StageModel:
+        """A pair whose bodies know how they yield along the profile."""
+        spec = load_stage(RUBBING)
+        return assemble(spec, load_bodies(spec))
+
+    def measure(self, effect: Effect) -> tuple[Cost, bool]:
+        """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
+        plain = self.turning if effect.carried else self.rubbing if effect.name == "friction" else self.plain
+        with_it = self.own.get(effect.name, plain)
+        plain = with_it if effect.off_setting else plain  # the switch is there where the data are
+        whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
+        on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
+        off = self.count(whole, plain, {**BASE, **effect.off_setting}, torque)
+        without = self.count(lacking, plain, {**BASE, **effect.off_setting}, torque)
+        cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)
+        return cost, off.outputs == without.outputs
+
+
+def arguments(model: StageModel, settings: Mapping[str, float], torque: float) -> list[str]:
+    """Parameters, inputs of constant speed and load, and watched outputs, by reference."""
+    known = model.kernel().variables
+    steady = Steady(model, SPEED, torque)
+    start, later = steady(0.0), steady(1.0)
+    words = [f"p{known[name].reference}={value!r}+0" for name, value in settings.items()]
+    words += [f"i{known[name].reference}={start[name]!r}+{later[name] - start[name]!r}" for name in start]
+    return words + [f"w{known[name].reference}" for name in WATCHED]
+
+
+def set_arguments(model: StageModel, settings: Mapping[str, float]) -> list[str]:
+    """`arguments` of a planetary set under constant torques."""
+    known, parameters = model.kernel().variables, {**settings, **SET_START}
+    words = [f"p{known[name].reference}={value!r}+0" for name, value in parameters.items()]
+    words += [f"i{known[name].reference}={value!r}+0" for name, value in SET_TORQUE.items()]
+    return words + [f"w{known[name].reference}" for name in SET_WATCHED]
+
+
+def table(rows: Mapping[str, Cost]) -> str:
+    """The CSV, in the order of the effects."""
+    lines = [f"{row.effect},{row.on:.1f},{row.off:.1f},{row.without:.1f}" for row in ordered(rows)]
+    return "\n".join(["effect,on,off,without", *lines, ""])
+
+
+def ordered(rows: Mapping[str, Cost]) -> list[Cost]:
+    return [rows[effect.name] for effect in EFFECTS if effect.name in rows]
+
+
+def main(names: list[str]) -> None:
+    """Measure the named effects, or all, and write the table."""
+    rows = costs()
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(Path(folder))
+        for effect in EFFECTS:
+            if names and effect.name not in names:
+                continue
+            row, same = bench.measure(effect)
+            rows[effect.name] = row
+            print(
+                f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a "
+                "step: "
+                f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}",
+                flush=True,
+            )
+    write_text(TABLE, table(rows))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

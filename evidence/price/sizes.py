@@ -1,0 +1,113 @@
+"""Sizes of models and FMUs, and what export and the start of an FMU cost, of shipped stages.
+
+    python -m evidence.price.sizes
+
+Every measurement runs in a process of its own. Times are processor time, s, memory is MB: the peak of the exporting
+process; what instance, initialisation and first step add to the importer (FMPy). Level: that of the FMU's start.
+Prints a table and writes evidence/price/sizes.csv; tests/fmu/test_fmu_sizes.py fails where an FMU outgrows its row.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import multiprocessing
+import os
+import resource
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+import gearfmu
+from gearfmu.fmu import export
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLE = Path(__file__).with_suffix(".csv")
+STAGES = ("fzg_c", "helical_demo", "two_stage", "planetary54", "helical_set")
+STEP = 1e-4  # s
+PAGE = resource.getpagesize()
+
+
+def peak_mb() -> float:
+    """Peak of this process, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+def resident_mb() -> float:
+    """Resident memory of this process now, MB."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * PAGE / 1e6
+
+
+def exported(stage: str, path: str) -> dict[str, float]:
+    """Export of a shipped stage, assembly included; imports are not counted."""
+    start = time.process_time()
+    model = gearfmu.assemble(stage)
+    export(model, Path(path))
+    return {
+        "blob_mb": len(model.blob) / 1e6,
+        "fmu_mb": Path(path).stat().st_size / 1e6,
+        "export_s": time.process_time() - start,
+        "export_mb": peak_mb(),
+    }
+
+
+def started(path: str, folder: str) -> dict[str, float]:
+    """Instance, initialisation and first step in FMPy, each with what it adds."""
+    unpacked = extract(path, folder)
+    description = read_model_description(unpacked)
+    identifier = description.coSimulation.modelIdentifier
+    slave = FMU2Slave(guid=description.guid, unzipDirectory=unpacked, modelIdentifier=identifier, instanceName="a")
+    before, marks = resident_mb(), [time.process_time()]
+    slave.instantiate()
+    marks.append(time.process_time())
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    marks.append(time.process_time())
+    at_rest = resident_mb() - before
+    slave.doStep(0.0, STEP)
+    marks.append(time.process_time())
+    times = [b - a for a, b in zip(marks, marks[1:], strict=False)]
+    return dict(zip(("instantiate_s", "initialise_s", "first_step_s"), times, strict=True)) | {
+        "initialised_mb": at_rest,
+        "stepped_mb": resident_mb() - before,
+    }
+
+
+def apart(work: Callable[..., dict[str, float]], *arguments: str) -> dict[str, float]:
+    """The result of `work` in a fresh process."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(work, arguments)
+
+
+def measure(stage: str, work: Path) -> dict[str, object]:
+    """One row of the table."""
+    fmu = work / f"{stage}.fmu"
+    row = apart(exported, stage, str(fmu)) | apart(started, str(fmu), str(work / stage))
+    with zipfile.ZipFile(fmu) as archive:
+        assert json.loads(archive.read("resources/stage.json"))
+    return {"stage": stage} | {name: round(value, 3) for name, value in row.items()}
+
+
+def main() -> int:
+    os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # waiting threads are no work
+    rows = []
+    with tempfile.TemporaryDirectory() as work:
+        for stage in STAGES:
+            rows.append(measure(stage, Path(work)))
+            print("  ".join(f"{name} {value}" for name, value in rows[-1].items()), flush=True)
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""The paper's reductions in the time domain against the unreduced finite elements (its Figs. 3 and 4).
+
+    python -m evidence.reduction.in_time.compare [carrier_planet] [hammering] [--work DIR] [--chart]
+
+carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method and to several sizes.
+hammering      : carrier + planet + sun through their backlash, 0.5 ms; the carrier by each method, gears by eigenmodes.
+
+A line that reduces one kind of body has the others unreduced, or reduced so that a line of their own shows them to be
+without influence (planet: Rubin 60; carrier: Krylov 120).
+Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
+reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
+Writes errors.csv (rms of the difference, in the whole run and in its last fifth, over that of the reference) and
+curves_<scene>.csv beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in
+DIR and not made again. Ten minutes of one core, a third of it the modes of the gears.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from evidence.reduction.in_time.channels import channels, errors
+from evidence.reduction.in_time.chart import RUNS, draw
+from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
+from evidence.reduction.in_time.tables import read_rows, write_columns, write_rows
+from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
+from gearfmu.files import written_whole
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.oscillators import oscillators
+
+HERE = Path(__file__).parent
+TABLE = HERE / "errors.csv"
+FOUR = ("modal", "craig_bampton", "rubin", "krylov")
+EVERY = 2  # steps of a curve's points
+
+
+@dataclass(frozen=True)
+class Run:
+    """One line of a table: how each kind of body is reduced, "whole" or method and number; see `reduced`."""
+
+    carrier: str = "whole"
+    gears: str = "whole"
+    half_step: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.carrier} | {self.gears}" + (" | half the step" if self.half_step else "")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A scene, its scheme, and its runs; the first is the reference."""
+
+    make: Callable[[Meshes], Scene]
+    meshes: Meshes
+    scheme: Scheme
+    runs: tuple[Run, ...]
+
+
+SIZES, PAPER = (60, 120, 240), 120
+PLANET = "rubin 60"
+CARRIER = f"krylov {PAPER}"
+STUDIES = {
+    "carrier_planet": Study(
+        carrier_planet,
+        Meshes(carrier=0.5, gear=0.17),
+        Scheme(2e-6, 1e-3),
+        (
+            Run(),
+            Run(gears=PLANET),
+            Run(gears=PLANET, half_step=True),
+            *(Run(f"{method} {n}", PLANET) for n in SIZES for method in FOUR),
+            *(Run(f"modal {n} + residual", PLANET) for n in SIZES),
+        ),
+    ),
+    "hammering": Study(
+        hammering,
+        Meshes(carrier=0.5, gear=0.25),
+        Scheme(1e-6, 0.5e-3),
+        (
+            Run(),
+            Run(CARRIER),
+            Run(CARRIER, half_step=True),
+            *(Run(CARRIER, f"modal {n}{rest}") for n in (400, 200, 100) for rest in ("", " + residual")),
+            Run(CARRIER, "rubin 400"),
+            *(Run(f"{method} {PAPER}", "modal 400 + residual") for method in FOUR if method != "krylov"),
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A channel of a run. error, late: over the reference's rms, of the whole run and of its last
+    fifth; seconds: processor time
+    of the integration."""
+
+    scene: str
+    carrier: str
+    gears: str
+    half_step: bool
+    channel: str
+    error: float
+    late: float
+    seconds: float
+
+
+def measure(name: str, study: Study, work: Path) -> Iterator[Line]:
+    """All lines of a study; its curves are written when it ends."""
+    scene = study.make(study.meshes)
+    made: dict[tuple[str, str], Member] = {}
+    curves: dict[str, dict[str, np.ndarray]] = {}
+    for run in study.runs:
+        kept = work / name / f"{run.name.replace(' ', '_').replace('|', '-')}.npz"
+        if not kept.exists():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with written_whole(kept) as temporary, temporary.open("wb") as file:
+                np.savez(file, **integrated(scene, study.scheme, run, made))
+        with np.load(kept) as file:
+            found = dict(file)
+        seconds = float(found.pop("seconds"))
+        curves[run.name] = {key: values[:: 2 if run.half_step else 1] for key, values in found.items()}
+        reference = curves[study.runs[0].name]
+        for channel, values in curves[run.name].items():
+            error, late = errors(reference[channel], values)
+            yield Line(name, run.carrier, run.gears, run.half_step, channel, error, late, seconds)
+    write_curves(name, study.scheme, curves)
+
+
+def integrated(scene: Scene, scheme: Scheme, run: Run, made: dict[tuple[str, str], Member]) -> dict[str, np.ndarray]:
+    """Channels of a run, and its "seconds"."""
+    assembly = reduced(scene, run, made)
+    started = time.process_time()
+    motion = integrate(assembly, replace(scheme, step=scheme.step / (2 if run.half_step else 1)))
+    return channels(scene, motion) | {"seconds": np.array(time.process_time() - started)}
+
+
+def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Assembly:
+    """The scene's assembly with its bodies reduced as the run says; `made` keeps what was reduced before."""
+    others = []
+    for name, solid in scene.solids.items():
+        text = run.carrier if name == "carrier" else run.gears
+        if text == "whole":
+            continue
+        if (name, text) not in made:
+            method, number, *extra = text.split(" ", 2)
+            basis = METHODS[method](solid.full, Size(int(number)))
+            model = oscillators(solid.full, basis, damping_ratio=0.0)
+            made[name, text] = Member.reduced(model, residual=bool(extra))
+        others.append(made[name, text])
+    return scene.assembly.with_members(*others)
+
+
+def write_curves(name: str, scheme: Scheme, curves: dict[str, dict[str, np.ndarray]]) -> None:
+    """curves_<name>.csv: time and every channel of the reference and of what the picture shows."""
+    columns = {"time_s": np.arange(scheme.steps + 1) * scheme.step}
+    for run, found in curves.items():
+        if run in (STUDIES[name].runs[0].name, *RUNS[name]):
+            columns |= {f"{channel} | {run}": values for channel, values in found.items()}
+    write_columns(HERE / f"curves_{name}.csv", {key: values[::EVERY] for key, values in columns.items()})
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(STUDIES))
+    parser.add_argument("--work", type=Path, default=Path("out/in_time"), help="where runs are kept")
+    parser.add_argument("--chart", action="store_true", help="draw from the tables that are there")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.scenes if name not in STUDIES]:
+        parser.error(f"no scene {', '.join(unknown)}; there are {', '.join(STUDIES)}")
+    for name in chosen.scenes or STUDIES:
+        if not chosen.chart:
+            found = []
+            for line in measure(name, STUDIES[name], chosen.work):
+                found.append(asdict(line))
+                print("  ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in found[-1].values()), flush=True)
+            write_rows(TABLE, [*(row for row in read_rows(TABLE) if row["scene"] != name), *found])
+        draw(name)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""The price list of the fidelity levels, which every report shows: error and processor time of each at its default
+step, from a study (gearfmu/study) of the loaded and the lightly loaded pair.
+
+    python -m evidence.study.levels [--study DIR] [pair_loaded pair_light]
+
+DIR: folder of `gearfmu study`, evidence/study when not given; rows that are not there yet, or not of this kernel and
+these bodies, are measured and added. Writes levels_<stage>.csv beside the stage file, where the report looks for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.cosim.accuracy import alternating, rms
+from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
+from gearfmu.spec.scene import load_scene
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.run.trace import write_columns
+from gearfmu.study import Job, Row, default_rows
+from gearfmu.study.norm import Signals
+
+
+def price(row: Row, reference: Signals, bodies: str) -> dict[str, object]:
+    """One line of the list from a row of the study."""
+    size = rms(alternating(reference.te, reference.interval, reference.steady))
+    return {
+        "scene": row.scene,
+        "level": row.level,
+        "n_dyn": row.n_dyn,
+        "slices": row.slices,
+        "h_us": 1e6 * row.h_s,
+        "te_error": row.te_error,
+        "force_error": row.force_error,
+        "bearing_error": row.bearing_error,
+        "te_mean_error_um": 1e6 * row.te_mean_error * size,
+        "time_per_second": row.realtime_factor,
+        "bodies": bodies,
+    }
+
+
+def main() -> None:
+    """Measure what is missing and write one list a stage."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", default=["pair_loaded", "pair_light"])
+    parser.add_argument("--study", type=Path, default=Path(__file__).parent)
+    chosen = parser.parse_args()
+    for name in chosen.scenes:
+        found = default_rows(Job(load_scene(name), chosen.study))
+        bodies = fingerprint(found.model.body_hashes)
+        rows = [price(row, found.reference.signals, bodies) for row in found.rows]
+        path = levels_path(load_stage(found.scene.stage.name))
+        table = [old for old in read_levels(path) if old["scene"] != name] + rows
+        write_columns(path, {column: np.array([line[column] for line in table]) for column in COLUMNS})
+        for line in rows:
+            shown = (f"{value:.3g}" if isinstance(value, float) else str(value) for value in line.values())
+            print("  ".join(shown), flush=True)
+
+
+if __name__ == "__main__":
+    main()
