@@ -1,10 +1,8 @@
 /* Lines of contact of helical teeth, cut into parts that move and grow with them (docs/theory.md, 2.6). A part closes
- * gradually: its gap is the least of GAPS places along it, and the law of its contact (gk_law.c) knows the others. They
- * follow from sections at both ends and in the middle of every part by a parabola: flank, relief, deviations, lead,
- * tilt, and past a tip edge the gap of the corner. */
+ * gradually: its gap is the least of GAPS places along it, and the law of its contact (gk_law.c) knows the others. On both
+ * flanks they are straight along the line but for relief, deviations and lead; past a tip edge they follow a parabola
+ * through sections of the corner. */
 #include "force/gk_parts.h"
-
-static const double BENT = 50e-6; /* m: more than a parabola within a part can mean */
 
 /* What gear A slides past B along the profile of A, per motion of the poses: e = e_p of A, square to n in the section
  */
@@ -41,7 +39,7 @@ void gk_parts_lean(const gk_posed *q, double sg, const gk_touch *t, double z, gk
     }
 }
 
-/* deviations of both flanks at z: between two places of their fields */
+/* the flanks at z: their deviations, between two places of the fields */
 static void take_fields(const gk_posed *q, const gk_place *p, double z, gk_tooth_flanks *f)
 {
     for (int w = 0; w < 2; w++) {
@@ -54,6 +52,63 @@ static void take_fields(const gk_posed *q, const gk_place *p, double z, gk_tooth
     }
 }
 
+/* ---- gaps along a line ------------------------------------------------------------------------------------------- */
+typedef struct stretch { /* of a line: a parabola through its gaps at both ends and in the middle, m */
+    double low, high, gap[3];
+} stretch;
+
+typedef struct course { /* of the gaps along a line, without leads */
+    const gk_posed *q;
+    const gk_place *place;
+    gk_tooth_flanks *f;
+    const double *roll;            /* lengths of roll at mid-width */
+    stretch before, flanks, after; /* past the tip edge of one end, on both flanks without depths, past the other */
+} course;
+
+static double along(const stretch *s, double z)
+{
+    const double u = (z - s->low) / (s->high - s->low) - 0.5, *g = s->gap;
+    return g[1] + u * (g[2] - g[0]) + 2.0 * u * u * (g[0] - 2.0 * g[1] + g[2]);
+}
+
+/* The gap of the section at z, without leads; tilted: what tilts and axial motion open of it */
+static double gap_of(const course *c, double z, double *tilted)
+{
+    gk_point p;
+    gk_touch touch;
+    take_fields(c->q, c->place, z, c->f);
+    gk_section_at(c->q, c->f, c->roll, z, &p, &touch);
+    const double plane = c->q->mesh->cosine * p.gap;
+    gk_parts_lean(c->q, c->f->side->sg, &touch, z, &p);
+    *tilted = p.gap - plane;
+    return p.gap;
+}
+
+/* a stretch past a tip edge, by the gaps at its ends */
+static stretch past_edge(const course *c, double low, double high, double at_low, double at_high)
+{
+    double tilted;
+    return (stretch){low, high, {at_low, gap_of(c, 0.5 * (low + high), &tilted), at_high}};
+}
+
+/* The stretches of a line. One that is nowhere on both flanks is all past them. */
+static void run_along(course *c, const gk_line *line)
+{
+    const double first = line->end[0], last = line->end[1];
+    const double low = gk_clamp(line->edge[0], first, last), high = gk_clamp(line->edge[1], first, last);
+    const double flat = c->q->mesh->cosine * (c->f->side->gap - c->f->closer);
+    double tilted[2];
+    if (!(low < high)) {
+        c->before = past_edge(c, first, last, gap_of(c, first, &tilted[0]), gap_of(c, last, &tilted[1]));
+        c->flanks.low = c->flanks.high = last;
+        return;
+    }
+    const double at_low = gap_of(c, low, &tilted[0]), at_high = gap_of(c, high, &tilted[1]);
+    c->flanks = (stretch){low, high, {flat + tilted[0], flat + 0.5 * (tilted[0] + tilted[1]), flat + tilted[1]}};
+    if (first < low) c->before = past_edge(c, first, low, gap_of(c, first, &tilted[0]), at_low);
+    if (high < last) c->after = past_edge(c, high, last, at_high, gap_of(c, last, &tilted[1]));
+}
+
 /* what leads of both gears open at z, in the transverse section */
 static double lead_at(const gk_posed *q, int flank, double z)
 {
@@ -63,37 +118,35 @@ static double lead_at(const gk_posed *q, int flank, double z)
     return sum;
 }
 
-typedef struct cut { /* a section at z */
-    double z;
-    gk_point point;
-    gk_touch touch;
-} cut;
-
-/* the section at z with all that opens it there */
-static void cut_line(const gk_posed *q, const gk_place *place, gk_tooth_flanks *f, const double roll[2], cut *at)
+/* with all that opens it there */
+static double gap_at(const course *c, double z)
 {
-    take_fields(q, place, at->z, f);
-    gk_section_at(q, f, roll, at->z, &at->point, &at->touch);
-    gk_parts_lean(q, f->side->sg, &at->touch, at->z, &at->point);
-    at->point.gap += q->mesh->cosine * lead_at(q, f->side->flank, at->z);
+    const gk_posed *q = c->q;
+    const double lead = q->mesh->cosine * lead_at(q, c->f->side->flank, z);
+    if (z < c->flanks.low) return along(&c->before, z) + lead;
+    if (z > c->flanks.high) return along(&c->after, z) + lead;
+    double depths = 0.0, slope;
+    if (GK_HAS(flank_deviations)) take_fields(q, c->place, z, c->f);
+    for (int w = 0; w < 2; w++)
+        depths += gk_section_depth(q, c->f, w, c->roll[w] + c->f->side->sg * z * q->mesh->helix[w], &slope);
+    return along(&c->flanks, z) + q->mesh->cosine * depths + lead;
 }
 
+/* ---- parts ------------------------------------------------------------------------------------------------------- */
 static void order(double *a, double *b)
 {
     const double low = gk_min(*a, *b), high = gk_max(*a, *b);
     *a = low, *b = high;
 }
 
-/* gaps at GAPS places of a part by those at its ends and in its middle: the least, and what the others are more; their
- * mean where a part closes as a whole */
-static void profile(const double gap[3], int gradual, gk_point *p)
+/* gaps at GAPS places of a part: the least, and what the others are more; their mean where a part closes as a whole */
+static void profile(const course *c, const gk_part *part, gk_point *p)
 {
-    const double rise = gap[2] - gap[0], bend = gap[0] - 2.0 * gap[1] + gap[2];
+    const double step = (part->end[1] - part->end[0]) / GAPS;
+    const int gradual = c->q->mesh->yields > 0.0;
     double at[GAPS], mean = 0.0;
     for (int i = 0; i < GAPS; i++) {
-        const double u = (i + 0.5) / GAPS - 0.5, v = 2.0 * fabs(u);
-        at[i] = fabs(bend) < BENT ? gap[1] + rise * u + 2.0 * bend * u * u
-                                  : (1.0 - v) * gap[1] + v * gap[u < 0.0 ? 0 : 2];
+        at[i] = gap_at(c, part->end[0] + (i + 0.5) * step);
         mean += at[i] / GAPS;
     }
     order(&at[0], &at[1]), order(&at[2], &at[3]), order(&at[0], &at[2]), order(&at[1], &at[3]), order(&at[1], &at[2]);
@@ -101,38 +154,38 @@ static void profile(const double gap[3], int gradual, gk_point *p)
     for (int i = 1; i < GAPS; i++) p->opens[i - 1] = gradual ? at[i] - at[0] : 0.0;
 }
 
+/* The section of a part: that of its place on the flanks nearest to its middle, forces at its middle; the gap stays */
+static void section_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], const gk_part *part, gk_place *place,
+                       gk_point *p)
+{
+    const double gap = p->gap;
+    gk_touch touch;
+    take_fields(q, place, part->flank, f);
+    gk_section_at(q, f, roll, part->flank, p, &touch);
+    gk_parts_lean(q, f->side->sg, &touch, part->middle, p);
+    if (GK_ON(q->setup, friction)) gk_parts_glide(q, f->side->sg, &touch, part->middle, p);
+    p->gap = gap;
+    memcpy(p->end, part->end, sizeof p->end);
+    p->share = (part->end[1] - part->end[0]) * q->setup->slices / q->e->width;
+}
+
 int gk_parts_find(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance, gk_place *place)
 {
     GK_ASSERT(q->mesh->rides && place);
-    const double sg = f->side->sg;
-    const gk_line line = gk_strips_line(q->model, q->mesh, sg, roll);
-    const int gradual = q->mesh->yields > 0.0;
-    double gap[3] = {0};
+    const gk_line line = gk_strips_line(q->model, q->mesh, f->side->sg, roll);
+    course c = {.q = q, .place = place, .f = f, .roll = roll};
     f->open = GK_ON(q->setup, tip_contact) ? GK_OPEN : GK_OPEN * line.missing;
+    run_along(&c, &line);
     place->gap = GK_OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         const gk_part part = gk_strips_part(q->setup, &line, i);
-        const double z[3] = {part.end[0], part.end[1], part.middle};
-        const int into[3] = {0, 2, 1};
-        gk_point *p = &place->point[i];
-        cut at;
-        for (int k = i ? 1 : 0; k < 3; k++) {
-            at.z = z[k];
-            cut_line(q, place, f, roll, &at);
-            gap[into[k]] = at.point.gap;
-        }
-        if (part.flank != part.middle) {
-            take_fields(q, place, part.flank, f);
-            gk_section_at(q, f, roll, part.flank, &at.point, &at.touch);
-            gk_parts_lean(q, sg, &at.touch, part.middle, &at.point);
-        }
-        *p = at.point;
-        profile(gap, gradual, p);
-        if (GK_ON(q->setup, friction)) gk_parts_glide(q, sg, &at.touch, part.middle, p);
-        memcpy(p->end, part.end, sizeof p->end);
-        p->share = (part.end[1] - part.end[0]) * q->setup->slices / q->e->width;
-        place->gap = gk_min(place->gap, p->gap);
-        gap[0] = gap[2];
+        profile(&c, &part, &place->point[i]);
+        place->gap = gk_min(place->gap, place->point[i].gap);
     }
-    return place->gap < search_distance;
+    if (!(place->gap < search_distance)) return 0;
+    for (int i = 0; i < GK_STRIPS(q->setup); i++) {
+        const gk_part part = gk_strips_part(q->setup, &line, i);
+        section_of(q, f, roll, &part, place, &place->point[i]);
+    }
+    return 1;
 }

@@ -69,6 +69,8 @@ static inline double gk_base_distance(const gk_posed *q)
 }
 
 GK_HOT gk_flank_side gk_section_side(const gk_posed *q, int flank);
+/* what a flank has lost to relief and deviations at a length of roll, and its slope */
+GK_HOT double gk_section_depth(const gk_posed *q, const gk_tooth_flanks *f, int which, double s, double *slope);
 GK_HOT int gk_section(const gk_posed *q, const gk_tooth_flanks *f, gk_point *p, gk_touch *t);
 GK_HOT void gk_section_at(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], double z, gk_point *p,
                           gk_touch *t);
