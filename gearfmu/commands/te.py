@@ -82,18 +82,18 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         if len(meshes) > 1:
             click.echo(mesh)
         _tell(result)
-        _tell_slices(model, torques, mesh)
+        _tell_slices(model, torques, mesh=mesh, **where)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
     _end(model, torques, failed)
 
 
-def _tell_slices(model: Any, torques: Sequence[float], mesh: str | None = None) -> None:
-    """What the number of slices of a helical stage leaves open."""
+def _tell_slices(model: Any, torques: Sequence[float], **where: Any) -> None:
+    """What the number of slices of a helical stage leaves open, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
-    left = left_of_slices(model, torques, mesh)
+    left = left_of_slices(model, torques, **{key: of for key, of in where.items() if key not in ("positions", "pitches")})
     if left is not None:
         click.echo(f"{'':14}{left.text}")
 
@@ -149,7 +149,7 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     _tell(result)
-    _tell_slices(model, torques)
+    _tell_slices(model, torques, **where)
     for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -45,18 +46,16 @@ class Change:
 
 
 def left_of_slices(
-    model: StageModel, torques: Sequence[float], mesh: str | None = None, slices: int | None = None
+    model: StageModel, torques: Sequence[float], slices: int | None = None, **where: Any
 ) -> Change | None:
     """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
-    where a torque has no equilibrium."""
+    where a torque has no equilibrium. where: mesh, bearings and parameters as `stage_te` takes them."""
     own = slices or model.stage.slices
     finer = twice(model.stage, own)
     if finer == own:
         return None
     try:
-        found = [
-            stage_te(model, torques, POSITIONS, mesh=mesh, slices=float(n)).harmonics(ORDERS) for n in (own, finer)
-        ]
+        found = [stage_te(model, torques, POSITIONS, slices=float(n), **where).harmonics(ORDERS) for n in (own, finer)]
     except SimulationError:
         return None
     length = np.abs(found[1] - found[0])
