@@ -62,7 +62,7 @@ GK_API void probe_part(const gk_model *model, const gk_setup *setup, const doubl
 {
     gk_system s;
     memset(&s, 0, sizeof s);
-    s.contacts = 1;
+    s.contacts = s.n = 1, s.stride = 4;
     s.curvature[0] = 100.0, s.force[0] = force;
     s.width[0] = s.per_width[0] = 1.0;
     for (int k = 0; k < GAPS - 1; k++) s.opens[k][0] = opens[k];

@@ -115,14 +115,15 @@ void gk_strips_spread(const gk_setup *setup, const gk_engagement *e, const doubl
     }
 }
 
-/* The tip edge carries a line of contact on past the end of its flank, by the half-width of the load patch: where the
- * gap of the edge is about what deflections are; without end for spur teeth, which leave the flank as a whole. Without contact of tip edges the line ends with its flank. */
+/* The tip edge carries a line of contact on past the end of its flank, by one and a half half-widths of the load patch,
+ * to where the gap of the edge is about what deflections are; without end for spur teeth, which leave the flank as a
+ * whole. Without contact of tip edges the line ends with its flank. */
 static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
 {
     if (!GK_ON(setup, tip_contact) || e->kind == MESH_FLAT) return 0.0;
-    const double span = fabs(helix) * e->width, least = 1e-6;
+    const double span = fabs(helix) * e->width, least = 1e-6, reach = 1.5 * gear->strip;
     const double outwards = gear->s_tip > gear->s_form ? 1.0 : -1.0;
-    return outwards * gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
+    return outwards * reach * gk_max(1.0, reach / gk_max(span, least));
 }
 
 /* a gear's lead at x, −1 … 1 of its half-width */
