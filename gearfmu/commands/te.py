@@ -93,7 +93,9 @@ def _tell_slices(model: Any, torques: Sequence[float], **where: Any) -> None:
     """What the number of slices of a helical stage leaves open, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
-    left = left_of_slices(model, torques, **{key: of for key, of in where.items() if key not in ("positions", "pitches")})
+    left = left_of_slices(
+        model, torques, **{key: of for key, of in where.items() if key not in ("positions", "pitches")}
+    )
     if left is not None:
         click.echo(f"{'':14}{left.text}")
 

@@ -248,7 +248,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="2.2 (eqs. 5a to 5f)",
         matters="corrected or measured flanks: micrometres are as large as the transmission error",
         off="involutes with parabolic tip relief; leads too are left out",
-        code="gk_deviation.c (gk_deviation_at), gk_section.c (depth_of), gk_strips.c (fill_deviations)",
+        code="gk_deviation.c (gk_deviation_at), gk_section.c (gk_section_depth), gk_strips.c (fill_deviations)",
         test="tests/stage/test_flanks.py::test_unloaded_te_is_the_gap_of_the_modified_profile",
         of_data=True,
     ),

@@ -1,6 +1,6 @@
 """Refinement: a discretisation twice as fine moves results by less than the product states: every harmonic of the mesh
-by 1 dB or 1 nm (slices of helical teeth: 7 nm from 7 on, 4 nm from 10 on), the order levels of forces by 1 dB or 1e-3 of the mean. And no
-level is worse than a cheaper one."""
+by 1 dB or 1 nm (slices of helical teeth: 7 nm from 7 on, 4 nm from 10 on), the order levels of forces by 1 dB or 1e-3
+of the mean. And no level is worse than a cheaper one."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 /* Lines of contact of helical teeth, cut into parts that move and grow with them (docs/theory.md, 2.6). A part closes
- * gradually: its gap is the least of GAPS places along it, and the law of its contact (gk_law.c) knows the others. On both
- * flanks they are straight along the line but for relief, deviations and lead; past a tip edge they follow a parabola
- * through sections of the corner. */
+ * gradually: its gap is the least of GAPS places along it, and the law of its contact (gk_law.c) knows the others. On
+ * both flanks they are straight along the line but for relief, deviations and lead; past a tip edge they follow a
+ * parabola through sections of the corner. */
 #include "force/gk_parts.h"
 
 /* What gear A slides past B along the profile of A, per motion of the poses: e = e_p of A, square to n in the section
@@ -155,8 +155,8 @@ static void profile(const course *c, const gk_part *part, gk_point *p)
 }
 
 /* The section of a part: that of its place on the flanks nearest to its middle, forces at its middle; the gap stays */
-static void section_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], const gk_part *part, gk_place *place,
-                       gk_point *p)
+static void section_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], const gk_part *part,
+                       gk_place *place, gk_point *p)
 {
     const double gap = p->gap;
     gk_touch touch;
