@@ -66,6 +66,19 @@ def test_twice_the_slices(name: str, slices: int, least: float) -> None:
     assert moved(own, twice, least) == []
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("slices", [5, 7])
+def test_no_line_of_the_transmission_error_at_the_parts(slices: int) -> None:
+    """Of parts that entered one after the other there would be orders k·slices/overlap: none is above its neighbours by
+    more than half."""
+    kind, overlap = KINDS["helical"], 1.016
+    found = stage_te(kind.model(), [kind.torque], 400, slices=float(slices)).harmonics(80)[0]
+    for order in np.round(np.arange(1, 80 * overlap / slices) * slices / overlap).astype(int):
+        if 3 < order < 77:
+            near = np.r_[found[order - 4 : order - 1], found[order : order + 3]]  # found[k - 1]: order k
+            assert found[order - 1] < 1.5 * near.max(), order
+
+
 @pytest.mark.parametrize(
     "name", ["pair", "internal", *(pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train"))]
 )

@@ -15,7 +15,7 @@ from gearfmu.spec.forms.general import Stage, ToothedBody
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.set_te import stage_te
 
-ORDERS, POSITIONS = 8, 32
+ORDERS, POSITIONS = 8, 24
 HEARD = 1e-9  # m: an order that changes by less is not judged by its level
 
 
