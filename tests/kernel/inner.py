@@ -47,7 +47,7 @@ class Inner:
         return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
 
     def rows(self, engagement: int, pose: np.ndarray, reach: float = 1e-3) -> np.ndarray:
-        """(k, 27) per place and slice: flank, slice, share of it on both flanks; gap and sliding per motion of the pose
+        """(k, 27) per place and slice: flank, slice, z of its middle (m); gap and sliding per motion of the pose
         (12,): of either gear x, y, φ, z, and tilt about x and y."""
         full, out = (ctypes.c_double * 12)(*pose), (ctypes.c_double * (8 * 64 * 27))()
         count = self._lib.probe_rows(*self._handles(), engagement, full, ctypes.c_double(reach), out)

@@ -23,7 +23,7 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
     return found;
 }
 
-/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, share, gradient[12], slide[12]} */
+/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, z of its middle, gradient[12], slide[12]} */
 GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const double *pose, double reach,
                       double *out)
 {
@@ -34,7 +34,9 @@ GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const
     for (int i = 0; i < found; i++)
         for (int strip = 0; strip < setup->strips; strip++, rows++, out += 3 + 2 * POSE) {
             const gk_point *point = gk_point_of(setup, &place[i], strip);
-            out[0] = place[i].flank, out[1] = strip, out[2] = point->share;
+            const gk_mesh *mesh = &setup->mesh[e];
+            out[0] = place[i].flank, out[1] = strip;
+            out[2] = mesh->rides ? 0.5 * (point->end[0] + point->end[1]) : mesh->strip_middle[strip];
             memcpy(out + 3, point->gradient, sizeof point->gradient);
             memcpy(out + 3 + POSE, point->slide, sizeof point->slide);
         }
