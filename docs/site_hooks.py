@@ -12,6 +12,7 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[1]
 OUTER_PAGES = {"README.md": "index.md", "CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
+OUTSIDE = "checkout/"  # folder of the site for what lies outside docs/
 LINK = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)(#[^)\s]*)?\)")
 CSV = re.compile(r"<!-- csv: (\S+) -->")
 LIST_OR_TABLE = re.compile(r"(- |\d+\. |\|)")
@@ -22,11 +23,14 @@ def on_files(files: Files, config: Any) -> Files:
     for name, page in OUTER_PAGES.items():
         if (ROOT / name).is_file():
             files.append(File.generated(config, page, content=(ROOT / name).read_text(encoding="utf-8")))
-    for file in list(files.documentation_pages()):
-        for target in _targets(file):
+    pages = list(files.documentation_pages())
+    while pages:
+        for target in _targets(pages.pop()):
             place = _in_site(target)
             if place not in OUTER_PAGES.values() and files.get_file_from_path(place) is None:
-                files.append(File.generated(config, place, content=(ROOT / target).read_bytes()))
+                linked = File.generated(config, place, content=(ROOT / target).read_bytes())
+                files.append(linked)
+                pages += [linked] if linked.is_documentation_page() else []
     return files
 
 
@@ -64,7 +68,10 @@ def _targets(file: File) -> list[str]:
 
 def _folder(file: File) -> PurePosixPath:
     """The folder in the checkout of the file that a page is made from."""
-    return PurePosixPath(".") if file.src_uri in OUTER_PAGES.values() else PurePosixPath("docs", file.src_uri).parent
+    if file.src_uri in OUTER_PAGES.values():
+        return PurePosixPath(".")
+    outside = file.src_uri.removeprefix(OUTSIDE)
+    return PurePosixPath(outside if outside != file.src_uri else f"docs/{outside}").parent
 
 
 def _target(folder: PurePosixPath, link: str) -> str | None:
@@ -79,7 +86,7 @@ def _in_site(target: str) -> str:
     if target in OUTER_PAGES:
         return OUTER_PAGES[target]
     inside = target.removeprefix("docs/")
-    return inside if inside != target else f"checkout/{target}"
+    return inside if inside != target else OUTSIDE + target
 
 
 def _up(page: str) -> str:

@@ -3,6 +3,7 @@ lack, with one message for each."""
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import resource
 import shutil
@@ -50,6 +51,12 @@ def part_of(path: Path) -> int:
     """The part of a file of tests."""
     name = path.relative_to(Path(__file__).parent).as_posix()
     return next(part for part, heads in PARTS.items() if name.startswith(heads))
+
+
+def pytest_collection_finish() -> None:
+    """What collecting made stays: the collector of garbage need not go through it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

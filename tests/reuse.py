@@ -125,16 +125,25 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
         else:
             prepare(kernel)
             size = len(kernel._work_keep) - (kernel._work - ctypes.addressof(kernel._work_keep))
-            content = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(kernel._work))
-            used = size - int(np.argmax(content[::-1] != 0)) if content.any() else 0
+            used = _used(kernel._work, size)
             setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
-            memory = Prepared(setup, work, content[:used].tobytes(), size, kernel.warning, kernel._opened)
+            memory = Prepared(setup, work, ctypes.string_at(kernel._work, used), size, kernel.warning, kernel._opened)
         (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work) = memory.setup, memory.work
         kernel.warning = memory.warning
         kernel._gives_back = weakref.finalize(kernel, give_back, key, memory)
         kernel._gives_back.atexit = False
 
     return found
+
+
+def _used(start: int, size: int) -> int:
+    """Bytes up to the last one that is not zero, in whole pages."""
+    page = 1 << 16
+    for end in range(-(-size // page) * page, 0, -page):
+        words = (ctypes.c_uint64 * (min(page, size - end + page) // 8)).from_address(start + end - page)
+        if np.frombuffer(words, np.uint64).any():
+            return min(end, size)
+    return 0
 
 
 def keep(kernel: instance.Kernel) -> None:

@@ -10,10 +10,12 @@ import subprocess
 import sys
 import venv
 import zipfile
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
+from verbs import call
 
 from gearfmu.stage.run.trace import Trace
 
@@ -40,12 +42,10 @@ chain_in_fmu = true
 
 def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
     """Standard output of the verb."""
-    command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False
-    )
-    assert done.returncode == expect, done.stderr + done.stdout
-    return done.stdout
+    with chdir(cwd or Path.cwd()):
+        code, out, err = call(*arguments)
+    assert code == expect, err + out
+    return out
 
 
 def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:

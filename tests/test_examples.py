@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import runpy
-import subprocess
-import sys
 import wave
 from pathlib import Path
 
 import numpy as np
 import pytest
+from verbs import call, example
 
 from gearfmu.body import load_bodies
 from gearfmu.spec.stage import load_stage
@@ -21,15 +19,6 @@ ROOT = Path(__file__).resolve().parents[1]
 BASE_RADIUS = 0.5 * 4.5e-3 * 16 * 0.9396926207859084  # m, pinion of fzg_c
 
 
-def example(name: str, *arguments: object, cwd: Path) -> str:
-    """Standard output of the example."""
-    command = [sys.executable, str(ROOT / "examples" / name), *map(str, arguments)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def numbers(text: str) -> list[float]:
     return [float(word) for word in re.findall(r"(?<![\w.])-?\d+\.?\d*(?![\w.])", text)]
 
@@ -37,6 +26,14 @@ def numbers(text: str) -> list[float]:
 def test_drive_with_fmpy(tmp_path: Path) -> None:
     """At rest the mesh force is torque over base radius, and the held wheel carries 24/16 of the torque."""
     te, force, torque = numbers(example("drive_with_fmpy.py", cwd=tmp_path).splitlines()[-1])
+    assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
+    assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
+    assert 50 < te < 200
+
+
+def test_stage_in_ssp(tmp_path: Path) -> None:
+    """As the FMU alone: torque over base radius, and 24/16 of the torque at the held wheel."""
+    te, force, torque = numbers(example("stage_in_ssp.py", tmp_path, cwd=tmp_path).splitlines()[-1])
     assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
     assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
     assert 50 < te < 200
@@ -81,24 +78,8 @@ def test_own_stage(tmp_path: Path) -> None:
 
 def test_read_a_trace(tmp_path: Path) -> None:
     """Mesh orders of a pair at 2000 rpm are multiples of 16 · 2000/60 Hz."""
-    command = [
-        sys.executable,
-        "-m",
-        "gearfmu.cli",
-        "simulate",
-        "fzg_c",
-        "--torque",
-        "302 N*m",
-        "--speed",
-        "2000 rpm",
-        "--duration",
-        "0.05 s",
-        "--set",
-        "level=fast",
-        "--out",
-        str(tmp_path),
-    ]
-    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    order = "simulate fzg_c --torque 302~N*m --speed 2000~rpm --duration 0.05~s --set level=fast --out".split()
+    assert call(*(word.replace("~", " ") for word in order), tmp_path)[0] == 0
     text = example("read_a_trace.py", tmp_path / "trace.h5", cwd=tmp_path)
     first = re.search(r"mesh order 1: +(-?[\d.]+) dB re 1 N at (\d+) Hz", text)
     assert first and float(first[2]) == pytest.approx(16 * 2000 / 60, abs=2)

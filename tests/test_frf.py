@@ -8,14 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from verbs import call
 
 from gearfmu import cli
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    code = cli.outcome(["frf", *map(str, arguments)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 def errors(path: Path) -> dict[str, list[float]]:
@@ -28,9 +23,9 @@ def errors(path: Path) -> dict[str, list[float]]:
 
 
 @pytest.mark.full
-def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
+def test_carrier_in_the_order_of_the_paper(tmp_path) -> None:
     options = ["--scale", 0.3, "--lines", 30, "--out", tmp_path]
-    code, out, err = call(capsys, "planetary54", "carrier", *options)
+    code, out, err = call("frf", "planetary54", "carrier", *options)
     assert code == 0, err
     assert "24 inputs, held at its ground, rotations times 45 mm, 1 % damping" in out
     assert " has " not in out, "every method has the 120 vectors"
@@ -47,19 +42,19 @@ def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
     )
 
 
-def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path, capsys) -> None:
+def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path) -> None:
     """24 inputs: four whole blocks of the five that 100 vectors would begin."""
     options = ["--scale", 0.2, "--lines", 5, "--methods", "rubin,krylov", "--size", 100, "--out", tmp_path]
-    code, out, err = call(capsys, "planetary54", "carrier", *options)
+    code, out, err = call("frf", "planetary54", "carrier", *options)
     assert code == 0, err
     assert "krylov has 96 vectors where 100 were asked for: it takes whole blocks of one vector per input" in out
     assert "rubin has" not in out
 
 
 @pytest.mark.full
-def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path, capsys) -> None:
+def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path) -> None:
     options = ["--scale", 0.3, "--lines", 12, "--free", "--methods", "modal:10, rubin:90", "--out", tmp_path]
-    code, out, err = call(capsys, "fzg_c", "pinion", *options)
+    code, out, err = call("frf", "fzg_c", "pinion", *options)
     assert code == 0, err
     found = errors(tmp_path / "pinion_frf.csv")
     assert set(found) == {"modal", "rubin"} and all(len(values) == 12 for values in found.values())
@@ -75,7 +70,7 @@ def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path, capsys) -
         (["planetary54", "carrier", "--band", "5 kHz", "1 kHz", "--scale", 0.4], "from a lower to a higher frequency"),
     ],
 )
-def test_bad_input_is_one_clear_message_and_nothing_written(arguments, message, tmp_path, capsys) -> None:
-    code, _, err = call(capsys, *arguments, "--out", tmp_path / "none")
+def test_bad_input_is_one_clear_message_and_nothing_written(arguments, message, tmp_path) -> None:
+    code, _, err = call("frf", *arguments, "--out", tmp_path / "none")
     assert code in (1, cli.USAGE_ERROR) and not (tmp_path / "none").exists()
     assert re.search(message, " ".join(err.split()))

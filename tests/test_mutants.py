@@ -7,8 +7,8 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from copies import nearest
-from draw import ROOT, SKIPPED, drawn, edits, files
+from copies import Copy, nearest
+from draw import ROOT, SKIPPED, Defect, drawn, edits, files
 from table import CAUGHT, EQUIVALENT, HARMLESS, HOLE, OPEN, count, read
 
 LEAST = 0.85  # of the defects that change anything
@@ -47,6 +47,28 @@ def test_a_seed_draws_the_same_defects_of_every_kind_in_both_languages() -> None
     c = Counter(Path(d.file).suffix == ".py" for d in first)
     assert 60 < c[True] < 140, "about half of the lines are Python"
     assert len(files()) > 200
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("file", "before", "after", "judge"),
+    [
+        (
+            "gearfmu/geometry/involute.py",
+            "return math.atan(t)",
+            "return math.tan(t)",
+            "tests/geometry/test_involute.py",
+        ),
+        ("gearfmu/kernel/src/base/gk_math.c", "return sum;", "return -sum;", "tests/kernel/test_math.py"),
+    ],
+)
+def test_a_planted_defect_is_caught_by_a_test_that_is_sound(file: str, before: str, after: str, judge: str) -> None:
+    """The tool itself: it builds, plants, runs a test that knows better, and puts the source back."""
+    copy = Copy("selftest")
+    assert not copy.build() and not copy.run([judge], 60.0).failed
+    with copy.planted(Defect(file, 1, "chosen", before, after)) as changed:
+        assert changed and copy.run([judge], 60.0).failed.startswith(judge)
+    assert not copy.run([judge], 60.0).failed
 
 
 def test_every_defect_of_the_table_stands_in_the_sources() -> None:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from verbs import call
 
 from gearfmu import cli
 from gearfmu.spec.proposals.coarse import coarse_stage
@@ -16,27 +17,20 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto-own-stage.md"
 TINY = {"modes": 40, "roll_points": 8, "width_functions": 3, "flank": 6, "thickness": 2, "width": 2}
 
 
-def call(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    code = cli.outcome(words)
-    return code, *capsys.readouterr()
-
-
 def commands(text: str) -> list[list[str]]:
     """The command lines of a page as words, without `gearfmu`."""
     lines = re.findall(r"^gearfmu (.+)$", text, flags=re.MULTILINE)
     return [[a or b for a, b in re.findall(r'"([^"]*)"|(\S+)', line)] for line in lines]
 
 
-def test_the_page_goes_from_numbers_to_stages_that_are_valid(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_goes_from_numbers_to_stages_that_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text(encoding="utf-8")
     fast = [words for words in commands(text) if words[0] in ("new", "inspect")]
     assert [words[0] for words in fast] == ["new", "inspect", "new", "inspect"]
     told = ""
     for words in fast:
-        code, out, err = call(words, capsys)
+        code, out, err = call(*words)
         assert code == 0, err
         told += out
     assert "0.2484, 0.0735" in told and "89.8, 202.17 mm" in told and told.count("memory_GB") == 6
@@ -55,25 +49,23 @@ def test_every_option_on_the_page_is_one_of_its_verb() -> None:
         assert {word for word in words if word.startswith("--")} <= known
 
 
-def test_a_tiny_pair_is_coarse_in_seconds_and_meshes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_tiny_pair_is_coarse_in_seconds_and_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     words = 'new tiny --teeth 17 19 --module "1 mm" --width "5 mm"'
-    assert call(commands(f"gearfmu {words}")[0], capsys)[0] == 0
+    assert call(*commands(f"gearfmu {words}")[0])[0] == 0
     path = tmp_path / "tiny" / "stage.toml"
     text = path.read_text(encoding="utf-8")
     for key, value in TINY.items():
         text = re.sub(rf"^{key} = \d+", f"{key} = {value}", text, flags=re.MULTILINE)
     path.write_text(text, encoding="utf-8")
-    code, out, err = call(["reduce", "tiny", "--coarse"], capsys)
+    code, out, err = call("reduce", "tiny", "--coarse")
     assert code == 0, err
     assert "evidence/bodies/coarse.csv" in out and "2 bodies reduced, 0 read" in out
     assert sorted(p.name for p in (tmp_path / "tiny" / "coarse").iterdir()) == ["pinion.h5", "stage.toml", "wheel.h5"]
-    assert "0 bodies reduced, 2 read" in call(["reduce", "tiny", "--coarse"], capsys)[1]
-    code, out, err = call("te tiny/coarse --positions 4 --torque".split() + ["1 N*m", "--out", "te.csv"], capsys)
+    assert "0 bodies reduced, 2 read" in call("reduce", "tiny", "--coarse")[1]
+    code, out, err = call(*"te tiny/coarse --positions 4 --torque".split(), "1 N*m", "--out", "te.csv")
     assert code == 0 and "mesh stiffness" in out, err
-    shown = json.loads(call(["inspect", "tiny/coarse", "--json"], capsys)[1])
+    shown = json.loads(call("inspect", "tiny/coarse", "--json")[1])
     assert shown["name"] == "tiny_coarse" and shown["reduction"]["pinion"]["memory_GB"] > 0
 
 
@@ -90,9 +82,8 @@ def test_a_tiny_pair_is_coarse_in_seconds_and_meshes(
 )
 def test_bad_numbers_are_one_clear_message(
     words: str, code: int, told: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
-    found, out, err = call(["new", "mine", *(word.replace("~", " ") for word in words.split())], capsys)
+    found, out, err = call("new", "mine", *(word.replace("~", " ") for word in words.split()))
     assert found == code and out == "" and all(text in err for text in told), err
     assert not list(tmp_path.iterdir())

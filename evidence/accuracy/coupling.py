@@ -20,14 +20,16 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from gearfmu.cosim.accuracy import Window, coupling_errors, distance
+from gearfmu.cosim.accuracy import Window, alternating, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
+from gearfmu.errors import CouplingError
 from gearfmu.files import write_text, written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.spec.scene import SceneSpec, load_scene
@@ -38,6 +40,29 @@ FILE, PICTURE = Path(__file__).with_suffix(".csv"), ROOT / "docs" / "pictures" /
 PAGE, BEGIN, END = ROOT / "docs" / "coupling.md", "<!-- begin: evidence/accuracy/coupling.py -->\n", "<!-- end -->"
 STEPS = (25e-6, 50e-6, 100e-6, 200e-6, 250e-6, 500e-6, 1e-3)
 WHOLE = Window(0.0, steady=False)
+
+
+class Distance(NamedTuple):
+    """rms of a difference in the channel's unit, over the rms of the reference's AC part, over its standard
+    deviation."""
+
+    rms: float
+    over_ac: float
+    over_std: float
+
+
+def distance(trace: Trace, reference: Trace, name: str, window: Window) -> Distance:
+    """How far a channel of `trace` is from `reference`, a run of the same scene at a whole multiple of times as many
+    points, at the times of `trace`. AC part and standard deviation are those of the reference at all its points."""
+    step, fine = float(trace.time[1] - trace.time[0]), float(reference.time[1] - reference.time[0])
+    ratio = round(step / fine)
+    if ratio < 1 or abs(ratio * fine - step) > 1e-6 * fine:
+        raise CouplingError(f"steps of {step:g} s are no whole multiple of the reference's, {fine:g} s")
+    index = np.flatnonzero(trace.time >= window.start)
+    index = index[ratio * index < reference.time.size]
+    whole = reference[name][reference.time >= window.start]
+    error = rms(trace[name][index] - reference[name][ratio * index])
+    return Distance(error, error / rms(alternating(whole, fine, window.steady)), error / float(np.std(whole)))
 
 
 @dataclass(frozen=True)

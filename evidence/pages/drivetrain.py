@@ -7,8 +7,8 @@ from typing import get_args
 
 from gearfmu.spec.reading.base import Quantity, Spec
 from gearfmu.spec.scene import load_scene, shipped_scenes
-from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig, table
-from gearfmu.spec.scenes.parts import TABLES, Drivetrain
+from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
+from gearfmu.spec.scenes.parts import ClutchPart, Drivetrain, InertiaPart, PortShaft, ShaftPart, TorquePart
 from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 
 INTRODUCTION = """# Drivetrains and scenes
@@ -27,6 +27,10 @@ possible ([coupling](coupling.md)):
 
 Between ┤ and ├ is the stage: two ports with a chain. The wheel's chain keeps its clutch closed, so its two inertias,
 half the final drive each, are one. With `chain_in_fmu = false` the cuts are input shaft and output shaft."""
+
+PARTS: dict[str, type[Spec]] = {
+    "ports": PortShaft, "inertias": InertiaPart, "shafts": ShaftPart, "clutches": ClutchPart, "torques": TorquePart,
+}  # fmt: skip
 
 
 def page() -> str:
@@ -47,15 +51,13 @@ def page() -> str:
 
 def _drivetrain(kind: type[PassengerCar] | type[TestRig], title: str) -> str:
     about = " ".join((kind.__doc__ or "").split())
-    rows = [
-        (
-            f"`{row.name}`",
-            row.meaning,
-            f"{'given by the scene,' if row.value is None else f'{row.value:g}'} {row.unit}".strip(),
-            "" if row.source == "assumed" else row.source.removeprefix("computed: "),
-        )
-        for row in table(kind)
-    ]
+    rows = []
+    for name, field in kind.model_fields.items():
+        if (quantity := next((item for item in field.metadata if isinstance(item, Quantity)), None)) is not None:
+            value = "given by the scene," if field.is_required() else f"{field.default:g}"
+            source = str((field.json_schema_extra or {})["source"]).removeprefix("computed: ")
+            about_it = field.description or "", f"{value} {quantity.unit}".strip()
+            rows.append((f"`{name}`", *about_it, "" if source == "assumed" else source))
     return f"## {title}\n{about}\n\n" + _table(("name", "meaning", "value", "source"), rows)
 
 
@@ -69,7 +71,7 @@ def _shaft_loads() -> str:
 def _parts() -> str:
     about = " ".join((Drivetrain.__doc__ or "").split())
     rows = []
-    for name, kind in TABLES.items():
+    for name, kind in PARTS.items():
         own = [field for field in kind.model_fields if field not in ShaftLoad.model_fields]
         rows += [(f"`{name}`", f"`{field}`", *_meaning(kind, field)) for field in own]
     text = f"A scene may build its drivetrain itself, `[drivetrain]`, round any number of the stage's ports. {about}"

@@ -19,7 +19,7 @@ from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec
-from gearfmu.spec.stage import load_set
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
@@ -121,14 +121,14 @@ def _ends(motion: Turn, time: float, load: float) -> dict[str, float]:
 @lru_cache(maxsize=1)
 def set_bodies() -> list[Any]:
     """Sun, planet, ring and carrier, as shipped."""
-    return load_bodies(load_set(SET))
+    return load_bodies(load_stage(SET))
 
 
 @lru_cache(maxsize=1)
 def thin_ring() -> tuple[RingSpec, ReducedBody]:
     """A ring with 3.4 mm of rim instead of 9 behind its teeth, oval at 0.4 kHz where the shipped one is at 1.6, and its
     body: reduced here in a few seconds, on a coarse mesh."""
-    spec = load_set(SET)
+    spec = load_stage(SET)
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
     body = spec.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
     ring = spec.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
@@ -143,7 +143,7 @@ def _model(variant: PlanetSet) -> StageModel:
 
 def set_spec(variant: PlanetSet) -> PlanetarySpec:
     """The shipped set with the changes of a variant."""
-    spec = load_set(SET)
+    spec = load_stage(SET)
     parts: dict[str, tuple[Any, float | None]] = {
         "sun": (spec.sun, variant.sun),
         "planet": (spec.planet, variant.pin),
@@ -165,7 +165,7 @@ def set_spec(variant: PlanetSet) -> PlanetarySpec:
 @lru_cache(maxsize=1)
 def base_radius() -> float:
     """Base radius of the sun, m."""
-    spec = load_set(SET)
+    spec = load_stage(SET)
     return member_of(spec, "sun").geometry.r_b
 
 

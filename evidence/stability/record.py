@@ -115,28 +115,19 @@ class Run:
     def __init__(self, kernel: Kernel, capacity: int, watched: Watched) -> None:
         self.kernel = kernel
         self.names = [*watched.names, *(name for name in watched.optional if name in kernel.variables)]
-        memory = (ctypes.c_double * len(self.names))()
-        self._cells = [ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(self.names))]
-        self._references = [kernel.variables[name].reference for name in self.names]
-        self._buffer = np.ctypeslib.as_array(memory)
+        self._references, self._memory = kernel.references(self.names), (ctypes.c_double * len(self.names))()
         self._time, self._samples = np.full(capacity + 1, 0.0), np.full((capacity + 1, len(self.names)), 0.0)
         self._count = 0
-        self._set: dict[str, int] = {}
 
     def set(self, values: Mapping[str, float]) -> None:
         """Inputs for the next step."""
         for name, value in values.items():
-            reference = self._set.get(name)
-            if reference is None:
-                reference = self._set[name] = self.kernel.variables[name].reference
-            if self.kernel.set_reference(reference, value):
-                self.kernel.set(name, value)
+            self.kernel.set(name, value)
 
     def take(self, time: float) -> None:
         """Record all outputs as of `time`."""
-        for reference, cell in zip(self._references, self._cells, strict=True):
-            self.kernel.get_reference(reference, cell)
-        self._time[self._count], self._samples[self._count] = time, self._buffer
+        self.kernel.get_many(self._references, self._memory)
+        self._time[self._count], self._samples[self._count] = time, self._memory
         self._count += 1
 
     def record(self, outcome: str, cpu_s: float, powers: np.ndarray | None = None) -> Record:

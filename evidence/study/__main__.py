@@ -45,7 +45,8 @@ def write(name: str, specs: Sequence[SceneSpec], out: Path, quick: bool) -> None
     with progress_bar(name) as progress:
         rows = table(name, specs, quick, progress)
     names = {spec.name for spec in specs}
-    kept = [row for row in read_rows(path, type(rows[0])) if getattr(row, "scene", None) not in {None, *names}]
+    made = {None, *names, *(getattr(row, "scene", None) for row in rows)}
+    kept = [row for row in read_rows(path, type(rows[0])) if getattr(row, "scene", None) not in made]
     write_rows(path, type(rows[0]), [*kept, *rows])
     print(tidy(rows, [field for field in vars(rows[0]) if field != "message"]))
     for message in dict.fromkeys(row.message for row in rows if getattr(row, "message", "")):

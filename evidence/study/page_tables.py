@@ -8,10 +8,15 @@ from pathlib import Path
 from evidence.rows_again import rows_of
 
 LEVELS = ("fast", "standard", "full", "rigid", "paper")
-DEFAULT = 20e-6 / 3  # s
+DEFAULT, SET_DEFAULT = 20e-6 / 3, 10e-6  # s: of a pair and of a set, in communication steps of 20 µs
 SHOWN = {"rigid": (DEFAULT,), "fast": (DEFAULT, 10e-6, 5e-6, 1.25e-6), "standard": (DEFAULT,)}
 PAIR_STEPS = SHOWN | {"full": (DEFAULT, 1.25e-6)}
-SET_STEPS = SHOWN | {"rigid": (5e-6,), "standard": (DEFAULT, 5e-6, 2.5e-6), "full": (DEFAULT, 5e-6, 2.5e-6)}
+SET_STEPS = {
+    "rigid": (SET_DEFAULT, 5e-6),
+    "fast": (SET_DEFAULT, DEFAULT, 5e-6, 1.25e-6),
+    "standard": (SET_DEFAULT, DEFAULT, 5e-6, 2.5e-6),
+    "full": (SET_DEFAULT, DEFAULT, 5e-6, 2.5e-6),
+}
 HEAD = "| level | modes | h, µs | transmission error | {} | {} | thousand instructions a step | time | ratio |"
 Row = dict[str, str]
 
@@ -22,7 +27,7 @@ def pairs(folder: Path) -> str:
     counted = instructions(folder, "fzg_c/stage_relief")
     own = [row for level in LEVELS for row in at(rows, level, PAIR_STEPS.get(level, ()), "dg4")]
     own += [row for row in rows if row["integrator"] == "rk45"]
-    return table(own, counted, ("force_error", "bearing_error"), HEAD.format("mesh force", "bearing force"))
+    return table(own, DEFAULT, counted, ("force_error", "bearing_error"), HEAD.format("mesh force", "bearing force"))
 
 
 def sets(folder: Path) -> str:
@@ -31,7 +36,7 @@ def sets(folder: Path) -> str:
     rows = [row for row in rows_of(folder / "study" / "sets.csv") if wanted.items() <= row.items()]
     own = [row for level in LEVELS for row in at(rows, level, SET_STEPS.get(level, ()))]
     counted = instructions(folder, "planetary54")
-    return table(own, counted, ("force_error", "pin_error"), HEAD.format("mesh forces", "pins"))
+    return table(own, SET_DEFAULT, counted, ("force_error", "pin_error"), HEAD.format("mesh forces", "pins"))
 
 
 def instructions(folder: Path, stage: str) -> dict[tuple[str, int], float]:
@@ -51,13 +56,15 @@ def at(rows: list[Row], level: str, steps: tuple[float, ...], integrator: str | 
     return [row for h in steps for row in own if nanoseconds(row["h_s"]) == nanoseconds(h)]
 
 
-def table(rows: list[Row], counted: dict[tuple[str, int], float], errors: tuple[str, str], head: str) -> str:
+def table(
+    rows: list[Row], default: float, counted: dict[tuple[str, int], float], errors: tuple[str, str], head: str
+) -> str:
     """The rows as Markdown; errors in per cent with two digits."""
     lines = [head, "|" + "---|" * (head.count("|") - 1)]
     for row in rows:
         level = row["level"] if row.get("integrator") != "rk45" else f"{row['level']}`, `rk45"
         step = nanoseconds(row["h_s"])
-        shown = f"{step / 1e3:.3g}" + " (default)" * (step == nanoseconds(DEFAULT))
+        shown = f"{step / 1e3:.3g}" + " (default)" * (step == nanoseconds(default))
         count = counted.get((row["level"], step)) if row.get("integrator") != "rk45" else None
         cells = [f"`{level}`", row["n_dyn"], shown]
         cells += [number(100 * float(row[name])) for name in ("te_error", *errors)]

@@ -22,7 +22,7 @@ from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_set
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Replay, Run, measure, models_for, replayed_price
@@ -144,7 +144,7 @@ class _SetStudy:
 
     def __init__(self, scene: SceneSpec, out: Path, quick: bool, tell: Tell) -> None:
         self.scene, self.out, self.quick, self.tell = window(scene, quick), out, quick, tell
-        spec = load_set(scene.stage.name)
+        spec = load_stage(scene.stage.name)
         self.spec, self.bodies, self.slices = spec, load_bodies(spec), scene.stage.slices
         self.model = self._model_of(spec, self.bodies)
         self.base = Point("fast", h=self._fitting(BASE_STEP), slices=self.slices)

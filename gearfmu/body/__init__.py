@@ -14,13 +14,11 @@ from gearfmu.body.bodies import (
 )
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
-from gearfmu.body.mounted import MountedRing, mounted
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body
 
 __all__ = [
     "InterfaceBody",
-    "MountedRing",
     "ReducedBody",
     "body_hashes",
     "body_needs",
@@ -30,7 +28,6 @@ __all__ = [
     "load_bodies",
     "load_body",
     "load_interface_body",
-    "mounted",
     "reduce_apart",
     "reduce_bodies",
     "reduce_body",

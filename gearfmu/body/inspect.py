@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
 from gearfmu.body.interface_body import interface_facts, load_interface_body
 from gearfmu.body.layout import entries_of
-from gearfmu.body.mounted import mounted
+from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.body.reduced import ReducedBody, value_of
 from gearfmu.body.store import load_body
 from gearfmu.hdf5 import format_of
@@ -69,17 +69,11 @@ def _mounts(body: ReducedBody) -> dict[str, Any]:
         return {}
     if not body.rim.mounts:
         return {"internal": True, "mounts": 0}
-    ring = mounted(body)
     return {
         "internal": True,
         "mounts": body.rim.mounts,
         "mount_stiffness_N_per_m": body.rim.mount_stiffness,
-        "mounted_frequencies_Hz": [float(f) for f in ring.frequency[:8]],
-        "spread_of_residual_between_teeth": {
-            f"{n} modes": ring.residual_spread(0.5 * float(ring.frequency[n - 1] + ring.frequency[n]))
-            for n in (36, 128)
-            if n < len(ring.frequency) and body.all_offsets
-        },
+        "mounted_frequencies_Hz": [float(f) for f in mounted_frequencies(body)[:8]],
     }
 
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearfmu.errors import CouplingError
 from gearfmu.stage.run.trace import Trace
 
 AVERAGE_OVER = 10e-3  # s: in transient runs AC is the signal minus this moving average of the reference
@@ -66,26 +65,3 @@ def alternating(values: np.ndarray, interval: float, steady: bool) -> np.ndarray
 def rms(values: np.ndarray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0
-
-
-class Distance(NamedTuple):
-    """rms of a difference in the channel's unit, over the rms of the reference's AC part, over its standard
-    deviation."""
-
-    rms: float
-    over_ac: float
-    over_std: float
-
-
-def distance(trace: Trace, reference: Trace, name: str, window: Window) -> Distance:
-    """How far a channel of `trace` is from `reference`, a run of the same scene at a whole multiple of times as many
-    points, at the times of `trace`. AC part and standard deviation are those of the reference at all its points."""
-    step, fine = float(trace.time[1] - trace.time[0]), float(reference.time[1] - reference.time[0])
-    ratio = round(step / fine)
-    if ratio < 1 or abs(ratio * fine - step) > 1e-6 * fine:
-        raise CouplingError(f"steps of {step:g} s are no whole multiple of the reference's, {fine:g} s")
-    index = np.flatnonzero(trace.time >= window.start)
-    index = index[ratio * index < reference.time.size]
-    whole = reference[name][reference.time >= window.start]
-    error = rms(trace[name][index] - reference[name][ratio * index])
-    return Distance(error, error / rms(alternating(whole, fine, window.steady)), error / float(np.std(whole)))

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
 import numpy as np
 
 from gearfmu.fem import surface
+
+Basis: TypeAlias = Callable[[np.ndarray], np.ndarray]
+Part: TypeAlias = tuple[np.ndarray, Basis, Basis, tuple[np.ndarray, np.ndarray]]
 
 
 def rigid_fields(positions: np.ndarray) -> np.ndarray:
@@ -32,14 +38,20 @@ def surface_moments(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
     With A(x) the rigid fields at a point, returns b = ∫ Aᵀ N dA, (6, 3N), and g = ∫ Aᵀ A dA, (6, 6), over the
     8-node faces (F, 8). Both add up over the parts of a surface.
     """
-    xi, weight = surface.gauss_quad()
-    values = surface.shape(xi)
-    measure = surface.surface_measure(nodes[faces], xi) * weight
-    fields = rigid_fields(np.einsum("pn,qnc->qpc", values, nodes[faces]))
-    per_node = np.einsum("qp,pn,qpcr->qncr", measure, values, fields, optimize=True)
-    moments = np.zeros((len(nodes), 3, 6))
-    np.add.at(moments, faces, per_node)
-    gram = np.einsum("qp,qpcr,qpcs->rs", measure, fields, fields, optimize=True)
+    return moments_of(nodes, [(faces, surface.shape, surface.shape_gradient, surface.gauss_quad())])
+
+
+def moments_of(nodes: np.ndarray, parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
+    """`surface_moments` of faces of any form: faces (F, k), their shape functions, derivatives and Gauss rule."""
+    moments, gram = np.zeros((len(nodes), 3, 6)), np.zeros((6, 6))
+    for faces, shape, slope, (xi, weight) in parts:
+        if len(faces) == 0:
+            continue
+        values = shape(xi)
+        measure = surface.surface_measure(nodes[faces], slope(xi)) * weight
+        fields = rigid_fields(np.einsum("pn,qnc->qpc", values, nodes[faces]))
+        np.add.at(moments, faces, np.einsum("qp,pn,qpcr->qncr", measure, values, fields, optimize=True))
+        gram += np.einsum("qp,qpcr,qpcs->rs", measure, fields, fields, optimize=True)
     return moments.reshape(-1, 6).T, gram
 
 

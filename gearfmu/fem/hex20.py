@@ -8,7 +8,8 @@ Source of the shape functions: Zienkiewicz & Taylor, The Finite Element Method, 
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,6 +42,9 @@ class Material(Protocol):
     youngs_modulus: float
     poisson_ratio: float
     density: float
+
+
+ElementMatrices: TypeAlias = Callable[[np.ndarray, Material], tuple[np.ndarray, np.ndarray]]
 
 
 def shape(xi: np.ndarray) -> np.ndarray:
@@ -135,35 +139,35 @@ def assemble(nodes: np.ndarray, elements: np.ndarray, material: Material) -> tup
     nodes : (N, 3), m; elements : (E, 20) int. Returns K (3N, 3N) csr, N/m, and M (3N, 3N) csr, kg, both symmetric.
     Raises MeshError for inside-out elements.
     """
-    nodes, elements = np.asarray(nodes, float), np.asarray(elements)
-    dofs = (3 * elements[:, :, None] + np.arange(3)).reshape(len(elements), 60)
-    k_global = sp.csr_array((3 * len(nodes),) * 2)
-    m_scalar = sp.csr_array((len(nodes),) * 2)
-    for first in range(0, len(elements), _SCATTERED):
-        chunk = slice(first, first + _SCATTERED)
-        stiffness, mass = _element_matrices(nodes[elements[chunk]], material)
-        k_global = k_global + scattered(stiffness, dofs[chunk], 3 * len(nodes))
-        m_scalar = m_scalar + scattered(mass, elements[chunk], len(nodes))
-    del stiffness, mass
-    k_global, m_scalar = symmetric(k_global), symmetric(m_scalar)
-    return k_global, sp.csr_array(sp.kron(m_scalar, sp.identity(3), format="csr"))
+    return assembled(nodes, [(elements, element_matrices)], material)
 
 
-def _element_matrices(positions: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """`element_matrices` of many elements, batch by batch."""
-    stiffness, mass = (np.empty((len(positions), size, size)) for size in (60, 20))
-    for start in range(0, len(positions), _BATCH):
-        batch = slice(start, start + _BATCH)
-        stiffness[batch], mass[batch] = element_matrices(positions[batch], material)
-    return stiffness, mass
+def assembled(
+    nodes: np.ndarray, blocks: Sequence[tuple[np.ndarray, ElementMatrices]], material: Material
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """`assemble` of blocks of elements (E, k), each with what makes their matrices."""
+    k_global, m_scalar = sp.csr_array((3 * len(nodes),) * 2), sp.csr_array((len(nodes),) * 2)
+    for elements, matrices in blocks:
+        for first in range(0, len(elements), _SCATTERED):
+            chunk = elements[first : first + _SCATTERED]
+            batches = np.split(chunk, range(_BATCH, len(chunk), _BATCH))
+            stiffness, mass = (
+                np.concatenate(found)
+                for found in zip(*(matrices(nodes[batch], material) for batch in batches), strict=True)
+            )
+            dofs = (3 * chunk[:, :, None] + np.arange(3)).reshape(len(chunk), -1)
+            k_global = k_global + _scattered(stiffness, dofs, 3 * len(nodes))
+            m_scalar = m_scalar + _scattered(mass, chunk, len(nodes))
+            del stiffness, mass
+    return symmetric(k_global), sp.csr_array(sp.kron(symmetric(m_scalar), sp.identity(3), format="csr"))
 
 
 def scatter(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
     """Sum of element matrices (E, k, k) at the unknowns (E, k), symmetric: (size, size)."""
-    return symmetric(scattered(blocks, dofs, size))
+    return symmetric(_scattered(blocks, dofs, size))
 
 
-def scattered(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
+def _scattered(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
     """As `scatter`, symmetric to rounding."""
     dofs = dofs.astype(np.int32 if size < 2**31 else np.int64)
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()

@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-from gearfmu.fem.coupling import rigid_fields
+from gearfmu.fem.coupling import moments_of
 from gearfmu.fem.solids import Faces
 
 _TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
@@ -50,18 +50,5 @@ def averaging_rows(nodes: np.ndarray, faces: Faces) -> np.ndarray:
 
 def patch_moments(nodes: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
     """b = ∫ Aᵀ N dA, (6, 3N), and g = ∫ Aᵀ A dA, (6, 6), A the rigid fields."""
-    moments, gram = np.zeros((len(nodes), 3, 6)), np.zeros((6, 6))
-    rules = (
-        (faces.quads, surface.shape, surface.shape_gradient, surface.gauss_quad()),
-        (faces.triangles, triangle_shape, triangle_gradient, gauss_triangle()),
-    )
-    for block, shape, slope, (xi, weight) in rules:
-        if len(block) == 0:
-            continue
-        values = shape(xi)
-        tangents = np.einsum("pan,qnc->qpac", slope(xi), nodes[block])
-        measure = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=-1) * weight
-        fields = rigid_fields(np.einsum("pn,qnc->qpc", values, nodes[block]))
-        np.add.at(moments, block, np.einsum("qp,pn,qpcr->qncr", measure, values, fields, optimize=True))
-        gram += np.einsum("qp,qpcr,qpcs->rs", measure, fields, fields, optimize=True)
-    return moments.reshape(-1, 6).T, gram
+    quads = (faces.quads, surface.shape, surface.shape_gradient, surface.gauss_quad())
+    return moments_of(nodes, [quads, (faces.triangles, triangle_shape, triangle_gradient, gauss_triangle())])

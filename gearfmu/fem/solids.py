@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, tet10
-from gearfmu.fem.hex20 import Material, scatter
+from gearfmu.fem.hex20 import Material
 
 ELEMENTS = {"hexahedron20": hex20, "tetra10": tet10}
 _BATCH = 256
@@ -24,17 +24,8 @@ def assemble(
     nodes : (N, 3), m. elements : "hexahedron20" → (E, 20), "tetra10" → (E, 10), VTK order. Returns K, N/m, and M, kg,
     (3N, 3N) csr, symmetric. Raises MeshError for inside-out elements.
     """
-    size = len(nodes)
-    stiffness, mass = sp.csr_array((3 * size, 3 * size)), sp.csr_array((size, size))
-    for kind, block in elements.items():
-        parts = [
-            ELEMENTS[kind].element_matrices(nodes[block[first : first + _BATCH]], material)
-            for first in range(0, len(block), _BATCH)
-        ]
-        dofs = (3 * block[:, :, None] + np.arange(3)).reshape(len(block), -1)
-        stiffness = stiffness + scatter(np.concatenate([k for k, _ in parts]), dofs, 3 * size)
-        mass = mass + scatter(np.concatenate([m for _, m in parts]), block, size)
-    return sp.csr_array(stiffness), sp.csr_array(sp.kron(mass, sp.identity(3), format="csr"))
+    blocks = [(block, ELEMENTS[kind].element_matrices) for kind, block in elements.items()]
+    return hex20.assembled(nodes, blocks, material)
 
 
 def jacobian_quality(nodes: np.ndarray, block: np.ndarray, kind: str) -> np.ndarray:

@@ -39,9 +39,10 @@ def gauss_quad(points: int = 4) -> tuple[np.ndarray, np.ndarray]:
     return grid, np.outer(w, w).reshape(-1)
 
 
-def surface_measure(positions: np.ndarray, xi: np.ndarray) -> np.ndarray:
-    """Area of the surface per unit natural area: positions (Q, 8, 3), m, xi (P, 2) → (Q, P), m²."""
-    tangents = np.einsum("pan,qnc->qpac", shape_gradient(xi), positions)
+def surface_measure(positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Area of the surface per unit natural area: positions (Q, k, 3), m, of the nodes of faces of any form, gradient
+    (P, 2, k) of their shape functions → (Q, P), m²."""
+    tangents = np.einsum("pan,qnc->qpac", gradient, positions)
     return np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=-1)
 
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
+from gearfmu.femesh.lattice import graded, parameter, transfinite
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, rim_parameters
+from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, flank_rolls, rim_parameters, section_of
 from gearfmu.femesh.sector import gear_sector, sector_of
-from gearfmu.geometry import GearGeometry, involute
+from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.tables.gear import MeshSpec
 
@@ -41,33 +41,9 @@ def sector_mesh(geometry: GearGeometry | InternalGearGeometry, face_width: float
 def build_ring_section(ring: InternalGearGeometry, mesh: MeshSpec) -> Section:
     """The section of `ring` with the counts of `mesh`; MeshError when the rim leaves no room for the root block."""
     elements = mesh.scaled(mesh.flank, 2)
-    roll = ring_flank_rolls(ring, elements)
+    roll = flank_rolls(ring, elements)
     tooth, root, rim = _blocks(ring, mesh, roll)
-    upper = np.concatenate([quads_of(block) for block in (tooth, root, rim)])
-    points = np.concatenate([upper, mirrored(upper)])
-    nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
-    find = Finder(nodes)
-    flank_line = tooth[0, : 2 * elements + 1]
-    cut = np.concatenate([tooth[-1, ::-1], rim[1:, 0]])
-    return Section(
-        nodes=nodes, quads=index.reshape(-1, 8),
-        bore=find(np.concatenate([rim[-1], rim[-1, :-1] * [1, -1]])),
-        cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
-        flank=np.stack([edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
-        flank_roll=edges(roll[: 2 * elements + 1]),
-    )  # fmt: skip
-
-
-def ring_flank_rolls(ring: InternalGearGeometry, elements: int) -> np.ndarray:
-    """Rolls (m) of the flank's nodes from the form point to the tip form point, equal arc lengths, then one element to
-    the tip circle."""
-    ends = involute.arc_length(np.array([ring.s_form, ring.s_tip, ring.s_a]), ring.r_b)
-    length = np.linspace(ends[0], ends[1], 2 * elements + 1)
-    if ring.s_a < ring.s_tip:
-        length = np.append(length, [0.5 * (ends[1] + ends[2]), ends[2]])
-    roll = involute.roll_at_arc_length(length, ring.r_b)
-    roll[0], roll[2 * elements] = ring.s_form, ring.s_tip
-    return roll
+    return section_of((tooth, root, rim), np.concatenate([tooth[-1, ::-1], rim[1:, 0]]), roll[: 2 * elements + 1])
 
 
 def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

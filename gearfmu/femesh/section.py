@@ -18,6 +18,7 @@ import numpy as np
 from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
+from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.tables.gear import MeshSpec
 
 ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
@@ -50,25 +51,31 @@ def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
     elements = mesh.scaled(mesh.flank, 2)
     roll = flank_rolls(gear, elements)
     tooth, root, rim = _blocks(gear, mesh, roll)
-    upper = np.concatenate([quads_of(block) for block in (tooth, root, rim)])
+    return section_of((tooth, root, rim), np.concatenate([root[:, -1], rim[1:, -1]]), roll[: 2 * elements + 1])
+
+
+def section_of(blocks: tuple[np.ndarray, np.ndarray, np.ndarray], cut: np.ndarray, roll: np.ndarray) -> Section:
+    """The section whose upper half consists of the blocks tooth, root and rim; cut (P, 2): its edge to the next sector;
+    roll (R,): of the nodes on the flank, the tooth's first edge."""
+    tooth, _, rim = blocks
+    upper = np.concatenate([quads_of(block) for block in blocks])
     points = np.concatenate([upper, mirrored(upper)])
     nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
-    find = Finder(nodes)
-    flank_line, cut = tooth[0, : 2 * elements + 1], np.concatenate([root[:, -1], rim[1:, -1]])
+    find, held, flank = Finder(nodes), rim[-1], tooth[0, : len(roll)]
     return Section(
         nodes=nodes, quads=index.reshape(-1, 8),
-        bore=find(np.concatenate([rim[-1], rim[-1, 1:] * [1, -1]])),
+        bore=find(np.concatenate([held, held[held[:, 1] != 0] * [1, -1]])),
         cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
-        flank=np.stack([edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
-        flank_roll=edges(roll[: 2 * elements + 1]),
+        flank=np.stack([edges(find(flank * [1, sg])) for sg in (1, -1)]),
+        flank_roll=edges(roll),
     )  # fmt: skip
 
 
-def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
+def flank_rolls(gear: GearGeometry | InternalGearGeometry, elements: int) -> np.ndarray:
     """Rolls (m) of the flank's nodes: equal arc lengths to the tip form point, then one element to the tip circle."""
     ends = involute.arc_length(np.array([gear.s_form, gear.s_tip, gear.s_a]), gear.r_b)
     length = np.linspace(ends[0], ends[1], 2 * elements + 1)
-    if gear.s_a > gear.s_tip:
+    if (gear.s_a - gear.s_tip) * (gear.s_tip - gear.s_form) > 0:
         length = np.append(length, [0.5 * (ends[1] + ends[2]), ends[2]])
     roll = involute.roll_at_arc_length(length, gear.r_b)
     roll[0], roll[2 * elements] = gear.s_form, gear.s_tip

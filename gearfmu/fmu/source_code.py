@@ -5,12 +5,16 @@ read. Flags are those of the shipped binaries: with them gcc, clang and zig give
 
 from __future__ import annotations
 
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from gearfmu.kernel.build import FLAGS, HERE, fmi_headers, sources
 
 FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+SYSTEM_HEADERS = "errno float math stdarg stddef stdint stdio stdlib string".split()  # all that the sources include
+# At the head of every file that is compiled: what no attribute exports stays inside, whatever flags an importer takes
+HIDDEN = "".join(f"#include <{name}.h>\n" for name in SYSTEM_HEADERS) + (
+    "#if defined(__GNUC__) && !defined(_WIN32)\n#pragma GCC visibility push(hidden)\n#endif\n#line 1\n"
+)
 COMPILER_OPTIONS = " ".join(flag for flag in FLAGS if not flag.startswith("-W"))
 
 
@@ -18,7 +22,8 @@ def source_files() -> dict[str, bytes]:
     """Path below sources/ → content: the C files of the kernel, what they include, and the headers of FMI 2."""
     root = HERE / "src"
     own = {path.relative_to(root).as_posix(): path for path in sources()}
-    return {name: Path(path).read_bytes() for name, path in sorted(own.items())} | {
+    head = {".c": HIDDEN.encode()}
+    return {name: head.get(path.suffix, b"") + path.read_bytes() for name, path in sorted(own.items())} | {
         name: (fmi_headers() / name).read_bytes() for name in FMI_HEADERS
     }
 

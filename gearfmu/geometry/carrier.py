@@ -65,23 +65,5 @@ class CarrierGeometry:
     @property
     def volume(self) -> float:
         """m³."""
-        plate, bolt = self._parts()
-        return plate + self.planets * bolt
-
-    @property
-    def centre_of_mass(self) -> float:
-        """z of the centre of mass, m. Equally spaced bolts leave it on the axis."""
-        plate, bolt = self._parts()
-        moment = plate * self.bore_centre[2] - self.planets * bolt * self.gap / 2
-        return moment / self.volume
-
-    @property
-    def polar_moment(self) -> float:
-        """∫ (x² + y²) dV about the axis, m⁵ (Steiner's theorem for the bolts)."""
-        plate, bolt = self._parts()
-        return plate * (self.r_o**2 + self.r_bore**2) / 2 + self.planets * bolt * (self.r_bolt**2 / 2 + self.a**2)
-
-    def _parts(self) -> tuple[float, float]:
-        """Volumes of the plate and of one bolt above it."""
         plate = math.pi * (self.r_o**2 - self.r_bore**2) * self.thickness
-        return plate, math.pi * self.r_bolt**2 * (self.gap + self.seat)
+        return plate + self.planets * math.pi * self.r_bolt**2 * (self.gap + self.seat)

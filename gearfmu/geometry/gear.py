@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import GAUSS, ReferenceGear
+from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.geometry.root import RackRounding
 
 _CLOSE = 3e-4  # of the base radius
@@ -117,50 +117,6 @@ class GearGeometry(ReferenceGear):
     def tip_edge_centre(self, sg: int = 1) -> np.ndarray:
         """Centre (2,) in m of the tip edge rounding."""
         return self.flank_point(self.s_tip, sg) - self.tip_edge * self.flank_normal(self.s_tip, sg)
-
-    def profile(self, points: int = 32) -> np.ndarray:
-        """Outline (P, 2) in m of tooth 0, counter-clockwise from mid space to mid space, tip edges sharp.
-
-        `points` on either flank and trochoid, a quarter of that on root land and half the tip land.
-        """
-        few = max(points // 4, 2)
-        rounding = self.rounding
-        land = self.half_pitch - rounding.land_angle * np.linspace(0, 1, few, endpoint=False)
-        tau = np.linspace(math.pi / 2, self.form_angle, points, endpoint=False)
-        roll = np.linspace(self.s_form, self.s_a, points, endpoint=False)
-        tip = self.tip_half_angle * np.linspace(1, 0, few)
-        root = self.r_f * np.stack([np.cos(land), np.sin(land)], axis=-1)
-        top = self.r_a * np.stack([np.cos(tip), np.sin(tip)], axis=-1)
-        half = np.concatenate([root, rounding.point(tau), self.flank_point(roll), top])
-        return np.concatenate([half * [1, -1], half[-2::-1]])
-
-    def radius_moment(self, power: int) -> float:
-        """∫ r^power dθ along the outline of one sector from space to space, tip edges sharp (m^power)."""
-        tip = self.tip_half_angle * self.r_a**power
-        land = self.rounding.land_angle * self.r_f**power
-        return 2 * (tip + land + self.flank_moment(power, self.s_form, self.s_a) + self._root_moment(power))
-
-    def _root_moment(self, power: int) -> float:
-        edges = np.linspace(self.form_angle, math.pi / 2, 5)
-        total = 0.0
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
-            tau = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
-            total += (
-                0.5
-                * (high - low)
-                * float(np.dot(GAUSS[1], self.rounding.polar(tau)[0] ** power * self.rounding.angle_slope(tau)))
-            )
-        return total
-
-    @property
-    def sector_area(self) -> float:
-        """Area (m²) of the cross-section of one tooth with half a space on either side, down to the bore."""
-        return 0.5 * self.radius_moment(2) - self.half_pitch * self.r_bore**2
-
-    @property
-    def sector_polar_moment(self) -> float:
-        """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
-        return 0.25 * self.radius_moment(4) - 0.5 * self.half_pitch * self.r_bore**4
 
 
 @lru_cache(maxsize=64)

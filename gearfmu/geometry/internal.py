@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import GAUSS, ReferenceGear
+from gearfmu.geometry.reference import ReferenceGear
 
 
 @dataclass(frozen=True)
@@ -105,32 +105,6 @@ class InternalGearGeometry(ReferenceGear):
     def fillet_length(self) -> float:
         """Length of one fillet, m."""
         return abs(self._fillet_turn) * self.fillet
-
-    @property
-    def sector_area(self) -> float:
-        """Area (m²) of the cross-section of one tooth with half a space on either side, up to the rim."""
-        return self.half_pitch * self.r_rim**2 - 0.5 * self._inner_moment(2)
-
-    @property
-    def sector_polar_moment(self) -> float:
-        """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
-        return 0.5 * self.half_pitch * self.r_rim**4 - 0.25 * self._inner_moment(4)
-
-    def _inner_moment(self, power: int) -> float:
-        """∫ r^power dθ along the inner outline of one sector, tip edges sharp (m^power)."""
-        land = self.fillet_centre[1] * self.r_f**power
-        tip = self.tip_half_angle * self.r_a**power
-        return 2 * (land + self._fillet_moment(power) + self.flank_moment(power, self.s_a, self.s_form) + tip)
-
-    def _fillet_moment(self, power: int) -> float:
-        """By the angle at the fillet's centre: dθ = (x dy − y dx)/r²."""
-        share = 0.5 * (1 + GAUSS[0])
-        point, turn = self.fillet_point(share), self._fillet_turn
-        radius, angle = self.fillet_centre
-        arm = (point - radius * np.array([math.cos(angle), math.sin(angle)])) * turn
-        square = (point**2).sum(axis=-1)
-        swept = (point[:, 0] * arm[:, 0] + point[:, 1] * arm[:, 1]) / square
-        return float(-0.5 * np.dot(GAUSS[1], square ** (power / 2) * swept))
 
 
 def _signed_root(radius: float, r_b: float) -> float:

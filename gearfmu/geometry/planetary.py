@@ -8,14 +8,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.pair import PairGeometry
 
-SAME_ANGLE = 1e-9  # rad
 HANDS = {"sun": 1, "planet": -1, "ring": -1}  # sign of the helix angle over that of the set
 MOUNTS = 6  # of a ring, where nothing says how many
 
@@ -165,28 +162,10 @@ class PlanetaryGeometry:
         """Speed of the sun over that of the carrier with the ring at rest, 1 + z_r/z_s."""
         return set_ratio(self.sun_mesh.gears[0].z, self.ring_mesh.ring.z)
 
-    def planet_centre(self, planet: int) -> np.ndarray:
-        """(2,) m, with the carrier at angle 0."""
-        angle = self.angles[planet]
-        return self.sun_mesh.a * np.array([math.cos(angle), math.sin(angle)])
-
     @property
     def neighbour_clearance(self) -> float:
         """Gap (m) between the tip circles of neighbouring planets; negative: they touch."""
         return 2 * self.sun_mesh.a * math.sin(least_apart(self.angles) / 2) - 2 * self.ring_mesh.planet.r_a
-
-    def sun_phase(self) -> float:
-        """Angle (rad, in (−π/z_s, π/z_s]) of the sun's tooth 0 from +x that centres it in the mesh with planet 0.
-
-        Planet 0 has tooth 0 on +x, so towards the sun, at angle π, it shows a tooth (z_p even) or a space (odd).
-        """
-        z_s, z_p = self.sun_mesh.gears[0].z, self.ring_mesh.planet.z
-        return math.pi / z_s if z_p % 2 == 0 else 0.0
-
-    def assembles(self) -> bool:
-        """Whether the planets fit: their angles are multiples of 2π/(z_s + z_r)."""
-        teeth = self.sun_mesh.gears[0].z + self.ring_mesh.ring.z
-        return all(abs(math.remainder(angle, 2 * math.pi / teeth)) < SAME_ANGLE for angle in self.angles)
 
 
 def set_ratio(sun: int, ring: int) -> float:

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
 
-GAUSS = np.polynomial.legendre.leggauss(40)
-
 
 @dataclass(frozen=True)
 class ReferenceGear:
@@ -87,10 +85,3 @@ class ReferenceGear:
     def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
         """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
         return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
-
-    def flank_moment(self, power: int, low: float, high: float) -> float:
-        """∫ r^power dθ (m^power) along a flank between two rolls (m), dθ = u²/(1+u²) du with u = s/r_b."""
-        low, high = low / self.r_b, high / self.r_b
-        u = 0.5 * (low + high) + 0.5 * (high - low) * GAUSS[0]
-        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
-        return float(0.5 * (high - low) * np.dot(GAUSS[1], values))

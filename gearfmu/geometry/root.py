@@ -58,19 +58,6 @@ class RackRounding:
         from_space = np.arctan2(across, up) + (centre - self.centre_depth * cot) / self.r
         return np.hypot(across, up), self.half_pitch - from_space
 
-    def angle_slope(self, tau: ArrayLike) -> np.ndarray:
-        """dθ/dτ of the trochoid (θ from the tooth's middle)."""
-        tau = np.asarray(tau, float)
-        sin, cos = np.sin(tau), np.cos(tau)
-        slant, more = self._slant(tau), self.stretch**2 - 1
-        radius = self.radius / slant
-        d_radius = radius * more * sin * cos / slant**2
-        across, up = radius * cos + self.centre_depth * cos / sin, self.r - self.centre_depth - radius * sin
-        d_across = -radius * sin - self.centre_depth / sin**2 + d_radius * cos
-        d_up = -radius * cos - d_radius * sin
-        turn = (self.centre_depth / sin**2 + more * (d_radius * cos - radius * sin)) / self.r
-        return -((d_across * up - across * d_up) / (across**2 + up**2) + turn)
-
     def _slant(self, tau: ArrayLike) -> np.ndarray:
         """√(k² cos² τ + sin² τ), k = stretch: the ellipse's point with the normal at τ is (k² cos τ, −sin τ) times
         radius over this."""

@@ -159,14 +159,6 @@ class Kernel:
         self._lib.gk_get(self._model, self._data, self._reference(name), ctypes.byref(value))
         return value.value
 
-    def set_reference(self, reference: int, value: float) -> int:
-        """Fast path: outcome number of gk_set."""
-        return self._lib.gk_set(self._model, self._data, reference, value)
-
-    def get_reference(self, reference: int, out: ctypes.c_double) -> int:
-        """Fast path: outcome number of gk_get, the value in `out`."""
-        return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
-
     def references(self, names: Iterable[str]) -> ctypes.Array:
         """Value references (c_uint32) of variables; ModelError for one that there is not."""
         known = list(map(self._reference, names))

@@ -40,26 +40,24 @@ class Signals:
 
 @dataclass(frozen=True)
 class Error:
-    """In budgets: bound, error over the whole window, and by output."""
+    """In budgets: bound, and error over the whole window."""
 
     bound: float
     whole: float
-    by_output: dict[str, float]
 
 
 def error(found: Signals, wanted: Signals, request: Request) -> Error:
     """How far `found` is from `wanted`; infinite where a run did not reach the end or is not finite."""
     sizes = {v.size for v in wanted.values.values()}
     if not found.values or {v.size for v in found.values.values()} != sizes:
-        return Error(FAILED, FAILED, dict.fromkeys(wanted.values, FAILED))
-    parts = [_errors(found.part(0, w), wanted.part(0, w), request) for w in NESTED]
-    each = [max(part.values()) for part in parts]
+        return Error(FAILED, FAILED)
+    each = [_worst(found.part(0, w), wanted.part(0, w), request) for w in NESTED]
     bound = each[-1] + 2.0 * float(np.std(each)) if np.all(np.isfinite(each)) else FAILED
-    return Error(bound, each[-1], parts[-1])
+    return Error(bound, each[-1])
 
 
-def _errors(found: Signals, wanted: Signals, request: Request) -> dict[str, float]:
-    return {o.name: _distance(found, wanted, o, request) for o in request.outputs}
+def _worst(found: Signals, wanted: Signals, request: Request) -> float:
+    return max(_distance(found, wanted, output, request) for output in request.outputs)
 
 
 def _distance(found: Signals, wanted: Signals, output: Output, request: Request) -> float:
@@ -114,7 +112,7 @@ def split_half_noise(wanted: Signals, request: Request) -> float:
     first, second = wanted.part(0, 0.5), wanted.part(0.5, 1.0)
     size = min(v.size for part in (first, second) for v in part.values.values())
     first, second = (Signals({k: v[:size] for k, v in p.values.items()}, p.interval) for p in (first, second))
-    return max(_errors(second, first, level).values())
+    return _worst(second, first, level)
 
 
 def silent_outputs(wanted: Signals, request: Request) -> list[str]:

@@ -31,7 +31,7 @@ def carrier_full_order(spec: Form, scale: float = 1.0) -> FullOrder:
     if carrier.part.imported is not None:
         return imported_carrier(spec).full
     sector = scaled_sector(carrier, scale)
-    full = full_order("carrier", *_whole_elements(carrier, sector), Judgement(("bore",), carrier.geometry.a))
+    full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.geometry.a))
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full
 
 
@@ -74,19 +74,14 @@ def cyclic_carrier(carrier: CarrierMember) -> bool:
     return even and len(kinds) == 1 and geometry.planets >= 3
 
 
-def carrier_elements(spec: Form, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
-    """Finite elements of the carrier as the file describes it, and the couplings of its bolts and bore."""
-    carrier = carrier_of(spec)
-    return _whole_elements(carrier, scaled_sector(carrier, scale))
-
-
 def scaled_sector(carrier: CarrierMember, scale: float) -> FeMesh:
     """One bolt's sector of a carrier meshed here. scale : factor on all element counts."""
     counts = carrier.part.mesh
     return carrier_sector(carrier.geometry, counts.model_copy(update={"scale": counts.scale * scale}))
 
 
-def _whole_elements(carrier: CarrierMember, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
+def carrier_elements(carrier: CarrierMember, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
+    """Finite elements of a carrier of these sectors, and the couplings of its bolts and bore."""
     geometry = carrier.geometry
     whole = whole_carrier(geometry, sector)
     body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, carrier.part.material))

@@ -20,7 +20,6 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from gearfmu.fem.factor import FactorError
-from gearfmu.fem.free import Balanced
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.repeated import Parts, RepeatedFactor
 from gearfmu.fem.solver import Solves, definite_factor, symmetric_factor
@@ -41,7 +40,7 @@ def elastic(body: FullOrder) -> Elastic:
     return _KNOWN[body]
 
 
-class Elastic(Balanced):
+class Elastic:
     """Operators of a body under its constraints; vectors are (N, k).
 
     rigid : (N, r) mass-normalised rigid modes that nothing holds. elastic : number of elastic degrees of freedom.
@@ -82,11 +81,20 @@ class Elastic(Balanced):
         gram = fields.T @ (self.mass_matrix @ fields)
         return sl.solve_triangular(np.linalg.cholesky(gram), fields.T, lower=True).T
 
+    def mass(self, vectors: np.ndarray) -> np.ndarray:
+        """M v."""
+        product: np.ndarray = self.mass_matrix @ vectors
+        return product
+
+    def balance(self, loads: np.ndarray) -> np.ndarray:
+        """Pᵀ f: loads together with the inertia forces of the rigid motion they cause."""
+        return loads - self._mass_rigid @ (self.rigid.T @ loads)
+
     def gauge(self, vectors: np.ndarray) -> np.ndarray:
         """P u: displacement without its rigid part and, against rounding, without what C would still see of it."""
         if self.constraints.shape[0]:
             vectors = vectors - self.constraints.T @ self._spread.solve(self.constraints @ vectors)
-        return super().gauge(vectors)
+        return vectors - self.rigid @ (self._mass_rigid.T @ vectors)
 
     @cached_property
     def _spread(self) -> _SmallSystem:

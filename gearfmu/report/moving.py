@@ -26,7 +26,7 @@ from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_p
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 
-FRAMES, CONTACTS, PITCHES = 160, 4, 8
+FRAMES, CONTACTS = 160, 4
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
 STEPS = 127  # of a displacement, in the page
 BOLT_TONE = 1.45  # brighter than the plate behind it

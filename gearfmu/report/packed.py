@@ -99,28 +99,3 @@ def reduced(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     starts = np.linspace(0, x.size, COLUMNS, endpoint=False).astype(int)
     ends = np.stack([np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)], axis=1)
     return np.repeat(x[starts], 2), ends.ravel()
-
-
-def unpacked(text: str) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """The structure and the arrays of a `Pack.text`, as the page's script reads them."""
-    data = gzip.decompress(base64.b64decode(text))
-    length = struct.unpack("<I", data[:4])[0]
-    content, block = json.loads(data[4 : 4 + length]), data[4 + length :]
-    return content, [_array(head, block) for head in content["arrays"]]
-
-
-def _array(head: dict[str, Any], block: bytes) -> np.ndarray:
-    n, kind = head["n"], head["kind"]
-    if kind == "even":
-        return np.asarray(head["start"] + head["step"] * np.arange(n))
-    at = block[head["at"] :]
-    if kind == "steps":
-        low, high = np.frombuffer(at, np.uint8, 2 * n).reshape(2, n).astype(np.uint16)
-        steps = np.cumsum(low + 256 * high, dtype=np.uint16)
-        values = head["low"] + steps / LEVELS * (head["high"] - head["low"])
-        return np.where(steps == MISSING, np.nan, values)
-    if kind == "u1":
-        steps = np.frombuffer(at, np.uint8, n)
-        values = head["low"] + steps / BYTE_LEVELS * (head["high"] - head["low"])
-        return np.where(steps == BYTE_MISSING, np.nan, values).reshape(-1, head["columns"])
-    return np.frombuffer(at, f"<{kind}", n)

@@ -52,28 +52,10 @@ def stage_class(tables: Mapping[str, Any]) -> type[Spec]:
     return kinds.get(tables.get("kind"), StageSpec)
 
 
-def load_pair(stage: str | os.PathLike[str]) -> StageSpec:
-    """`load_stage` where only a pair will do; SpecError for any other stage."""
-    spec = load_stage(stage)
-    require_pair(spec)
-    return spec
-
-
-def load_set(stage: str | os.PathLike[str]) -> PlanetarySpec:
-    """`load_stage` where only a planetary set will do; SpecError for any other stage."""
-    spec = load_stage(stage)
-    _require(spec, "planetary_set", "a planetary set", "planetary54")
-    return spec
-
-
 def require_pair(spec: Any) -> None:
     """SpecError unless `spec` is a pair: a verb about one pair, or its gears' files, means nothing else."""
-    _require(spec, "external_pair", "one pair", "fzg_c")
-
-
-def _require(spec: Any, kind: str, what: str, example: str) -> None:
-    if spec.kind != kind:
-        remedy = f"this is about {what}: name a stage of kind {kind}, such as {example}"
+    if spec.kind != "external_pair":
+        remedy = "this is about one pair: name a stage of kind external_pair, such as fzg_c"
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
 
 

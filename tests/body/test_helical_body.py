@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from verbs import call
 
-from gearfmu import cli
 from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies
 from gearfmu.body.layout import GROUPS, entries_of
 from gearfmu.body.parts import drawn_counts, kept_offsets
@@ -120,27 +120,20 @@ def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:
             assert abs(np.angle(turn)) < 1e-3 * body.teeth * pitch
 
 
-def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    code = cli.outcome([str(a) for a in arguments])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
-def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path: Path, capsys) -> None:
-    code, out, _ = call("mesh", made.path, "--gear", "wheel", "--out", tmp_path, capsys=capsys)
+def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path: Path) -> None:
+    code, out, _ = call("mesh", made.path, "--gear", "wheel", "--out", tmp_path)
     assert code == 0 and "scaled_jacobian_min" in out
-    code, out, _ = call("reduce", made.path, capsys=capsys)
+    code, out, _ = call("reduce", made.path)
     assert code == 0 and "0 bodies reduced, 2 read" in out
-    code, out, _ = call("inspect", body_path(made.spec, "wheel"), "--json", capsys=capsys)
+    code, out, _ = call("inspect", body_path(made.spec, "wheel"), "--json")
     assert code == 0 and json.loads(out)["facts"]["base_helix_angle_deg"] == pytest.approx(-18.7472, abs=1e-3)
-    code, out, _ = call("inspect", made.path, "--json", capsys=capsys)
+    code, out, _ = call("inspect", made.path, "--json")
     derived = json.loads(out)["derived"]
     assert code == 0 and derived["overlap_ratio"] == pytest.approx(1.016, abs=1e-3)
     assert derived["total_contact_ratio"] == pytest.approx(derived["contact_ratio"] + derived["overlap_ratio"])
-    code, out, _ = call("modes", made.path, "--body", "pinion", "--count", 4, "--out", tmp_path, capsys=capsys)
+    code, out, _ = call("modes", made.path, "--body", "pinion", "--count", 4, "--out", tmp_path)
     assert code == 0 and "torsion" in out or "lobes" in out
     code, out, _ = call(
         "frf", made.path, "pinion", "--methods", "modal", "--size", 20, "--lines", 8, "--scale", 0.5, "--out", tmp_path,
-        capsys=capsys,
     )  # fmt: skip
     assert code == 0 and "modal" in out

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gearfmu.cosim.accuracy import Distance, Window, coupling_errors, distance, rms
+from evidence.accuracy.coupling import Distance, distance
+from gearfmu.cosim.accuracy import Window, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model

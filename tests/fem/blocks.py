@@ -6,10 +6,20 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearfmu.fem import hex20
+from gearfmu.fem.coupling import rigid_modes
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.full_order import FullOrder
 
 STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
+
+
+def free_body(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray, cells: np.ndarray) -> Elastic:
+    """A body that nothing holds, without any symmetry, from its matrices."""
+    of_dof = np.repeat(np.arange(len(nodes)), 3)
+    return Elastic(FullOrder("body", stiffness, mass, rigid_modes(nodes), (), (), 1.0, cells, of_dof))
 
 
 def grid_mesh(cells: tuple[int, int, int], mapping: Callable[[np.ndarray], np.ndarray]):

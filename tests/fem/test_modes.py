@@ -8,20 +8,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from blocks import STEEL, box, grid_mesh, ring, ring_sector
+from blocks import STEEL, box, free_body, grid_mesh, ring, ring_sector
 from scipy.optimize import brentq
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces
-from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "nafems_ring_test6.json").read_text())
 
 
-def free_body(nodes, elements, material=STEEL) -> FreeBody:
-    return FreeBody(*hex20.assemble(nodes, elements, material), nodes, elements)
+def whole_body(nodes, elements, material=STEEL):
+    return free_body(*hex20.assemble(nodes, elements, material), nodes, elements)
 
 
 def frequencies(body, count: int) -> np.ndarray:
@@ -31,7 +30,7 @@ def frequencies(body, count: int) -> np.ndarray:
 def axial_eigenvalue(cells: int, length: float) -> float:
     """ω² of the first axial mode of a free bar, found by its shape."""
     nodes, elements = box((cells, 1, 1), (length, 0.3, 0.3))
-    body = free_body(nodes, elements, SimpleNamespace(youngs_modulus=4.0, poisson_ratio=0.0, density=1.0))
+    body = whole_body(nodes, elements, SimpleNamespace(youngs_modulus=4.0, poisson_ratio=0.0, density=1.0))
     squared, shapes = lowest_modes(body, 12)
     axial = np.zeros((len(nodes), 3))
     axial[:, 0] = np.sin(np.pi * nodes[:, 0] / length)
@@ -79,14 +78,14 @@ def _free_determinant(omega: float, length: float, beam) -> float:
 
 @pytest.mark.parametrize(("length", "cells", "tolerance"), [(0.1, 10, 2e-3), (0.6, 24, 5e-4)])
 def test_free_beam_bends_as_timoshenko_says(length, cells, tolerance):
-    body = free_body(*box((cells, 2, 2), (length, 0.01, 0.01)))
+    body = whole_body(*box((cells, 2, 2), (length, 0.01, 0.01)))
     first = frequencies(body, 2)
     exact = timoshenko_free(length, 0.01, STEEL)
     assert np.allclose(first, exact, rtol=tolerance)
 
 
 def test_slender_free_beam_reaches_the_euler_limit():
-    body = free_body(*box((24, 1, 1), (1.0, 0.005, 0.005)))
+    body = whole_body(*box((24, 1, 1), (1.0, 0.005, 0.005)))
     euler = 4.730040744862704**2 / (2 * np.pi) * np.sqrt(206e9 * 0.005**2 / 12 / 7850)
     assert np.allclose(frequencies(body, 2), euler, rtol=1e-3)
 
@@ -126,7 +125,7 @@ def test_one_sector_gives_the_modes_of_the_whole_ring():
     for space in sector_spaces(sector):
         for nu in range(teeth // 2 + 1):
             cyclic += list(frequencies(space.harmonic(nu), 8)) * (1 if nu == 0 else 2)
-    whole = frequencies(free_body(*ring((2, 2 * teeth, 2), 0.02, 0.06, 0.02)), 30)
+    whole = frequencies(whole_body(*ring((2, 2 * teeth, 2), 0.02, 0.06, 0.02)), 30)
     assert np.allclose(np.sort(cyclic)[:30], whole, rtol=1e-9)
 
 
@@ -153,7 +152,7 @@ def test_cuts_that_do_not_match_are_refused():
 
 def test_inertia_relief_is_a_projection_and_leaves_no_rigid_motion():
     nodes, elements = ring((1, 8, 2), 0.02, 0.06, 0.02)
-    body = free_body(nodes, elements)
+    body = whole_body(nodes, elements)
     assert np.allclose(body.rigid.T @ body.mass(body.rigid), np.eye(6), atol=1e-12)
     loads = np.random.default_rng(2).standard_normal((body.size, 4))
     once = body.balance(loads)
@@ -168,7 +167,7 @@ def test_inertia_relief_is_a_projection_and_leaves_no_rigid_motion():
 
 def test_all_modes_of_a_small_body_add_up_to_its_flexibility():
     nodes, elements = box((2, 1, 1), (0.2, 0.1, 0.1))
-    body = free_body(nodes, elements)
+    body = whole_body(nodes, elements)
     squared, shapes = lowest_modes(body, 10**6)
     assert len(squared) == body.elastic
     loads = np.random.default_rng(3).standard_normal((body.size, 3))

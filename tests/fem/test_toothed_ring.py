@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blocks import STEEL
 from blocks import ring_sector as smooth_sector
+from sections import section
 
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces
@@ -36,7 +37,7 @@ def bending(mesh, nodal_diameter: int) -> np.ndarray:
 def difference(z: int, module: float, nodal_diameter: int) -> np.ndarray:
     """Relative differences (2,) to the smooth ring of the same volume and outer radius."""
     shape = toothed(z, module)
-    inner = math.sqrt(RIM**2 - z * shape.sector_area / math.pi)
+    inner = math.sqrt(RIM**2 - z * section(shape)[0] / math.pi)
     mesh = ring_sector(shape, WIDTH, MeshSpec(flank=3, thickness=1, root=2, rim=3, width=2))
     smooth = smooth_sector((4, 2, 2), inner, RIM, WIDTH, 30)
     return bending(mesh, nodal_diameter) / bending(smooth, nodal_diameter) - 1

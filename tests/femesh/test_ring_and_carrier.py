@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
+from sections import carrier_moments, section
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, surface
@@ -47,7 +48,7 @@ def carrier() -> FeMesh:
 
 def test_volume_of_the_ring_converges_to_the_analytic_one():
     errors = [
-        volume(ring_sector(RING, WIDTH, COUNTS.model_copy(update={"scale": s}))) / (RING.sector_area * WIDTH) - 1
+        volume(ring_sector(RING, WIDTH, COUNTS.model_copy(update={"scale": s}))) / (section(RING)[0] * WIDTH) - 1
         for s in (1, 2)
     ]
     assert abs(errors[0]) < 2e-5 and abs(errors[1]) < abs(errors[0]) / 4
@@ -87,15 +88,15 @@ def test_whole_ring_joins_its_sectors(ring):
 
 def test_inertia_of_ring_and_carrier_is_the_analytic_one(carrier):
     """Consistent mass with density 1: mass = volume, polar inertia = polar moment, carrier's centre of mass."""
-    shapes = ((carrier, CARRIER.volume, CARRIER.polar_moment), (None, RING.z * RING.sector_area * WIDTH, 0.0))
-    for mesh, size, polar in shapes:
+    (middle, about), (area, polar) = carrier_moments(CARRIER), section(RING)
+    shapes = ((carrier, CARRIER.volume, about, middle), (None, RING.z * area * WIDTH, RING.z * polar * WIDTH, 0.0))
+    for mesh, size, inertia, centre in shapes:
         sector = mesh or ring_sector(RING, WIDTH, COUNTS.model_copy(update={"width": 1}))
         fields = rigid_modes(sector.nodes)
         mass = fields.T @ (hex20.assemble(sector.nodes, sector.elements, UNIT)[1] @ fields)
         assert sector.teeth * mass[0, 0] == pytest.approx(size, rel=1e-4)
-        assert sector.teeth * mass[5, 5] == pytest.approx(polar or RING.z * RING.sector_polar_moment * WIDTH, rel=1e-4)
-        centre = mass[0, 4] / mass[0, 0]
-        assert centre == pytest.approx(CARRIER.centre_of_mass if mesh else 0.0, rel=1e-4, abs=1e-12)
+        assert sector.teeth * mass[5, 5] == pytest.approx(inertia, rel=1e-4)
+        assert mass[0, 4] / mass[0, 0] == pytest.approx(centre, rel=1e-4, abs=1e-12)
 
 
 def test_carrier_elements_are_good_cuts_match_and_sets_are_the_seats(carrier):
@@ -168,5 +169,5 @@ def test_many_rings_mesh_well(z, x, tip, fillet, rim, scale):
         return
     mesh = ring_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
     assert scaled_jacobian(mesh).min() > 0.35
-    assert volume(mesh) == pytest.approx(ring.sector_area * 5 * m, rel=5e-4)
+    assert volume(mesh) == pytest.approx(section(ring)[0] * 5 * m, rel=5e-4)
     assert cut_gap(mesh) < 1e-12 * r + 1e-15

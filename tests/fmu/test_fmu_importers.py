@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import read_model_description
+from fmpy import read_model_description, simulate_fmu
 
+import gearfmu as gf
 from evidence.fmu_probes.probes import Subject
 
 STEPS, H = 200, 1e-4
@@ -96,6 +97,26 @@ def test_ecos_gives_the_numbers_of_fmpy(native, unpacked):
     expected = held_run(unpacked, inputs, names)
     rows = np.array(json.loads(done.stdout.splitlines()[-1]))
     assert (np.abs(rows - expected) / np.abs(expected).max(axis=0)).max() <= 1e-12
+
+
+@pytest.mark.needs("fmu_manipulation_toolbox")
+def test_a_container_makes_an_fmi_3_unit_with_the_same_bits(tmp_path):
+    """All outputs of a run under a ramp of torque."""
+    model = gf.assemble("fzg_c", ports={"pinion": "torque", "wheel": "fixed"})
+    gf.export(model, tmp_path / "pair.fmu", level="fast")
+    (tmp_path / "pair3.csv").write_text("rule;from_fmu;from_port;to_fmu;to_port\nFMU;pair.fmu;;;\n")
+    tool = [sys.executable, "-m", "fmu_manipulation_toolbox.cli.fmucontainer"]
+    subprocess.run([*tool, "-container", f"pair3.csv:{H}", "-fmi", "3"], cwd=tmp_path, check=True, capture_output=True)
+    three = read_model_description(tmp_path / "pair3.fmu")
+    names = sorted(v.name for v in three.modelVariables if v.causality == "output")
+    assert three.fmiVersion == "3.0" and {"mesh.force", "mesh.te", "bearing.wheel.fx"} <= set(names)
+    time = np.arange(101) * H
+    torque = np.array(list(zip(time, 3e4 * time, strict=True)), dtype=[("time", float), ("pinion.tau", float)])
+    two, container = (
+        simulate_fmu(str(tmp_path / f), stop_time=100 * H, step_size=H, output_interval=H, input=torque, output=names)
+        for f in ("pair.fmu", "pair3.fmu")
+    )
+    assert two["mesh.force"][-1] > 1000 and two.tobytes() == container.tobytes()
 
 
 def inputs_at(time: float) -> dict[str, float]:

@@ -15,6 +15,7 @@ from small_stage import unpack
 
 from evidence.fmu_probes.everything import findings
 from evidence.fmu_probes.probes import Subject
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export
 from gearfmu.kernel.build import host_platform
@@ -72,3 +73,16 @@ def test_the_sources_make_the_binary(with_sources, tmp_path):
     shutil.move(built, apart / binary.relative_to(folder))
     assert Subject(str(apart)).initialized().run(100) == shipped
     assert re.search(rb"GCC: ", (apart / binary.relative_to(folder)).read_bytes())
+
+
+@pytest.mark.full
+@pytest.mark.needs("gcc")
+def test_sources_export_their_interface_alone_whatever_the_flags(with_sources, tmp_path):
+    """Two such FMUs in one host do not meet in each other's functions: no flag of ours, not even hidden visibility."""
+    folder = Path(unpack(with_sources, tmp_path))
+    code = folder / "sources"
+    files = etree.parse(code / "buildDescription.xml").xpath("//SourceFile/@name")
+    command = ["gcc", "-shared", "-fPIC", "-O0", f"-I{code}", "-o", "plain.so", *(str(code / name) for name in files)]
+    subprocess.run([*command, "-lm"], check=True, cwd=tmp_path)
+    binary = next((folder / "binaries" / host_platform()).glob("*.so"))
+    assert exported_symbols(tmp_path / "plain.so") == exported_symbols(binary)

@@ -12,15 +12,6 @@ from fzg import ALPHA, MODULE, PINION, WHEEL, gear
 from gearfmu.geometry import GearGeometry, involute
 
 
-def polygon_moments(points: np.ndarray) -> tuple[float, float]:
-    """Area and polar moment about the origin of a polygon (closed through the origin)."""
-    x, y = np.vstack([points, [0, 0]]).T
-    x1, y1 = np.roll(x, -1), np.roll(y, -1)
-    cross = x * y1 - x1 * y
-    polar = cross * (x * x + x * x1 + x1 * x1 + y * y + y * y1 + y1 * y1)
-    return float(cross.sum() / 2), float(polar.sum() / 12)
-
-
 def test_fzg_diameters_by_hand() -> None:
     assert 2 * PINION.r == pytest.approx(72e-3)
     assert 2 * PINION.r_b == pytest.approx(67.65787e-3, abs=1e-8)  # 72 cos 20°
@@ -62,20 +53,6 @@ class TestRoot:
         centres = np.hypot(across, up)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         for point in rack.point(np.linspace(shape.alpha, math.pi / 2, 9)):
             assert np.linalg.norm(centres - point, axis=1).min() == pytest.approx(rack.radius, rel=2e-6)
-
-
-@pytest.mark.parametrize("shape", [PINION, WHEEL, gear(80, -0.3, 369e-3, 100e-3)])
-def test_cross_section_against_polygons(shape) -> None:
-    """The outline's polygon converges to the closed integrals with the second order of chords."""
-    errors = []
-    for points in (200, 400):
-        area, polar = polygon_moments(shape.profile(points))
-        area -= shape.half_pitch * shape.r_bore**2
-        polar -= 0.5 * shape.half_pitch * shape.r_bore**4
-        errors.append((abs(area / shape.sector_area - 1), abs(polar / shape.sector_polar_moment - 1)))
-    assert max(errors[1]) < 1e-6
-    rates = np.log2(np.array(errors[0]) / np.array(errors[1]))
-    assert rates == pytest.approx(2, abs=0.15)
 
 
 def test_tip_edge_rounding_touches_flank_and_tip_circle() -> None:

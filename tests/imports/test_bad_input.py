@@ -9,18 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from blocks import free_body
 from decks import STEEL, brick, write_deck
 from gears import hex20_deck, pinion, stage
 
 from gearfmu.body import reduce_bodies
 from gearfmu.errors import GearfmuError, MeshError, SpecError
 from gearfmu.fem import solids
-from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.factor import FactorError
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction import memory
-from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.gear import hinge_problem
 from gearfmu.spec.stage import load_stage
 
@@ -232,20 +230,15 @@ def test_bad_matrices_are_refused(tmp_path: Path, matrices, spoil) -> None:
     assert re.search(wanted, text), text
 
 
-def free_body(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray, cells: np.ndarray) -> FullOrder:
-    of_dof = np.repeat(np.arange(len(nodes)), 3)
-    return FullOrder("brick", stiffness, mass, rigid_modes(nodes), (), (), 1.0, cells, of_dof)
-
-
 def test_a_body_that_is_no_solid_is_told_by_its_first_frequency() -> None:
     """A brick is sound; without the stiffness of one corner element a node flies away, though rigid motion needs no
     force."""
     nodes, cells = brick("hexahedron20", (4, 1, 1))
     sound, mass = solids.assemble(MM * nodes, {"hexahedron20": cells}, STEEL)
-    space = Elastic(free_body(sound, mass, MM * nodes, cells))
+    space = free_body(sound, mass, MM * nodes, cells)
     assert hinge_problem(space, float(space.modes(1)[0][0])) is None
     loose = solids.assemble(MM * nodes, {"hexahedron20": cells[1:]}, STEEL)[0]
-    space = Elastic(free_body(loose, mass, MM * nodes, cells))
+    space = free_body(loose, mass, MM * nodes, cells)
     try:
         told = hinge_problem(space, float(space.modes(1)[0][0]))
     except FactorError as error:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blocks import free_body
 from decks import STEEL, brick, write_deck
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, solids
-from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction.elastic import Elastic
@@ -21,7 +21,7 @@ MM = 1e-3
 
 def frequencies(nodes, elements, stiffness, mass, count=6) -> np.ndarray:
     cells = np.concatenate([np.pad(b, ((0, 0), (0, 20 - b.shape[1])), constant_values=-1) for b in elements.values()])
-    squared, _ = lowest_modes(FreeBody(stiffness, mass, nodes, cells), count)
+    squared, _ = lowest_modes(free_body(stiffness, mass, nodes, cells), count)
     return np.sqrt(squared) / (2 * np.pi)
 
 

@@ -1,6 +1,8 @@
 /* Opens inner functions of the kernel to tests: places of contact with gap and gradient, the local law. Compiled
  * together with gearfmu/kernel/src. */
+#include "integrate/gk_closed.h"
 #include "integrate/gk_integrate.h"
+#include "setup/gk_oscillator.h"
 
 /* planar: x, y, φ of both gears; out: per place {flank, tooth, gap, gradient[6], roll A, roll B, curvature} */
 GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *planar, double reach, double *out)
@@ -93,10 +95,21 @@ GK_API void probe_spread(const gk_model *model, const gk_setup *setup, const dou
     gk_strips_spread(setup, &model->engagement[0], end, force, out);
 }
 
+/* μ′: least for which the limit holds */
 GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
                        double gamma)
 {
-    return gk_limit_mu(model, setup, work, data, h, gamma);
+    const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
+    double low = 0.0, high = 16.0;
+    gk_closed_keep(model, setup, work, data);
+    for (int i = 0; i < 30; i++) {
+        const double middle = 0.5 * (low + high);
+        if (middle > 0.0 && gk_closed_holds(model, setup, work, data, k, middle))
+            high = middle;
+        else
+            low = middle;
+    }
+    return high;
 }
 
 /* a prepared setup keeps this γ, whatever its limit is */
@@ -138,4 +151,15 @@ GK_API void probe_runout(const gk_model *model, const gk_setup *setup, double *p
     double turn[POSE];
     gk_runout_move(model, setup, &model->engagement[0], pose, turn);
     gk_runout_follow(turn, motion);
+}
+
+/* pace (3): h, γ, matched Ω; out: flow (4), bq, bv, κ, weight of the energy, unit, lead and hold of the speed, κ of a
+ * free mass */
+GK_API void probe_oscillator(const double *pace, double omega, double zeta, double *out)
+{
+    const gk_pace of = {pace[0], pace[1], pace[2]};
+    const gk_oscillator o = gk_oscillator_of(&of, omega, zeta);
+    const double all[] = {o.a11,   o.a12,        o.a21,  o.a22,  o.bq,   o.bv,
+                          o.kappa, o.inverse_s2, o.unit, o.lead, o.hold, gk_oscillator_free_kappa(&of)};
+    memcpy(out, all, sizeof all);
 }

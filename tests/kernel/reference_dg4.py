@@ -5,11 +5,11 @@ Written from the formulas of the theory page alone, not from the C kernel, so th
 The problem. Modes q_k with unit mass, q̈ + 2ζωq̇ + ω²q = F + Wᵀλ (ω = 0: rigid), unknown forces λ and their gaps
 G = offset + W q + C λ. A contact has 0 ≤ λ ⊥ G ≥ 0, a bilateral row G = 0. C is the compliance of what has no mass.
 
-The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η);
-modes answer exactly (ωh < 1.2) or by the trapezoidal rule.
-With σ = sin(ωh)/(ωh), p = min(1, 2γ), rows scaled by σ^(−p/2) and the compliance C′ = C − W κ Wᵀ, κ = (1 − σ^p)/ω²
-(rigid: ph²/6), closed contact is of 4th order for γ = 1 (Fox and Goodwin's rule for rigid modes) and of 2nd for γ = 0
-(`em`). γ between ½ and 1 makes modes trapezoidal from ωh = 1.2γ on. Exponential modes are damped by ζσ^p.
+The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η): impulses h f at the ends of steps. With E the exact flow
+of a mode, its state is ρ times the exact response to them at the middle of an impulse. ρ and κ, the compliance that is
+taken off at once, make the response exact at rest and, matched at rest (no mesh mode is known here), up to Ω². γ < ½
+goes back to κ = 0 (`em`). Modes too fast for the step yield a share θ at once (κ = −θ/ω²), the rest by the trapezoidal
+rule with a step h √(1 − θ). 1 > γ > ¾ raises θ from .7 to .95, ¾ > γ > ½ halves the limit of ωh.
 η, along one direction
 and of one scalar, makes the work of a step in which a contact opens or closes equal to the change of ½ λᵀC′λ (a
 discrete
@@ -21,8 +21,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import expm
 
-EXPONENTIAL_LIMIT = 1.2
+EXPONENTIAL_LIMIT, LIMIT_OF_HIGH, HIGH = 1.6, 1.2, 2 * np.pi * 30e3  # ωh; of modes above HIGH, rad/s
+SHARE, RAISED, WHOLE = 0.7, 0.95, 3.0  # θ at γ = 1 and below ¾, from ωh = WHOLE on
 MEMORY = 0.25  # of a dashpot's force at the end of a step
 ROUNDS = 12
 
@@ -71,20 +73,25 @@ class Scheme:
     tolerance: float = 1e-9
 
     @property
-    def power(self) -> float:
-        """Of σ in the corrections."""
+    def correction(self) -> float:
+        """Share of κ that is left."""
         return min(1.0, 2.0 * self.gamma)
 
-    @property
-    def exponential_below(self) -> float:
-        """Modes with ωh below it answer exactly."""
-        return EXPONENTIAL_LIMIT * max(self.gamma, 0.5)
+    def exponential(self, omega: float) -> bool:
+        """Whether a mode answers exactly."""
+        part = 0.5 + 0.5 * np.clip(4 * self.gamma - 2, 0, 1)
+        return omega * self.h < part * (EXPONENTIAL_LIMIT if omega < HIGH else LIMIT_OF_HIGH)
+
+    def share(self, omega: float) -> float:
+        """θ of a mode that does not."""
+        most = RAISED + (SHARE - RAISED) * np.clip(4 * self.gamma - 3, 0, 1)
+        return float(most * np.clip((omega * self.h - EXPONENTIAL_LIMIT) / (WHOLE - EXPONENTIAL_LIMIT), 0, 1))
 
 
 @dataclass
 class State:
-    """y, v (n,): scaled modal state · f (n,): scaled modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta, dash (m,):
-    η of the last step, the dashpots' part of it, and their force at its end."""
+    """y, v (n,): modal state, y = displacement + κ f · f (n,): modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta,
+    dash (m,): η of the last step, the dashpots' part of it, and their force at its end."""
 
     y: np.ndarray
     v: np.ndarray
@@ -172,9 +179,8 @@ class Reference:
 
     def __init__(self, problem: Problem, scheme: Scheme) -> None:
         self.problem, self.scheme = problem, scheme
-        self.scale, self.kappa = _corrections(problem.omega, scheme)
-        self.flow, self.bq, self.bv = _flow(problem, scheme)
-        self.w = problem.rows * self.scale
+        self.flow, self.bq, self.bv, self.kappa, self.weight = _modes(problem, scheme)
+        self.w = problem.rows
         self.d = (self.w * self.bq) @ self.w.T
         self.c = problem.compliance - (self.w * self.kappa) @ self.w.T
         self.a = self.c - problem.path
@@ -191,19 +197,16 @@ class Reference:
         p = self.problem
         gap = p.offset + p.rows @ q
         force, _ = solve_lcp(p.compliance, gap, p.bilateral, gap < 0)
-        f = self.scale * (external + p.rows.T @ force)
-        y = q / self.scale + self.kappa * f
+        f = external + p.rows.T @ force
+        y = q + self.kappa * f
         at_gap = self._gap(y, external)
         closed = (force > 0) | p.bilateral
-        return State(
-            y, v / self.scale, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force)))
-        )
+        return State(y, v, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force))))
 
     def step(self, state: State, external: np.ndarray) -> State:
-        """The state h later; `external` (n,): unscaled external modal forces at the end of the step."""
-        outer = self.scale * external
+        """The state h later; `external` (n,): external modal forces at the end of the step."""
         (a11, a12), (a21, a22) = self.flow
-        f = state.f + outer
+        f = state.f + external
         y = a11 * state.y + a12 * state.v + self.bq * f
         v = a21 * state.y + a22 * state.v + self.bv * f
         gap = self._gap(y, external)
@@ -211,25 +214,25 @@ class Reference:
         y = y + self.bq * (self.w.T @ (force + eta))
         v = v + self.bv * (self.w.T @ (force + eta))
         reached = gap + self.d @ (force + eta) + self.c @ force + self.a @ late
-        return State(y, v, outer + self.w.T @ force, force, reached, eta, dash, late)
+        return State(y, v, external + self.w.T @ force, force, reached, eta, dash, late)
 
     def energy(self, state: State) -> float:
-        """The invariant of the undamped step without external work: ½v² + ½ω²y² + ½λᵀC′λ, J, and what the dashpots'
-        force holds in the compliance outside their paths."""
-        modal = 0.5 * state.v @ state.v + 0.5 * (self.problem.omega * state.y) @ (self.problem.omega * state.y)
+        """The invariant of the undamped step without external work: Σ weight (½v² + ½ω²y²) + ½λᵀC′λ, J, and
+        what the dashpots' force holds in the compliance outside their paths."""
+        modal = 0.5 * self.weight @ (state.v**2 + (self.problem.omega * state.y) ** 2)
         held = self.a @ state.late @ (state.force + 0.5 * state.late)
         return float(modal + 0.5 * state.force @ self.c @ state.force + held)
 
     def displacement(self, state: State) -> np.ndarray:
         """Physical modal displacements (n,)."""
-        return self.scale * (state.y - self.kappa * state.f)
+        return state.y - self.kappa * state.f
 
     def velocity(self, state: State) -> np.ndarray:
         """Physical modal velocities (n,); of second order where the force changes."""
-        return self.scale * state.v
+        return state.v
 
     def _gap(self, y: np.ndarray, external: np.ndarray) -> np.ndarray:
-        return self.problem.offset + self.w @ (y - self.kappa * self.scale * external)
+        return self.problem.offset + self.w @ (y - self.kappa * external)
 
     def _forces(self, gap: np.ndarray, state: State) -> tuple[np.ndarray, ...]:
         """λ₁, η, η_d and the dashpots' force at the end: complementarity, then energy where a contact changed, or
@@ -331,32 +334,39 @@ class Reference:
         return solved, alpha * direction
 
 
-def _corrections(omega: np.ndarray, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
-    """Scale s of the rows and correction κ of the compliance, per mode."""
-    x = omega * scheme.h
-    exact = (x < scheme.exponential_below) & (omega > 0)
-    sigma = np.sinc(np.where(exact, x, 0.0) / np.pi) ** scheme.power
-    kappa = np.where(exact, (1 - sigma) / np.where(exact, omega, 1.0) ** 2, 0.0)
-    kappa[omega == 0] = scheme.power * scheme.h**2 / 6
-    return sigma**-0.5, kappa
+def _modes(problem: Problem, scheme: Scheme) -> tuple[np.ndarray, ...]:
+    """Flow (2, 2, n), force coefficients bq, bv (n,), equal for both ends of the step, κ (n,) and weight of the energy
+    (n,)."""
+    flow, rest = np.empty((2, 2, len(problem.omega))), np.empty((4, len(problem.omega)))
+    for k, (w, z) in enumerate(zip(problem.omega, problem.zeta, strict=True)):
+        mode = _free if w == 0 else _exponential if scheme.exponential(w) else _fast
+        flow[:, :, k], *rest[:, k] = mode(scheme, w, z)
+    return flow, *rest
 
 
-def _flow(problem: Problem, scheme: Scheme) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Flow (2, 2, n) and force coefficients bq, bv (n,), equal for both ends of the step."""
-    omega, zeta, h = problem.omega, problem.zeta, scheme.h
-    flow, bq, bv = np.empty((2, 2, len(omega))), np.empty(len(omega)), np.empty(len(omega))
-    for k, (w, z) in enumerate(zip(omega, zeta, strict=True)):
-        if w == 0:
-            flow[:, :, k], bq[k], bv[k] = [[1, h], [0, 1]], h * h / 4, h / 2
-        elif w * h < scheme.exponential_below:
-            z *= np.sinc(w * h / np.pi) ** scheme.power
-            wd, decay = w * np.sqrt(1 - z * z), np.exp(-z * w * h)
-            cosine, sine = decay * np.cos(wd * h), decay * np.sin(wd * h) / wd
-            flow[:, :, k] = [[cosine + z * w * sine, sine], [-w * w * sine, cosine - z * w * sine]]
-            bq[k], bv[k] = (1 - flow[0, 0, k]) / (2 * w * w), sine / 2
-        else:
-            c = 2 * z * w
-            left = np.array([[1, -h / 2], [w * w * h / 2, 1 + c * h / 2]])
-            flow[:, :, k] = np.linalg.solve(left, [[1, h / 2], [-w * w * h / 2, 1 - c * h / 2]])
-            bq[k], bv[k] = np.linalg.solve(left, [0, h / 2])
-    return flow, bq, bv
+def _free(scheme: Scheme, _: float, __: float) -> tuple[np.ndarray, float, float, float, float]:
+    h = scheme.h
+    return np.array([[1, h], [0, 1]]), h * h / 4, h / 2, scheme.correction * h * h / 6, 1.0
+
+
+def _exponential(scheme: Scheme, w: float, z: float) -> tuple[np.ndarray, float, float, float, float]:
+    """H and H_imp at rest and their slopes by Ω² there are what ρ makes equal."""
+    h, one, b = scheme.h, np.eye(2), np.array([0.0, 1.0])
+    flow = expm(np.array([[0, 1], [-w * w, -2 * z * w]]) * h)
+    of_moment = 0.5 * h * np.linalg.solve(flow + one, (flow - one) @ b)
+    at_rest = h * np.linalg.solve(one - flow, flow @ b)[0]
+    matched = (w * h) ** -4 * 16 * np.sin(w * h / 2) ** 4 / np.sinc(w * h / np.pi)
+    static = 1 / (w * w * (of_moment[0] + at_rest))
+    rho = matched**scheme.correction * static ** (1 - scheme.correction)
+    kappa = rho * (of_moment[0] + at_rest) - 1 / (w * w)
+    return flow, rho * of_moment[0], rho * (h / 2 + of_moment[1]), kappa, np.sinc(w * h / np.pi) / rho
+
+
+def _fast(scheme: Scheme, w: float, z: float) -> tuple[np.ndarray, float, float, float, float]:
+    theta = scheme.share(w)
+    longer = np.sqrt(1 - theta)
+    h, c = longer * scheme.h, 2 * z * w * longer / (1 - theta)
+    left = np.array([[1, -h / 2], [w * w * h / 2, 1 + c * h / 2]])
+    flow = np.linalg.solve(left, [[1, h / 2], [-w * w * h / 2, 1 - c * h / 2]])
+    bq, bv = (1 - theta) * np.linalg.solve(left, [0, h / 2])
+    return flow, bq, bv, -theta / (w * w), 1 / (1 - theta)

@@ -56,7 +56,7 @@ def taken_over(drive: Steady, old: dict[str, float], new: dict[str, float]) -> t
 def test_the_same_setup_goes_on_as_if_nothing_had_been(drive: Steady) -> None:
     setup = {"level": 1.0, "h": 2e-6}
     found, wanted = taken_over(drive, setup, setup)
-    assert np.abs(found - wanted).max() < 5e-3  # states of modes are single precision, what contacts owe is forgotten
+    assert np.abs(found - wanted).max() < 5e-3  # states of modes are single precision
 
 
 def test_modes_that_become_dynamic_start_in_their_static_place(drive: Steady) -> None:

@@ -194,4 +194,4 @@ def test_step_limit_grows_with_the_step_and_falls_with_gamma(plain: Inner):
     steps = [2e-6, 4e-6, 8e-6, 16e-6]
     mu = [plain.mu(h) for h in steps]
     assert all(0 < a < b for a, b in zip(mu, mu[1:], strict=False))
-    assert plain.mu(8e-6, 0.0) == pytest.approx(0.0, abs=1e-12) and plain.mu(8e-6, 0.5) < mu[2]
+    assert plain.mu(8e-6, 0.0) < 1e-7 and plain.mu(8e-6, 0.5) < mu[2]

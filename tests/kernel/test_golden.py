@@ -19,6 +19,7 @@ def test_runs_have_not_moved_by_a_bit() -> None:
     assert not moved(stored("float"), results(library_path()))
 
 
+@pytest.mark.full
 def test_runs_in_double_have_not_moved_by_a_bit(double_library: Path) -> None:
     assert not moved(stored("double"), results(double_library))
 

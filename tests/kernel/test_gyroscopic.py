@@ -64,10 +64,10 @@ class Flight:
         return np.frombuffer(self.kernel.save(), np.uint8).copy()
 
     def split(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Views on a state: ground group (3, n) and the pinion's gear group (3, 2, LANES)."""
-        tail = state[-(8 * 3 * 16 + 4 * 2 * 3 * 2 * LANES) :]
-        ground, gears = tail[: 8 * 3 * 16].view(float), tail[8 * 3 * 16 :].view(np.float32)
-        return ground.reshape(3, 16), gears.reshape(2, 3, 2, LANES)[0]
+        """Views on a state, q, v, f and rate of f: ground group (4, n) and the pinion's gear group (4, 2, LANES)."""
+        tail = state[-(8 * 4 * 16 + 4 * 2 * 4 * 2 * LANES) :]
+        ground, gears = tail[: 8 * 4 * 16].view(float), tail[8 * 4 * 16 :].view(np.float32)
+        return ground.reshape(4, 16), gears.reshape(2, 4, 2, LANES)[0]
 
     def kick(self) -> None:
         state = self.bytes

@@ -49,7 +49,8 @@ def test_accumulated_times_give_the_bits_of_counted_ones(start: float) -> None:
 @pytest.mark.parametrize("reference", [0.0, 1.0])
 def test_angles_are_taken_but_for_whole_turns(reference: float) -> None:
     """A host that wraps angles to ±π, or starts a turn away, gives the run of one that does not; also of a state saved
-    after the first wrap, which holds the turns. Without them a wrap was a jump of 2π: tooth penetration."""
+    after the first wrap, which holds the turns. Without them a wrap was a jump of 2π: tooth penetration. 1e-15 rad more
+    of the angle move the force by 2e-8."""
 
     def outputs(wrap: Callable[[float], float], saved: int) -> np.ndarray:
         kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1, "phi_reference": reference})
@@ -72,7 +73,7 @@ def test_angles_are_taken_but_for_whole_turns(reference: float) -> None:
     straight = outputs(lambda phi: phi, -1)
     wrapped = outputs(lambda phi: math.remainder(phi, math.tau), 400)
     assert np.all(np.abs(straight[:, (0, 2)]).max(axis=0) > (10.0, math.pi))
-    assert np.all(np.abs(wrapped - straight) < 1e-9 * np.abs(straight).max(axis=0))
+    assert np.all(np.abs(wrapped - straight) < 1e-7 * np.abs(straight).max(axis=0))
 
 
 def test_a_step_that_is_not_at_the_present_time_is_refused_and_changes_nothing() -> None:

@@ -15,9 +15,9 @@ from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec
-from gearfmu.stage.build.tables import BORE, excited_modes, resampling, symmetric_functions
+from gearfmu.stage.build.tables import excited_modes, resampling, symmetric_functions
 
-DRIVE = 0
+DRIVE, BORE = 0, (0, 1, 5)  # flank; directions of the bore: x, y and spin
 LEAST_HALF_WIDTH = 5e-6  # m: below it the local law is a parabola (docs/theory.md 2.4), not known here
 
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from blocks import free_body
 from small import COUNT, frequencies, pinion, pinion_modes, set_body
 
 from gearfmu.errors import BodyError
 from gearfmu.fem import hex20, surface
-from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.gear import as_stored
@@ -27,7 +27,7 @@ def whole() -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (Hz) and shapes (N, 3, k) of the whole pinion without any symmetry."""
     mesh, material = pinion()
     full = mesh.full()
-    free = FreeBody(*hex20.assemble(full.nodes, full.elements, material), full.nodes, full.elements)
+    free = free_body(*hex20.assemble(full.nodes, full.elements, material), full.nodes, full.elements)
     squared, shapes = lowest_modes(free, COUNT + 2)
     return np.sqrt(squared) / (2 * np.pi), shapes.reshape(len(full.nodes), 3, -1)
 

@@ -59,7 +59,7 @@ def at(model: StageModel, position: float) -> tuple[Linearised, list[Load], dict
     return system, loads, turned
 
 
-@pytest.mark.parametrize("position", [1 / 8, 5 / 8])
+@pytest.mark.parametrize("position", [pytest.param(1 / 8, marks=pytest.mark.full), 5 / 8])
 def test_coupled_frequencies_are_those_of_the_train_put_together_from_its_parts(train, position: float) -> None:
     """The 60 lowest, from the first torsion of the train up to bending of its shafts and gear bodies: within 2.5e-4,
     which the kernel's tables make where the end of a line moves within a slice (7e-5 while rows were those of whole

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
+from verbs import call
 
-from gearfmu import cli
 from gearfmu.body.sector import body_sector
 from gearfmu.commands import shared
 from gearfmu.fem import solids
@@ -18,12 +18,6 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.modes.planetary import set_body_modes, uncoupled_carrier_modes
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
-
-
-def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    code = cli.outcome(["modes", *map(str, arguments)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 @pytest.fixture(autouse=True)
@@ -40,8 +34,8 @@ def coarse_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_body_with_its_files(coarse_set: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = call(coarse_set, "--body", "sun", "--count", 3, "--out", tmp_path / "new" / "out", capsys=capsys)
+def test_a_body_with_its_files(coarse_set: Path, tmp_path: Path) -> None:
+    code, out, err = call("modes", coarse_set, "--body", "sun", "--count", 3, "--out", tmp_path / "new" / "out")
     assert (code, err) == (0, "")
     with open(tmp_path / "new" / "out" / "sun_modes.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -52,8 +46,8 @@ def test_a_body_with_its_files(coarse_set: Path, tmp_path: Path, capsys: pytest.
     assert {path.name for path in (tmp_path / "new" / "out").iterdir()} == expected
 
 
-def test_the_whole_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = call("fzg_c", "--torque", "302 N*m", "--count", 7, "--out", tmp_path, capsys=capsys)
+def test_the_whole_stage(tmp_path: Path) -> None:
+    code, out, err = call("modes", "fzg_c", "--torque", "302 N*m", "--count", 7, "--out", tmp_path)
     assert (code, err) == (0, "") and "linearised at 302 N·m, 12 positions" in out
     assert "mode 4 meets mesh order 3 at 4687, 4 at 3515, 5 at" in out and "mode 6 meets mesh order 6 at 5394" in out
     assert {path.name for path in tmp_path.iterdir()} == {"fzg_c_frequencies.csv", "fzg_c_campbell.png"}
@@ -63,9 +57,9 @@ def test_the_whole_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert all(float(row["lowest_Hz"]) <= float(row["frequency_Hz"]) <= float(row["highest_Hz"]) for row in rows)
 
 
-def test_a_train(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_train(tmp_path: Path) -> None:
     """Torque on the input that brings no mesh beyond its torque_max; a column and orders of its own for each mesh."""
-    code, out, err = call("two_stage", "--count", 4, "--out", tmp_path, capsys=capsys)
+    code, out, err = call("modes", "two_stage", "--count", 4, "--out", tmp_path)
     assert (code, err) == (0, "") and "linearised at 300 N·m" in out
     assert "rpm of the input (stage1)" in out and "rpm of the input (stage2)" in out
     with open(tmp_path / "two_stage_frequencies.csv", newline="", encoding="utf-8") as file:
@@ -85,10 +79,8 @@ def test_a_train(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("fzg_c", "--torque", "302"), 100, "--torque"),
     ],
 )
-def test_messages(
-    arguments: tuple, code: int, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given, out, err = call(*arguments, "--out", tmp_path / "out", capsys=capsys)
+def test_messages(arguments: tuple, code: int, message: str, tmp_path: Path) -> None:
+    given, out, err = call("modes", *arguments, "--out", tmp_path / "out")
     assert given == code and message in " ".join(err.replace("│", " ").split()) and out == ""
     assert not (tmp_path / "out").exists()
 

@@ -26,7 +26,7 @@ from threading import Lock
 from chosen import chosen
 from copies import Copy
 from draw import drawn
-from judges import judges, make_map
+from judges import judges, known, make_map
 from table import CAUGHT, OPEN, Row, count, read, row_of, write
 
 LEAST = 0.85  # share that must be caught
@@ -123,6 +123,8 @@ def main() -> int:
         return int(bool(wrong))
     if given.map or given.draw:
         return 0
+    if not known():
+        parser.error("nobody knows which tests run which lines: --map first")
     rows = read()
     wanted = [k for k, r in enumerate(rows) if not r.verdict]
     if given.again:

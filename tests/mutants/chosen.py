@@ -40,7 +40,7 @@ CHOSEN: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "gk_friction.c": (
         ("0.5 * ratio * s->force0[j]", "0.4 * ratio * s->force0[j]"),
-        ("glide->limit[j] * glide->slid[j] > -glide->creep[j]", "glide->limit[j] * glide->slid[j] < -glide->creep[j]"),
+        ("glide->limit[j] * slid_in_step(glide, j) > -", "glide->limit[j] * slid_in_step(glide, j) < -"),
     ),
     "gk_tally.c": (
         ("tally->mesh[e] += (side[0] - side[1]) * h;", "tally->mesh[e] += (side[0] + side[1]) * h;"),

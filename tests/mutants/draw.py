@@ -10,6 +10,7 @@ import random
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import accumulate
 from pathlib import Path
 
@@ -88,6 +89,7 @@ def drawn(seed: int, root: Path = ROOT) -> Iterator[Defect]:
 Edit = tuple[str, int, int, str]  # kind, columns that are replaced, by what
 
 
+@cache
 def possible(path: Path) -> dict[int, list[Edit]]:
     """Edits of every line of a file that offers any, by its number."""
     text = path.read_text(encoding="utf-8")

@@ -67,12 +67,17 @@ def make_map() -> None:
         print(f"{run.seconds:5.1f} s {name} {run.failed}", flush=True)
 
 
+def known() -> list[Judge]:
+    """The map: modules that were run under coverage."""
+    return [Judge(**json.loads(path.read_text(encoding="utf-8"))) for path in sorted(MAP.glob("*.json"))]
+
+
 def judges(file: str, line: int) -> list[str]:
     """Modules that run a line, the best first: little time, and much of it in that file. Modules that the map does not
     know yet are judges where they import the file, or lie in the folder of its package."""
-    known = [Judge(**json.loads(p.read_text(encoding="utf-8"))) for p in sorted(MAP.glob("*.json"))]
-    ran = [j for j in known if j.green and line in j.lines.get(file, ())]
-    fit = ran or [j for j in known if j.green and j.lines.get(file)]  # what is done at import, and tables of C
+    mapped = known()
+    ran = [j for j in mapped if j.green and line in j.lines.get(file, ())]
+    fit = ran or [j for j in mapped if j.green and j.lines.get(file)]  # what is done at import, and tables of C
     found = [j.module for j in sorted(fit, key=lambda j: max(j.seconds, 0.1) / j.share(file))]
     new = [path for path in modules() if not _place(path).exists()]
     head = {path: path.read_text(encoding="utf-8").partition("\ndef ")[0] for path in new}

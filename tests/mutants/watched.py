@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Sequence
@@ -48,14 +49,20 @@ def build_product() -> None:
     build.build_library(out=build.HERE / "lib" / name / (build.STEM + build.SUFFIX[name]), compiler=PRODUCT)
 
 
-def _compile(arguments: Sequence[str | Path]) -> None:
+def _compile(arguments: Sequence[str | Path], folder: Path | None = None) -> None:
     """As `builds._compile`, with kept objects."""
-    words = list(map(str, arguments))
+    words, folder = list(map(str, arguments)), Path(folder or ".")
     files = [Path(w) for w in words if w.endswith(".c")]
     rest = [w for w in words if not w.endswith(".c")]
-    line = ["cc", *build.FLAGS, f"-I{build.HERE / 'src'}", *(w for w in rest[: rest.index("-o")] if w != "-shared")]
-    own = [f"-I{ROOT / 'tests' / 'kernel'}", *COVERAGE]
-    build._run(["cc", *rest, *COVERAGE, *map(str, objects(line, own, files, Path("."))), "-lm"])
+    flags = [w for w in rest if w.startswith("-") and w not in ("-shared", "-c", "-o")]
+    line = ["cc", *build.FLAGS, f"-I{build.HERE / 'src'}", *flags]
+    made = objects(line, [f"-I{ROOT / 'tests' / 'kernel'}", *COVERAGE], files, folder)
+    if "-c" in rest:
+        for path in made:
+            shutil.copy(path, folder / f"{path.stem.rpartition('-')[0]}.o")
+    else:
+        rest[rest.index("-o") + 1] = str(folder / rest[rest.index("-o") + 1])
+        build._run(["cc", *rest, *COVERAGE, *map(str, made), "-lm"])
 
 
 class Watch:
@@ -73,7 +80,6 @@ class Watch:
     def pytest_configure(self, config: pytest.Config) -> None:
         build._objects = objects
         if builds := sys.modules.get("builds"):
-            builds.O1 = (*builds.O1, *COVERAGE)
             builds._compile = _compile
 
     @pytest.hookimpl(tryfirst=True)

@@ -11,11 +11,12 @@ import pytest
 
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.errors import SpecError
+from gearfmu.fmu import export
 from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice, space
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
-from gearfmu.planning.run import run_planned
+from gearfmu.planning.run import planned_scene, planned_stage, run_planned
 from gearfmu.planning.table import plan_text, run_text
 from gearfmu.report.plan import plan_sections
 from gearfmu.spec.scene import load_scene
@@ -146,6 +147,15 @@ def poor(tmp_path: Path) -> Plan:
     segment = Segment("steady", 0.0, 0.08, "loaded", choice, 0.02, 0.012, 0.005, safety=1.25, **NOTHING)
     asked = {"outputs": ["mesh.te", "bearing.pinion.fx"], "band": ["500 Hz", "5000 Hz"], "budget": "0.2 dB"}
     return Plan(str(path), "", scene.coupling.step, asked, (segment,))
+
+
+def test_a_plan_takes_the_fmu_of_its_own_model_and_no_other(poor: Plan, tmp_path: Path) -> None:
+    model = stage_model(planned_scene(poor))
+    own = export(model, tmp_path / "own.fmu")
+    assert planned_stage(poor, own).model.hash == planned_stage(poor).model.hash == model.hash
+    other = export(model.with_starts({"slices": 3.0}), tmp_path / "other.fmu")
+    with pytest.raises(SpecError, match="was made for another model"):
+        planned_stage(poor, other)
 
 
 @pytest.fixture

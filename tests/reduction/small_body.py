@@ -38,19 +38,6 @@ def ring_body(cells: tuple[int, int, int] = (2, 12, 1), bolts: int = 2, outer: f
     return _free("ring", nodes, elements, chosen)
 
 
-def web_body(thickness: float) -> FullOrder:
-    """A wheel of hub, web and rim whose web is `thickness` (m) thick; the bore is ground, two patches of the rim's
-    outside are loaded. One mesh, squeezed in the web."""
-    nodes, elements = ring((5, 10, 1), INNER, OUTER, HEIGHT)
-    radius = np.hypot(nodes[:, 0], nodes[:, 1])
-    chosen = {"bore": radius < INNER * 1.0001}
-    for k in range(2):
-        chosen[f"tooth_{k + 1}"] = (radius > 0.999 * OUTER) & _near(nodes, np.pi * k)
-    ends = np.linspace(INNER, OUTER, 6)
-    nodes[:, 2] *= np.interp(radius, ends, np.array([1, 1, thickness / HEIGHT, thickness / HEIGHT, 1, 1]))
-    return _free("wheel", nodes, elements, chosen)
-
-
 def _near(nodes: np.ndarray, angle: float) -> np.ndarray:
     """True for nodes within 0.32 rad of an angle about z."""
     off = np.arctan2(nodes[:, 1], nodes[:, 0]) - angle

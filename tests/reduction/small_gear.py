@@ -7,10 +7,10 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
+from blocks import free_body
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
-from gearfmu.fem.free import FreeBody
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, flank_loads
@@ -53,7 +53,7 @@ def coarse() -> SectorBody:
 def whole() -> SimpleNamespace:
     """The coarse gear without any symmetry: free body, flank rows (2·R·A, 3N) of every tooth, bore rows (6, 3N)."""
     sector, full = coarse().mesh, coarse().mesh.full()
-    free = FreeBody(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
+    free = free_body(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
     rows = []
     for tooth in range(GEAR.z):
         index = sector.sector_nodes(tooth)

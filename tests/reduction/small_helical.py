@@ -9,11 +9,11 @@ from functools import cache, lru_cache
 from types import SimpleNamespace
 
 import numpy as np
+from blocks import free_body
 from small_gear import GEAR, STEEL, WIDTH
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
-from gearfmu.fem.free import FreeBody
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
@@ -51,8 +51,8 @@ def coarse(sign: int = 1) -> SectorBody:
 def whole() -> SimpleNamespace:
     """The coarse right-handed gear without any symmetry: free body, all load rows (4·R·A, 3N) of every tooth, bore."""
     sector, full = coarse().mesh, coarse().mesh.full()
-    free = FreeBody(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
-    local = coarse().load_rows.reshape(-1, len(sector.nodes), 3)
+    free = free_body(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
+    local = coarse().load_matrix.toarray().reshape(-1, len(sector.nodes), 3)
     rows = []
     for tooth in range(GEAR.z):
         whole_rows = np.zeros((len(local), len(full.nodes), 3))

@@ -9,12 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import scipy.sparse as sp
+from blocks import free_body
 
 from gearfmu.body.parts import tooth_flank
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.fem import hex20
-from gearfmu.fem.free import FreeBody
 from gearfmu.femesh import ring_sector
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.couplings import Elements
@@ -70,7 +70,7 @@ def whole(beta: float = 0.0) -> SimpleNamespace:
     """Without symmetry: free body, flank rows (2·R·A, 3N) of every space, mounts and their springs."""
     made = coarse(beta)
     sector, full = made.mesh, made.mesh.full()
-    free = FreeBody(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
+    free = free_body(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
     rows = [whole_rows(made.flank_rows, tooth) for tooth in range(GEOMETRY.z)]
     elements = Elements(full.nodes, full.elements, free.stiffness, free.mass_matrix)
     mounts = ring_mounts(sector, elements, MOUNTS)

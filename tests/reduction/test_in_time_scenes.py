@@ -38,8 +38,16 @@ def test_rows_of_contact_points_are_derivatives_of_their_gaps(modules: SimpleNam
     coarse mesh follow the involute to some 1e-3 of the normal's arm."""
     spec = load_stage("planetary54")
     geometry = PlanetaryGeometry.of(spec)
-    sun = modules.scenes.placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), geometry.sun_phase(), 0.17)
-    planet = modules.scenes.placed_gear(spec.planet, geometry.sun_mesh.gears[1], geometry.planet_centre(0), 0.0, 0.17)
+    sun = modules.scenes.placed_gear(
+        spec.sun,
+        geometry.sun_mesh.gears[0],
+        np.zeros(2),
+        0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth,
+        0.17,
+    )
+    planet = modules.scenes.placed_gear(
+        spec.planet, geometry.sun_mesh.gears[1], np.array([spec.set.center_distance, 0.0]), 0.0, 0.17
+    )
     grid = modules.contact_points.Grid(along=21, across=3, reach=0.2e-3)
     before = modules.contact_points.contact_points(planet, sun, grid, {1: 0.0, -1: 0.0})
     assert len(before.gap) > 50 and set(before.side) == {1, -1}

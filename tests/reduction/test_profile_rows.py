@@ -14,12 +14,12 @@ import small_ring
 from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
+from gearfmu.reduction.elastic import Elastic
 
 POINTS = 2 * 4 * 3
 
@@ -30,11 +30,11 @@ class Case:
     the normal, then along the profile, made on the mesh of the whole body."""
 
     sector: SectorBody
-    free: FreeBody
+    free: Elastic
     loads: np.ndarray
 
 
-def _case(sector: SectorBody, free: FreeBody) -> Case:
+def _case(sector: SectorBody, free: Elastic) -> Case:
     full, flank = sector.mesh.full(), sector.flank
     loads = [
         flank_loads(full.nodes, full.flank[side].quads, flank, side, sector.points, direction)

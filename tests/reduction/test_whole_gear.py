@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sections import section
 from small_gear import GEAR, coarse, whole
 from turned_rows import on_tooth
 
@@ -131,7 +132,7 @@ def test_inertia_is_that_of_the_whole_gear():
     fields = rigid_modes(coarse().mesh.full().nodes)
     inertia = fields.T @ whole().free.mass(fields)
     assert np.allclose(coarse().inertia, inertia, rtol=1e-10, atol=1e-10 * np.abs(inertia).max())
-    expected = 7850 * GEAR.z * GEAR.sector_area * 8e-3
+    expected = 7850 * GEAR.z * section(GEAR)[0] * 8e-3
     assert coarse().inertia[0, 0] == pytest.approx(expected, rel=2e-3)
 
 

@@ -16,7 +16,7 @@ from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.members import members
 from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_set
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.run.set_te import stage_te
@@ -195,7 +195,7 @@ def test_level_full_is_not_worse_than_standard_at_their_default_steps(name: str)
 def test_level_full_is_not_worse_than_standard_under_a_brake() -> None:
     """A set under a brake whose torque follows sampled speeds. Sees: oscillators that the step does not follow, dynamic
     at level full, ring with such a brake (.99 % of the transmission error where standard has .46)."""
-    scene, spec = window(load_scene("planetary_paper")), load_set("planetary54")
+    scene, spec = window(load_scene("planetary_paper")), load_stage("planetary54")
     model = models_for(scene, load_bodies(spec), set=spec.set, carrier=spec.carrier)
 
     def run(level: str, h: float) -> Any:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import KINDS, Drawn, Kind, drawn
+from kinds import KINDS, Kind, drawn
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.recording import Recording
@@ -23,7 +23,7 @@ H, INNER = 24e-6, 4e-6  # s: communication step, internal step
 BEFORE, AFTER = 12, 8  # communication steps; the load halves two steps before the cut
 WINDOWED = ("_mean", "_max", "_next", "_power", ".a")  # of a communication or internal step, not of a time
 QUICK = ("pair", "internal", "helical", "set")
-KEPT, UNDISTURBED, OWED, ELSEWHERE = 1e-5, 2e-6, 0.03, 0.03  # of the family of an output
+KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 3e-3  # of the family of an output
 PROCESS = """
 import sys
 from pathlib import Path
@@ -180,27 +180,19 @@ def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str,
 
 @pytest.mark.parametrize("kind", kinds())
 def test_a_run_that_goes_on_with_its_own_setup_is_not_disturbed(kind: Kind) -> None:
-    """It forgets the energy that contacts owe, which disturbs forces by up to .4 %, 1.5 % with pitch errors: at one of
-    several times none is owed, but for a helical set and drawn stages. 6e-7 is left in sets. Rigid rotations that were
-    taken over without their force: 2e-5 in the pair, 1e-4 in the set."""
-    cuts = range(40, 72, 4) if kind.name in ("pair", "internal") else range(40, 48, 4)
-    owes = isinstance(kind, Drawn) or kind.name == "helical_set"
-    assert max(adopted(kind, {}, cuts).values()) < (OWED if owes else UNDISTURBED)
+    """6e-7 is left in sets. Rigid rotations that were taken over without their force: 2e-5 in the pair, 1e-4 in the
+    set; energy that contacts owe and a run forgets: .4 %, 1.5 % with pitch errors."""
+    assert max(adopted(kind, {}, range(40, 48, 4)).values()) < UNDISTURBED
 
 
 SETUPS = {"standard": {"level": 2.0}, "half": {"h": INNER / 2}, "gyroscopic": {"effect.gyroscopic": 0.0}}
-SPEEDS = "elastic speeds stay those of the old step, where modes above ωh = 1.2 have no κ: the force moves by 7 %"
 
 
 @pytest.mark.parametrize("new", list(SETUPS.values()), ids=list(SETUPS))
 @pytest.mark.parametrize("kind", kinds(("pair", "internal")))
-def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(
-    kind: Kind, new: dict[str, float], request: pytest.FixtureRequest
-) -> None:
+def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(kind: Kind, new: dict[str, float]) -> None:
     """One communication step later motion and forces are those of the run that stays, but for what the setups differ by
     over it."""
-    if kind.file in ("internal", "two_stage", "helical_set") and "h" in new:
-        request.applymarker(pytest.mark.xfail(reason=SPEEDS, strict=True))
     if not new.keys() <= {v.name for v in kind.model().kernel_variables()}:
         pytest.skip("the stage has no such effect")
     assert max(adopted(kind, new, range(40, 56, 4)).values()) < ELSEWHERE

@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
+import json
 import re
+import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gearfmu import report
 from gearfmu.report.names import plain
-from gearfmu.report.packed import COLUMNS, EXACT, LEVELS, MOST, Pack, reduced, unpacked
+from gearfmu.report.packed import BYTE_LEVELS, BYTE_MISSING, COLUMNS, EXACT, LEVELS, MISSING, MOST, Pack, reduced
 from gearfmu.stage.run.trace import Channel, Trace
 
 LIMIT = 6_000_000  # bytes of a page
 TIME = np.arange(20_000) * 2e-5
+
+
+def unpacked(text: str) -> tuple[dict[str, Any], list[np.ndarray]]:
+    """The structure and the arrays of a `Pack.text`, as the page's script reads them."""
+    data = gzip.decompress(base64.b64decode(text))
+    length = struct.unpack("<I", data[:4])[0]
+    content, block = json.loads(data[4 : 4 + length]), data[4 + length :]
+    return content, [_array(head, block) for head in content["arrays"]]
+
+
+def _array(head: dict[str, Any], block: bytes) -> np.ndarray:
+    n, kind = head["n"], head["kind"]
+    if kind == "even":
+        return np.asarray(head["start"] + head["step"] * np.arange(n))
+    at = block[head["at"] :]
+    if kind == "steps":
+        low, high = np.frombuffer(at, np.uint8, 2 * n).reshape(2, n).astype(np.uint16)
+        steps = np.cumsum(low + 256 * high, dtype=np.uint16)
+        values = head["low"] + steps / LEVELS * (head["high"] - head["low"])
+        return np.where(steps == MISSING, np.nan, values)
+    if kind == "u1":
+        steps = np.frombuffer(at, np.uint8, n)
+        values = head["low"] + steps / BYTE_LEVELS * (head["high"] - head["low"])
+        return np.where(steps == BYTE_MISSING, np.nan, values).reshape(-1, head["columns"])
+    return np.frombuffer(at, f"<{kind}", n)
 
 
 def numbers(page: str) -> tuple[dict, list[np.ndarray]]:

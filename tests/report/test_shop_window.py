@@ -19,7 +19,7 @@ def closure(step: float, folder: Path) -> Trace:
 
 
 def test_the_demos_octave_bands_are_right_and_it_warns_of_nothing(tmp_path: Path) -> None:
-    """Against samples at every internal step, of 5 µs, where nothing folds: within 0.1 dB up to the band of 8 kHz, 0.25
+    """Against samples at every internal step, of 5 µs, where nothing folds: within 0.1 dB up to the band of 8 kHz, 0.3
     dB in that of 16 kHz. At 100 µs the samples are up to 17 dB off, and the page says so."""
     shown, fine, coarse = (closure(step, tmp_path) for step in (DEMO_STEP, 5e-6, 1e-4))
     found, true = (octave_table(trace, window_of_interest(trace)) for trace in (shown, fine))
@@ -32,7 +32,7 @@ def test_the_demos_octave_bands_are_right_and_it_warns_of_nothing(tmp_path: Path
     print({key: round(value, 2) for key, value in off.items()})
     assert {band for _, band in off} == {63, 125, 250, 500, 1000, 2000, 4000, 8000, 16000}
     assert max(value for (_, band), value in off.items() if band <= 8000) < 0.1
-    assert max(off.values()) < 0.25
+    assert max(off.values()) < 0.3
     assert sampling_warning(shown) is None and "Sampled every 100 µs" in str(sampling_warning(coarse))
     sampled = {name: channel for name, channel in coarse.channels.items() if not name.endswith("_mean")}
     plain = Trace(coarse.time, sampled, coarse.meta)

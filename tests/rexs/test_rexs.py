@@ -16,7 +16,7 @@ from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.reading import read_rexs
 from gearfmu.spec.proposals.new import write_drafted
-from gearfmu.spec.stage import load_pair, load_stage
+from gearfmu.spec.stage import load_stage
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "rexs"
 PAIR, SET = EXAMPLES / "fzg_c.rexs", EXAMPLES / "planetary54.rexs"
@@ -50,7 +50,7 @@ def stage_of(path: Path, tmp_path: Path, stage: str = ""):
 
 
 def test_a_pair_is_the_one_whose_data_the_file_holds(tmp_path: Path) -> None:
-    made, shipped = stage_of(PAIR, tmp_path), load_pair("fzg_c")
+    made, shipped = stage_of(PAIR, tmp_path), load_stage("fzg_c")
     kept = {"backlash": made.pair.backlash}
     assert made.pair == shipped.pair.model_copy(update=kept) and made.pair.backlash == pytest.approx(9e-5)
     for own, other in zip(made.gears, shipped.gears, strict=True):

@@ -12,7 +12,7 @@ from gearfmu.errors import MeshError, SpecError
 from gearfmu.spec.forms.body import body_hash, body_inputs
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.reading.library import find_stage
-from gearfmu.spec.stage import load_pair, load_stage
+from gearfmu.spec.stage import load_stage
 
 TEXT = find_stage("two_stage").read_text(encoding="utf-8")
 
@@ -92,7 +92,7 @@ def test_all_problems_come_at_once(tmp_path):
 
 @pytest.mark.parametrize("name", ["fzg_c", "fzg_c/stage_relief"])
 def test_a_pair_expands_into_two_rotors_and_keeps_its_bodies(name):
-    pair = load_pair(name)
+    pair = load_stage(name)
     stage = expand_pair(pair)
     assert stage.planar and list(stage.rotors) == list(stage.ports) == ["pinion", "wheel"]
     assert stage.rotors["wheel"].axis == (pair.pair.center_distance, 0.0)
@@ -109,7 +109,7 @@ def test_a_gear_that_cannot_be_meshed_is_named_by_its_table(monkeypatch):
 
     monkeypatch.setattr("gearfmu.body.bodies.reduced_gear", fail)
     train = load_stage("two_stage")
-    for stage, gear, table in ((train, "wheel1", "bodies.wheel1"), (load_pair("fzg_c"), "pinion", "gears.pinion")):
+    for stage, gear, table in ((train, "wheel1", "bodies.wheel1"), (load_stage("fzg_c"), "pinion", "gears.pinion")):
         with pytest.raises(MeshError, match=f": {table}: the rim"):
             reduce_body(stage, gear)
 

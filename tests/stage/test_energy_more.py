@@ -23,10 +23,10 @@ def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 
-def changes_of_h(free: FreePair, steps: tuple[float, float]) -> float:
+def changes_of_h(free: FreePair, steps: tuple[float, float], h: float = 7.5e-6) -> float:
     """Largest relative change of stored energy over 50 ms of undamped frozen rattle whose communication step alternates
     between two lengths (s); sampled after the first of them."""
-    kernel = started(free, Rattle(position=0.3), {"level": FAST, "h": 7.5e-6})
+    kernel = started(free, Rattle(position=0.3), {"level": FAST, "h": h})
     time, samples = 0.0, []
     while time < 0.05:
         for number, step in enumerate(steps):
@@ -38,9 +38,11 @@ def changes_of_h(free: FreePair, steps: tuple[float, float]) -> float:
 
 
 def test_changes_of_h_cost_little(pair_free: FreePair) -> None:
-    """Communication steps of 50 and 60 µs in turn: 2.6e-3 measured (docs/decisions.md); without changes rounding."""
+    """Communication steps of 50 and 60 µs in turn, 900 changes: rounding without them. Speeds stay, so that the energy
+    of the step goes up and down by what it is apart from that of the motion: 2.2e-2 measured, at half of h 2.8e-3."""
     assert changes_of_h(pair_free, (50e-6, 50e-6)) < 1e-5
-    assert changes_of_h(pair_free, (50e-6, 60e-6)) < 1e-2
+    coarse, fine = (changes_of_h(pair_free, (50e-6, 60e-6), h) for h in (7.5e-6, 3.75e-6))
+    assert coarse < 4e-2 and fine < 0.3 * coarse
 
 
 @pytest.mark.parametrize("position", [0.3, 0.8])

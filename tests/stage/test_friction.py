@@ -225,7 +225,7 @@ def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list
     print(f"slid {np.ptp(slid):.1e} m in 0.1 s, of {free:.1e} m without friction; lost {lost:.1e} J")
     drift = abs(np.mean(slid[50:]) - np.mean(slid[:50]))
     assert abs(lost) < 1e-12 and drift < 2e-4 * free  # it yields and rings, undamped
-    assert np.ptp(slid) < 2e-3 * free
+    assert np.ptp(slid) < 3e-3 * free  # 2.4e-3 at 1 ms, what shorter steps converge to: 2.3e-3 … 2.4e-3
 
 
 # ---- energy ----------------------------------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ the whole train."""
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -151,11 +150,3 @@ def test_a_ring_of_gears_whose_axes_do_not_fit_is_refused(train):
     )
     with pytest.raises(ModelError, match="move an axis"):
         tooth_phases(loose)
-
-
-def test_the_order_of_supports_does_not_matter(train, bodies):
-    layout = stage_layout(train, [*bodies, *bodies])
-    group = mount(layout)
-    again = mount(replace(layout, supports=layout.supports[::-1]))
-    print("frequencies", np.abs(again.omega / group.omega - 1).max())
-    assert np.allclose(again.omega, group.omega, rtol=1e-9)

@@ -91,8 +91,11 @@ def test_all_forces_and_moments_of_pinion_and_ring_balance(torque: float) -> Non
 
 @pytest.mark.full
 def test_a_vanishing_helix_is_the_spur_pair() -> None:
-    nearly, spur = (loaded_te(model_at(beta), [TORQUE], 8).te for beta in (1e-7, 0.0))
-    assert np.abs(nearly - spur).max() < 1e-6 * np.abs(spur).max()
+    """But for the slices, which yield as patches of their own in helical gears and as width functions in spur ones:
+    2.1e-4 found, as for an external pair (tests/relations/test_gears_alike.py)."""
+    nearly, small, spur = (loaded_te(model_at(beta), [TORQUE], 8).te for beta in (1e-7, 1e-5, 0.0))
+    assert np.abs(nearly - spur).max() < 5e-4 * np.abs(spur).max()
+    assert np.abs(nearly - small).max() < 1e-6 * np.abs(spur).max(), "no growth with the angle but its own"
 
 
 @pytest.mark.full

@@ -1,10 +1,9 @@
-"""A helical pair in the kernel: axial force, balance of all forces and moments, hands, the spur gear as its limit,
+"""A helical pair in the kernel: axial force, balance of all forces and moments, the spur gear as its limit,
 leads and misaligned axes."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,44 +94,6 @@ def steady(model: StageModel, torque: float = TORQUE, **parameters: float) -> di
     period = 2 * math.pi / 23 / SPEED
     trace = simulate(model, Steady(model, SPEED, torque), 10 * period, period / 60, {"level": 1.0} | parameters)
     return {name: trace[name][240:] for name in trace.channels}
-
-
-def mirrored(body: ReducedBody) -> ReducedBody:
-    """The body seen in the plane of mid-width: z, tilts and odd width functions change their signs, and the hand."""
-    odd = (-1.0) ** np.arange(body.width_functions)
-    motion = np.array([1, 1, -1, -1, -1, 1])
-    return replace(
-        body,
-        input_hash=body.input_hash[::-1],
-        flank_rows=body.flank_rows * odd[:, None],
-        bore_rows=body.bore_rows * motion[:, None],
-        static_ff=body.static_ff * odd[:, None] * odd,
-        static_fb=body.static_fb * odd[:, None] * motion,
-        static_bb=body.static_bb * np.outer(motion, motion),
-        inertia=body.inertia * np.outer(motion[3:], motion[3:]),
-        base_helix_angle=-body.base_helix_angle,
-        tangent=None,
-    )
-
-
-@pytest.mark.parametrize("level", [0.0, 1.0])
-def test_a_pair_of_the_other_hand_is_the_mirror_image(demo: SimpleNamespace, level: float) -> None:
-    """Same transmission error and forces in the plane, axial forces and tilts with the other sign, at rest and in
-    motion."""
-    other = plain(demo.spec, helix_angle=-demo.spec.pair.helix_angle)
-    models = [assemble(plain(demo.spec), demo.bodies), assemble(other, [mirrored(body) for body in demo.bodies])]
-    kernels = [at_rest(model, TORQUE, level=level) for model in models]
-    for kernel in kernels:
-        kernel.set("pinion.tau", 1.1 * TORQUE)
-        for i in range(50):
-            kernel.step(i * 2e-5, 2e-5)
-    signs = {f"{kind}.{shaft}.{axis}": sign for kind in ("bearing",) for shaft in SHAFTS
-             for axis, sign in (("fx", 1), ("fy", 1), ("fz", -1), ("mx", -1), ("my", -1))}  # fmt: skip
-    signs |= {"mesh.te": 1, "mesh.force": 1, "pinion.phi": 1}
-    for name, sign in signs.items():
-        own, seen = (kernel.get(name) for kernel in kernels)
-        scale = max(abs(kernels[0].get("mesh.force")), 1.0) if name.startswith("bearing") else abs(own)
-        assert seen == pytest.approx(sign * own, abs=3e-6 * scale), name
 
 
 def with_bearings(spec: StageSpec) -> StageSpec:

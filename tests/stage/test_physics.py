@@ -73,7 +73,7 @@ def test_free_rattle_keeps_its_energy_and_its_backlash(
             f"{impacts[-1]} impacts, energy within {drift:.1e}, te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm"
         )
         assert trace.meta["outcome"] == "completed" and trace["solver.retried_steps"][-1] == 0
-        assert drift < 1e-3
+        assert drift < 1.5e-3
         assert trace["mesh.force_drive"].max() > 100 and trace["mesh.force_coast"].max() > 100
         depth = 0.5 * (np.ptp(te) - pair.normal_backlash)
         assert 0 < depth < 30e-6  # compliance of mesh and bearings under the impacts, nothing more

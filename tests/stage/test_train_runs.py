@@ -1,5 +1,5 @@
-"""Trains in motion and at rest: independent pairs in one model, a stage turned as a whole, ratio and torque through the
-meshes, the same pair written in two ways."""
+"""Trains in motion and at rest: independent pairs in one model, ratio and torque through the meshes, the same pair
+written in two ways."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import RotorSpec, Stage
 from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.forms.turning import shafts_of, turns
+from gearfmu.spec.forms.turning import shafts_of
 from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -98,35 +98,6 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
         assert np.ptp(alone["mesh.force"]) > 10
 
 
-def turned(stage: Stage, angle: float) -> Stage:
-    """The whole stage about the z axis."""
-    c, s = math.cos(angle), math.sin(angle)
-    rotors = {
-        name: rotor.model_copy(
-            update={"axis": (c * rotor.axis[0] - s * rotor.axis[1], s * rotor.axis[0] + c * rotor.axis[1])}
-        )
-        for name, rotor in stage.rotors.items()
-    }
-    return stage.model_copy(update={"rotors": rotors})
-
-
-def test_a_pair_turned_as_a_whole_runs_the_same(relief_spec, bodies, relieved) -> None:
-    """By three pitches of the pinion, whose tooth 0 stands on +x at φ = 0: the mesh is the same to rounding, bearing
-    forces turn with the stage."""
-    angle = 2 * math.pi * 3 / relief_spec.gears[0].teeth
-    again = assemble(turned(expand_pair(relief_spec), angle), bodies)
-    drive = Steady(relieved, 200.0, 300.0)
-    before, after = (run(model, {"": drive}) for model in (relieved, again))
-    for name in ("mesh.force", "pinion.tau", "wheel.tau"):
-        scale = np.abs(before[name]).max()
-        error = np.abs(after[name] - before[name]).max() / scale
-        print(f"{name}: {error:.1e}")
-        assert error < 1e-6, name  # rows are of single precision: 1.2e-7
-    x, y = before["bearing.pinion.fx"], before["bearing.pinion.fy"]
-    wanted = math.cos(angle) * x - math.sin(angle) * y
-    assert np.abs(after["bearing.pinion.fx"] - wanted).max() < 1e-6 * np.hypot(x, y).max()
-
-
 def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
     """Outputs in static equilibrium under TORQUE, input and output wound against each other."""
     kernel = model.kernel(level=FAST, **parameters)
@@ -171,17 +142,6 @@ def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
     assert carried == pytest.approx(found["seat.wheel1.fz"] + found["seat.pinion2.fz"], rel=1e-4)
     assert abs(carried) < 0.6 * max(pushed.values())
     assert found["solver.status"] == 0 == at_rest(two_stage)["solver.status"]
-
-
-def test_a_train_turns_at_its_ratio_and_carries_its_torque(two_stage) -> None:
-    """In motion: mean speeds of the rotors are those of the teeth, both meshes stay closed."""
-    trace = run(two_stage, {"": Steady(two_stage, SPEED, TORQUE)})
-    late = slice(STEPS // 2, None)
-    for rotor, turn in turns(two_stage.stage, "input").items():
-        assert trace[f"{rotor}.gear.w"][late].mean() == pytest.approx(SPEED * float(turn), rel=0.02), rotor
-    assert trace["solver.retried_steps"][-1] == 0
-    assert trace["stage1.contact"].min() == 1 and trace["stage2.contact"].max() == -1
-    assert trace["output.tau"][late].mean() == pytest.approx(TORQUE * two_stage.shafts.ratio, rel=0.01)
 
 
 def test_every_mesh_of_a_train_has_its_transmission_error(two_stage) -> None:

@@ -189,8 +189,10 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
     rows = limit_rows(scene, ("fast",), (12, 6, 4, 1))
     kinds = [row.kind for row in rows]
     assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
-    assert [row.gamma_lowered for row in rows] == [False, False, True, True, True]
-    assert rows[2].gamma > rows[3].gamma and rows[3].te_error > rows[0].te_error
+    lowered = [row.gamma_lowered for row in rows]
+    assert lowered == sorted(lowered) and not lowered[0] and lowered[-1]
+    gammas, errors = [row.gamma for row in rows[:4]], [row.te_error for row in rows[:4]]
+    assert gammas == sorted(gammas, reverse=True) and errors == sorted(errors)
 
 
 def test_committed_tables_have_the_columns(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,34 +14,19 @@ from evidence.peers.calculix.ccx import run_deck, torques
 from evidence.peers.calculix.deck import Placed, Problem, write_deck
 from evidence.peers.calculix.section import Fineness, gear_plane
 from evidence.peers.calculix.solid import extruded
-from gearfmu.geometry import GearGeometry, PairGeometry
-
-THIN = 1e-6  # m, half thickness that stands for plane stress
+from gearfmu.geometry import PairGeometry
 
 
 @dataclass(frozen=True)
 class Case:
-    """condition: "half_width" (symmetry at mid width, free end face), "plane_strain", "plane_stress". bores: "clamped"
-    or "averaged". bore_radius (m): instead of the gears' own. layers: elements over half the width, thinner towards
-    the end face by `layer_growth` each."""
+    """Half the width, with symmetry at mid width and a free end face. bores: "clamped" or "averaged"."""
 
     name: str
-    condition: str = "half_width"
     bores: str = "clamped"
-    bore_radius: float | None = None
-    layers: int = 1
-    layer_growth: float = 1.0
     fine: Fineness = field(default_factory=Fineness)
     penalty: float = 3e16
     element: str = "C3D20R"
     increments: int = 1
-
-    def levels(self, face_width: float) -> np.ndarray:
-        """Corner levels z (m) of the elements."""
-        if self.condition != "half_width":
-            return np.array([0.0, 1e-3 if self.condition == "plane_strain" else THIN])
-        sizes = self.layer_growth ** np.arange(self.layers)
-        return face_width / 2 * np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
 
 
 @dataclass(frozen=True)
@@ -65,11 +50,6 @@ class Solution:
     nodes: int
     elements: int
     seconds: float
-
-    def te_at(self, line_load: float) -> float:
-        """te (m) at a line load (N/m) of the pinion: the polynomial through all loads."""
-        pinion = self.line_load[:, 0]
-        return float(np.polyval(np.polyfit(pinion / line_load, self.te, len(pinion) - 1), 1.0))
 
 
 def touching(pair: PairGeometry, turn: float, margin: float) -> dict[tuple[int, int], tuple[float, float]]:
@@ -102,21 +82,16 @@ def _at_tip_edge(pair: PairGeometry, tip: int, roll: float) -> list[float]:
     return [gear.s_tip, touched] if tip == 0 else [touched, gear.s_tip]
 
 
-def pitch_point_turn(pair: PairGeometry) -> float:
-    """The pinion's angle (rad) with tooth 0 in contact at the pitch point."""
-    return pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt
-
-
 def problem_of(case: Case, pair: PairGeometry, face_width: float, load: Load) -> Problem:
     """The contact problem of a case; every pair of teeth near the path of contact may touch."""
-    gears = [bored(gear, case.bore_radius) for gear in pair.gears]
+    gears = pair.gears
     pairs = touching(pair, load.turn, load.margin)
     contacts = [{teeth[k]: rolls[k] for teeth, rolls in pairs.items()} for k in (0, 1)]
     sections = [
         gear_plane(gear, rolls, range(-(gear.z // 2), gear.z - gear.z // 2), case.fine)
         for gear, rolls in zip(gears, contacts, strict=True)
     ]
-    solids = [extruded(section, case.levels(face_width)) for section in sections]
+    solids = [extruded(section, np.array([0.0, 0.5 * face_width])) for section in sections]
     phase = pair.wheel_phase - load.turn * gears[0].r_b / gears[1].r_b
     return Problem(
         gears=(
@@ -124,16 +99,10 @@ def problem_of(case: Case, pair: PairGeometry, face_width: float, load: Load) ->
             Placed("W", solids[1], np.array([pair.a, 0.0]), phase, case.bores, 0.0),
         ),
         pairs=list(pairs),
-        sides="both" if case.condition == "plane_strain" else "low",
         penalty=case.penalty,
         element=case.element,
         increments=case.increments,
     )
-
-
-def bored(gear: GearGeometry, radius: float | None) -> GearGeometry:
-    """The gear with another bore."""
-    return gear if radius is None else replace(gear, r_bore=radius)
 
 
 def prepared(
@@ -153,7 +122,7 @@ def digest(deck: Path) -> str:
 
 def solve(case: Case, pair: PairGeometry, face_width: float, loads: Sequence[Load], folder: Path) -> Solution:
     """Write a deck a load, run ccx, read the bores' torques. RuntimeError when ccx gives up."""
-    base, half = np.array([gear.r_b for gear in pair.gears]), case.levels(face_width)[-1]
+    base, half = np.array([gear.r_b for gear in pair.gears]), 0.5 * face_width
     line_load, seconds = [], 0.0
     for number, load in enumerate(loads):
         deck, problem = prepared(case, pair, face_width, load, folder, number)

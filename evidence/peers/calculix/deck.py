@@ -38,13 +38,11 @@ class Placed:
 
 @dataclass(frozen=True)
 class Problem:
-    """gears: pinion, wheel. pairs: their teeth that may touch. sides: which end faces are held along z: "low" (half
-    the width, plane of symmetry) or "both" (plane strain). youngs, poisson: Pa, –. penalty: Pa/m. increments: equal
-    parts in which the pinion is turned."""
+    """gears: pinion, wheel. pairs: their teeth that may touch; half the width, the low end face a plane of symmetry.
+    youngs, poisson: Pa, –. penalty: Pa/m. increments: equal parts in which the pinion is turned."""
 
     gears: tuple[Placed, Placed]
     pairs: Sequence[tuple[int, int]]
-    sides: str = "low"
     youngs: float = 206e9
     poisson: float = 0.3
     penalty: float = 3e16
@@ -99,7 +97,6 @@ def _physics(problem: Problem) -> list[str]:
     for gear, dummy, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
         lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL"]
         lines += ["*BOUNDARY", f"LOW{gear.name}, 3, 3"]
-        lines += [f"HIGH{gear.name}, 3, 3"] if problem.sides == "both" else []
         if gear.held == "averaged":
             lines += ["*NODE, NSET=ALL", f"{dummy}, 0, 0, 0", *_averaging(gear, dummy, node)]
     lines += ["*SURFACE INTERACTION, NAME=DRY", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
@@ -145,8 +142,7 @@ def _step(problem: Problem) -> list[str]:
         arm = 1e3 * (gear.nodes[gear.solid.bore, :2] - gear.centre)
         for number, (x, y) in zip(node + gear.solid.bore, arm, strict=True):
             lines += [f"{number}, 1, 1, {-angle * y:.12g}", f"{number}, 2, 2, {angle * x:.12g}"]
-        if problem.sides == "low":
-            lines += [f"BORE{gear.name}, 3, 3"]
+        lines += [f"BORE{gear.name}, 3, 3"]
     for gear in problem.gears:
         lines += [f"*NODE PRINT, NSET=BORE{gear.name}", "RF"]
     return [*lines, "*END STEP"]

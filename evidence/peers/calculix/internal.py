@@ -98,7 +98,7 @@ def problem_of(case: Case, pair: Pair, load: Load) -> Problem:
             replace(case.fine, far_root=1, toothed=mesh.ring.z),
         ),
     )
-    solids = [extruded(section, case.levels(pair.width)) for section in sections]
+    solids = [extruded(section, np.array([0.0, 0.5 * pair.width])) for section in sections]
     phase = mesh.ring_phase(load.turn, 0.0)
     return Problem(
         gears=(

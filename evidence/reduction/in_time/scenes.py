@@ -22,9 +22,10 @@ from gearfmu.femesh.mesh import rotated
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import PlanetaryGeometry
-from gearfmu.reduction.carrier import carrier_elements
+from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.spec.forms.members import carrier_of
 from gearfmu.spec.stage import load_stage
 
 TORQUE, RAMP = 150.0, 0.1e-3  # N·m, s
@@ -117,7 +118,8 @@ def _ramp(time: float) -> float:
 
 
 def _carrier(spec: Any, meshes: Meshes) -> Solid:
-    elements, couplings = carrier_elements(spec, meshes.carrier)
+    carrier = carrier_of(spec)
+    elements, couplings = carrier_elements(carrier, scaled_sector(carrier, meshes.carrier))
     full = full_order("carrier", elements, couplings, Judgement(("bore",), spec.set.center_distance))
     return Solid(np.zeros(3), elements, tuple(couplings), full)
 
@@ -125,11 +127,14 @@ def _carrier(spec: Any, meshes: Meshes) -> Solid:
 def _planet(spec: Any, meshes: Meshes) -> Placed:
     """The planet of bolt 0, tooth 0 on +x."""
     geometry = PlanetaryGeometry.of(spec)
-    return placed_gear(spec.planet, geometry.sun_mesh.gears[1], geometry.planet_centre(0), 0.0, meshes.gear)
+    centre = np.array([spec.set.center_distance, 0.0])
+    return placed_gear(spec.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
 
 
 def _sun(spec: Any, meshes: Meshes, geometry: PlanetaryGeometry) -> Placed:
-    return placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), geometry.sun_phase(), meshes.gear)
+    """The sun, turned so that the tooth or space that the planet shows it meets a space or tooth."""
+    angle = 0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth
+    return placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), angle, meshes.gear)
 
 
 def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scale: float) -> Placed:

@@ -121,11 +121,6 @@ class SectorBody:
         return sp.csr_array(sp.vstack(parts))
 
     @property
-    def load_rows(self) -> np.ndarray:
-        """`load_matrix`, dense."""
-        return self.load_matrix.toarray()
-
-    @property
     def profile_loads(self) -> int:
         """Number of the first load along the profile in `load_matrix`."""
         return self.flank_count + len(self.patch_rows)

@@ -37,7 +37,6 @@ from gearfmu.spec.tables.gear import PairSpec
 _THINNEST_RIM = 0.5  # of the tooth height: thinner rims are outside the rim thickness factor of ISO 6336-3
 _LARGEST_ALLOWANCE = 0.1  # of the module
 _LARGEST_THICKENING = 0.005  # of the module
-_DIAMETERS = ("tip_diameter", "bore_diameter", "rim_diameter")
 
 
 def set_problems(file: str, spec: PlanetarySpec) -> list[Problem]:

@@ -3,8 +3,7 @@ declared once; docs are made from it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -93,29 +92,3 @@ class TestRig(Spec):
         5.0e4, "wheel to the shaft of constant speed", "computed: solid steel, G = 79.3 GPa, d = 35 mm, l = 0.23 m"
     )
     wheel_shaft_damping: Damping = _value(0.5, "wheel's shaft")
-
-
-class Row(NamedTuple):
-    """One line of the table of values."""
-
-    name: str
-    meaning: str
-    value: float | None
-    unit: str
-    source: str
-
-
-def table(kind: type[PassengerCar] | type[TestRig]) -> Iterator[Row]:
-    """Every value of a drivetrain in the order of declaration; None where the scene must give it."""
-    for name, field in kind.model_fields.items():
-        quantity = next((item for item in field.metadata if isinstance(item, Quantity)), None)
-        if quantity is not None:
-            extra = field.json_schema_extra
-            assert isinstance(extra, dict)
-            yield Row(
-                name,
-                field.description or "",
-                None if field.is_required() else field.default,
-                quantity.unit,
-                str(extra["source"]),
-            )

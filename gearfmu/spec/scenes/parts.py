@@ -79,15 +79,6 @@ class Drivetrain(Spec):
     torques: dict[Name, TorquePart] = Field(default={}, description="torques of the outside on inertias")
 
 
-TABLES: dict[str, type[Spec]] = {
-    "ports": PortShaft,
-    "inertias": InertiaPart,
-    "shafts": ShaftPart,
-    "clutches": ClutchPart,
-    "torques": TorquePart,
-}
-
-
 def drivetrain_problems(parts: Drivetrain, file: str) -> Iterator[Problem]:
     """What no single field of [drivetrain] shows."""
     if not parts.ports:

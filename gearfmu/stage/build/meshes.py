@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +16,7 @@ from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
 
 EXTERNAL, INTERNAL = 1, -1
-H_MAX = 7.5e-6  # s: largest default step
+LONGEST = {"pair": 7.5e-6, "helical": 5e-6, "shared": 12.5e-6}  # s: default steps (docs/decisions/kernel.md)
 SAME_ANGLE = 1e-9  # rad
 
 
@@ -110,12 +111,24 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
             "name": stage.name,
             "rotor_names": "|".join(stage.rotors),
             "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
-            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
+            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, longest_step(stage), min(periods)]),
             "engaged": np.array(engaged, np.int32),
             "engagement": np.array(numbers),
             "direction": np.array(directions),
         }
     )
+
+
+def longest_step(stage: Stage) -> float:
+    """Longest default step (s), by its error: meshes that share a rotor hit it less hard than a pair alone, and contact
+    lines of helical gears begin and end at tip edges all the time."""
+    rotors = [tuple(map(stage.rotor_of, mesh.gears)) for mesh in stage.engagements]
+    uses = Counter(rotor for both in rotors for rotor in both)
+    longest = []
+    for mesh, both in zip(stage.engagements, rotors, strict=True):
+        alone = "helical" if mesh_shape(stage, mesh).gears[0].beta_b else "pair"
+        longest.append(LONGEST["shared" if max(uses[rotor] for rotor in both) > 1 else alone])
+    return min(longest)
 
 
 def _frame_section(stage: Stage) -> dict[str, Any]:

@@ -10,7 +10,6 @@ import numpy as np
 ROLLS = 48  # error and price of the grid: docs/decisions.md
 MOST_FUNCTIONS = 6
 OFFSETS = range(-3, 4)
-BORE = (0, 1, 5)
 
 
 def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS) -> np.ndarray:

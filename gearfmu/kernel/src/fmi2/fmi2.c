@@ -180,15 +180,15 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
     return fmi2OK;
 }
 
-static int finite(double x) { return x - x == 0; }
+static int is_finite(double x) { return x - x == 0; }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
     ENTER(SetupExperiment);
     (void)toleranceDefined, (void)tolerance; /* the internal step is fixed: parameter h */
-    if (!finite(startTime)) return REFUSE(f, "start time is not finite");
-    if (stopTimeDefined && !(finite(stopTime) && stopTime >= startTime))
+    if (!is_finite(startTime)) return REFUSE(f, "start time is not finite");
+    if (stopTimeDefined && !(is_finite(stopTime) && stopTime >= startTime))
         return REFUSE(f, "stop time %.17g s is before the start or not finite", stopTime);
     f->start = f->last_good = startTime;
     f->stop_defined = stopTimeDefined != fmi2False;

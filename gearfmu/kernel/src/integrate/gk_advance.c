@@ -17,18 +17,19 @@
 static const gk_real STILL = 1e-15f;
 static const double GROUND_STILL = 1e-140, UNTURNED = 1e-12;
 
-/* half a step of the dashpots of the supports: speeds contract along them; what that takes */
-static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, double *v)
+/* Half a step of the dashpots of the supports: speeds contract along them to those at rest under f; what that takes */
+static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const double *f,
+                            double *v)
 {
     const int n = setup->base.n;
     double taken = 0.0;
     for (int d = 0; d < model->supports; d++) {
         const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
         const gk_span span = setup->base.damper_span[d];
-        const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_span(span, e, v) : 0.0;
-        if (speed == 0.0) continue;
-        gk_axpy_span(span, -decay * speed, pulls, v);
-        taken += k->ground.loss[d] * speed * speed;
+        if (!(k->ground.decay[d] > 0.0)) continue;
+        const double held = gk_dot_span(span, k->ground.holds + d * n, f), speed = gk_dot_span(span, e, v) - held;
+        gk_axpy_span(span, -k->ground.decay[d] * speed, pulls, v);
+        taken += speed * (k->ground.loss[d] * speed + k->ground.gain[d] * held);
     }
     return taken;
 }
@@ -80,7 +81,7 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
     const gk_ground_flow *w = &k->ground;
     double *v = work->ground_start;
     memcpy(v, x + n, (size_t)n * sizeof *v);
-    const double taken = damp_supports(model, setup, k, v);
+    const double taken = damp_supports(model, setup, k, f, v);
     gk_frame_turn(setup, k, data, 0, v);
     work->pressed = gk_frame_press(model, setup, k, data, v);
     const gk_quad *x4 = SEEN_QUADS(x), *v4 = SEEN_QUADS(v), *f4 = SEEN_QUADS(f);
@@ -166,6 +167,15 @@ static double correct_undamped(const gk_setup *setup, const gk_work *work, const
     return sum;
 }
 
+/* modal force at the end of the step and its rate */
+static void take_force(const gk_real *next, int n, double h, gk_real *force)
+{
+    const gk_half *from = SEEN_HALVES(next);
+    gk_half *f = HALVES(force), *rate = HALVES(force + n);
+    const gk_real per_step = (gk_real)(1.0 / h);
+    for (int i = 0; i < 2 * n / LANES; i++) rate[i] = (from[i] - f[i]) * per_step, f[i] = from[i];
+}
+
 /* an engagement that knows the gear: it owes what rounding did to the gear's modes */
 static int engagement_of(const gk_model *model, int g)
 {
@@ -183,7 +193,7 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
     const int n = base->n, damped = GK_ON(setup, modal_damping);
     const gk_ground_flow *w = &k->ground;
     double *v = gk_ground_of(data) + n;
-    gk_quad *x4 = QUADS(gk_ground_of(data)), *v4 = QUADS(v), *f4 = QUADS(v + n), sum = {0};
+    gk_quad *x4 = QUADS(gk_ground_of(data)), *v4 = QUADS(v), *f4 = QUADS(v + n), *rate4 = f4 + n / 4, sum = {0};
     const gk_quad *qp = SEEN_QUADS(work->ground_q), *vp = SEEN_QUADS(work->ground_v),
                   *z = SEEN_QUADS(work->ground_force);
     const gk_quad *v0 = SEEN_QUADS(work->ground_start), *next = SEEN_QUADS(work->ground_next);
@@ -196,12 +206,13 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
         sum += (f4[i] + z[i]) * moved - weight[i] * ((v1 - v0[i]) * (v1 + v0[i]) + omega2[i] * moved * (x1 + x4[i]));
         x4[i] = x1;
         v4[i] = v1;
+        rate4[i] = (next[i] - f4[i]) / k->h;
         f4[i] = next[i];
     }
     const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
     data->energy.work += work->pressed + gk_frame_press(model, setup, k, data, v);
     gk_frame_turn(setup, k, data, 1, v);
-    return taken + damp_supports(model, setup, k, v);
+    return taken + damp_supports(model, setup, k, v + n, v);
 }
 
 static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
@@ -255,7 +266,7 @@ void gk_advance_correct(const gk_model *model, const gk_setup *setup, gk_work *w
             data->energy.dissipated += correct_damped(setup, work, k, g, bv_left, q);
         else /* what rounding gave or took */
             work->engaged[e].system.energy_error -= correct_undamped(setup, work, k, g, bv_left, q);
-        memcpy(q + 2 * n, work->next[g], (size_t)n * sizeof *q);
+        take_force(work->next[g], n, k->h, q + 2 * n);
     }
     data->energy.dissipated += correct_ground(model, setup, work, data, k);
     correct_spins(model, setup, work, data, k);

@@ -10,6 +10,7 @@
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
 #include "base/gk_dense.h"
 #include "integrate/gk_energy.h"
+#include "integrate/gk_closed.h"
 #include "integrate/gk_integrate.h"
 #include "problem/gk_exchange.h"
 
@@ -139,12 +140,12 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, c
 {
     gk_system *s = &work->engaged[e].system;
     const double full = model->engagement[e].force_max / model->engagement[e].width;
-    if (!gk_limit_place(model, setup, work, data, &work->explicit_rows, e, position)) return 0;
+    if (!gk_closed_place(model, setup, work, data, e, position)) return 0;
     for (int i = 0; i < s->n; i++) {
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
         s->slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->width[i]) : 0.0;
     }
-    gk_limit_compliance(s, s->A, full, 0, s->J);
+    gk_closed_compliance(s, s->A, full, 0, s->J);
     for (int i = 0; i < s->contacts && setup->nodal; i++) { /* the penalty in place of the law */
         const double slope = setup->mesh[e].compliance * s->per_width[i];
         s->J[i * s->n + i] += slope - s->slope[i];

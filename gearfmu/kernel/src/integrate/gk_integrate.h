@@ -32,11 +32,6 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
                          double h);
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
 /* gk_limit.c */
-void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);
-int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                   const gk_coefficients *k, int e, double position);
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
-                   double gamma);
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h);
 void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,

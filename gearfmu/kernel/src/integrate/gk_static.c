@@ -178,7 +178,7 @@ static void set_compliance(gk_equilibrium *r)
     r->k.timeless = 0;
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &r->setup.modal[g];
-        r->k.flow[g].exact = m->pairs;
+        r->k.flow[g].yields = m->pairs;
         for (int i = 0; i < m->n; i++)
             r->k.flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
         for (int i = 0; i < r->soft[g]; i++) r->k.flow[g].kappa[r->lane[g][i]] = 0;
@@ -223,6 +223,7 @@ static void spread(gk_equilibrium *r)
     data->state_h = data->state_gamma = 0.0;
     gk_exchange_scatter(r->model, setup, work, gk_step_force, gk_step_force);
     memcpy(x + 2 * n, work->ground_force, (size_t)n * sizeof *x);
+    memset(x + 3 * n, 0, (size_t)n * sizeof *x);
     gk_frame_load(r->model, setup, data, work->ground_force);
     for (int i = 0; i < n; i++) {
         x[i] = setup->base.omega2[i] > 0.0 ? work->ground_force[i] / setup->base.omega2[i] : 0.0;
@@ -235,6 +236,7 @@ static void spread(gk_equilibrium *r)
             q[i] = m->omega2[i] > 0 ? work->force[g][i] / m->omega2[i] : 0;
             q[m->n + i] = 0;
             q[2 * m->n + i] = work->force[g][i];
+            q[3 * m->n + i] = 0;
         }
     }
     memset(GK_OF(data, f), 0, (size_t)setup->spins * sizeof(double));

@@ -8,11 +8,32 @@
 static const double HUGE_FORCE = 1e15;             /* N: no gear force reaches this value */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
-/* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
-static double speed_lead(double h, double gamma) { return h * h * (2.0 * gk_correction(gamma) - 1.0) / 12.0; }
+/* from old to k, where the force is f: q and v of a state of displacement + κ f and unit ẋ + lead ḟ + hold f */
+static void express_modes(const gk_flow *k, const gk_flow *old, int n, gk_real *q)
+{
+    gk_real *v = q + n;
+    const gk_real *f = v + n, *rate = f + n;
+    for (int i = 0; i < n; i++) {
+        const gk_real speed = (v[i] - old->lead[i] * rate[i] - old->hold[i] * f[i]) / old->unit[i];
+        q[i] += (k->kappa[i] - old->kappa[i]) * f[i];
+        v[i] = k->unit[i] * speed + k->lead[i] * rate[i] + k->hold[i] * f[i];
+    }
+}
 
-/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the
- * speed of free masses. At rest κ = 0. Another expression has another energy: the balance goes on from there. */
+/* the same of the ground group */
+static void express_ground(const gk_ground_flow *k, const gk_ground_flow *old, int n, double *x)
+{
+    double *v = x + n;
+    const double *f = v + n, *rate = f + n;
+    for (int i = 0; i < n; i++) {
+        const double speed = (v[i] - old->lead[i] * rate[i] - old->hold[i] * f[i]) / old->unit[i];
+        x[i] += (k->kappa[i] - old->kappa[i]) * f[i];
+        v[i] = k->unit[i] * speed + k->lead[i] * rate[i] + k->hold[i] * f[i];
+    }
+}
+
+/* When h or γ changes, displacement and speed of the motion stay (docs/theory, 3.8); at rest they are the state.
+ * Another expression has another energy: the balance goes on from there. */
 static void express(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                     const gk_coefficients *k)
 {
@@ -20,19 +41,14 @@ static void express(const gk_model *model, const gk_setup *setup, gk_work *work,
     const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(model, setup, work, data->state_h, data->state_gamma)
                                                      : &work->explicit_rows;
     const double before = gk_energy_dynamic(model, setup, data, old);
-    double *x = gk_ground_of(data), *f = x + 2 * setup->base.n;
-    for (int i = 0; i < setup->base.n; i++) x[i] += (k->ground.kappa[i] - old->ground.kappa[i]) * f[i];
-    for (int g = 0; g < model->gears; g++) {
-        const int n = GK_LANES(setup, g);
-        gk_real *q = gk_modal_of(setup, data, g);
-        for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
+    express_ground(&k->ground, &old->ground, setup->base.n, gk_ground_of(data));
+    for (int g = 0; g < model->gears; g++)
+        express_modes(&k->flow[g], &old->flow[g], GK_LANES(setup, g), gk_modal_of(setup, data, g));
+    for (int d = 0; d < setup->spins; d++) {
+        const double by_force = setup->inverse_inertia[d] * GK_OF(data, f)[d];
+        GK_OF(data, x)[d] += (k->rigid_kappa - old->rigid_kappa) * by_force;
+        GK_OF(data, v)[d] += (k->rigid_lead - old->rigid_lead) * setup->inverse_inertia[d] * GK_OF(data, f_rate)[d];
     }
-    const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma)
-                                            : 0.0;
-    for (int d = 0; d < setup->spins; d++)
-        GK_OF(data, v)[d] += lead * setup->inverse_inertia[d] * GK_OF(data, f_rate)[d];
-    for (int d = 0; d < setup->spins; d++)
-        GK_OF(data, x)[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_inertia[d] * GK_OF(data, f)[d];
     data->energy.baseline += gk_energy_dynamic(model, setup, data, k) - before;
     data->state_h = k->h;
     data->state_gamma = k->gamma;

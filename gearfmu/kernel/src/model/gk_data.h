@@ -57,7 +57,6 @@ typedef struct gk_meshing { /* an engagement */
         pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;
     int32_t apart, pairs;
-    int32_t adopted, unused; /* gaps in memory are those at the end of the step: another setup made it */
     gk_memory memory[MAX_PAIRS];
 } gk_meshing;
 
@@ -85,8 +84,8 @@ typedef gk_joint_state gk_joint_states[JOINTS];
  * locked: clutches; input: outer ends at the start of the communication step; hold: angle a port is referred to
  * v_bore: speed of the bore nodes before the last internal step
  * angle: bore angle at a torque port, quasi-static part included
- * oscillator: ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real; then the amplitudes
- * of observed gears */
+ * oscillator: ground group: q (n), v (n), f (n), f_rate (n), double; then the same of every gear group, gk_real; then
+ * the amplitudes of observed gears */
 #define GK_ARRAYS                                                                                                      \
     GK_ARRAY(shaft, gk_shaft_values, model->ports)                                                                     \
     GK_ARRAY(rotor, gk_rotor_values, model->rotors)                                                                    \

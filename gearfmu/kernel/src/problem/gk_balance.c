@@ -265,6 +265,16 @@ static int rubs_away(const gk_island *island, double defect)
     return 1;
 }
 
+/* Is the defect that no scalar balances what friction leaves of the energy that it holds, as where it reverses under a
+ * light load? The next steps make that good. */
+static int friction_owes(const gk_island *island, double defect)
+{
+    static const double ELSE = 0.1; /* least share of another cause that is told */
+    double rubbing = 0.0;
+    for (int m = 0; m < island->count; m++) rubbing += island->member[m]->rubs ? island->member[m]->rubbing : 0.0;
+    return fabs(defect - rubbing) < ELSE * fabs(rubbing);
+}
+
 /* a step that cannot be balanced with films goes without them */
 static int dry(const gk_island *island)
 {
@@ -321,6 +331,6 @@ void gk_balance_solve(const gk_island *island)
         own.defect = 0.0;
     }
     leave(island, &b);
-    if (open_balance(&own, steady))
+    if (open_balance(&own, steady) && !(rubs && friction_owes(island, own.defect)))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }

@@ -136,9 +136,9 @@ static void gram(const gk_setup *setup, gk_work *work, gk_engaged *engaged, cons
         for (int j = 0; j < gk_block_end(i) && j < s->contacts; j++) {
             const gk_real *other = engaged->basis[side->which] + (size_t)j * n;
             s->D[i * s->stride + j] += gk_dot(moves, other, n);
-            if (flow->exact)
-                s->A[i * s->stride + j] -= gk_dot(yields, other, flow->exact) +
-                                           gk_dot(yields + P, other + P, flow->exact);
+            if (flow->yields)
+                s->A[i * s->stride + j] -= gk_dot(yields, other, flow->yields) +
+                                           gk_dot(yields + P, other + P, flow->yields);
         }
     }
 }

@@ -1,8 +1,7 @@
 /* Engagements of one island (gk_islands.c). Each has a problem of its own, solved with the others' forces as they are.
  * Their effect on its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and
  * scattered, never through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at
- * γ = 1, so that three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with.
- */
+ * γ = 1: three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_shared.h"
 #include "problem/gk_exchange.h"
 
@@ -115,10 +114,9 @@ static void give_bores(const gk_setup *setup, gk_work *work, int e, const double
 }
 
 /* what an engagement's forces do to spins, ground group and bores; with friction to the modes of shared gears too */
-static void give(const gk_coupled *c, int e, effect of)
+static void give_forces(const gk_coupled *c, int e)
 {
     const gk_forces *f = &c->work->engaged[e].forces;
-    forces_of(c->setup, &c->work->engaged[e], of);
     give_spins(c->setup, c->work, c->k, e, f);
     give_ground(c->setup, c->work, c->k, e, f);
     give_bores(c->setup, c->work, e, f->once);
@@ -126,9 +124,16 @@ static void give(const gk_coupled *c, int e, effect of)
         if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) give_modes(c->setup, c->work, c->k, e, w, f);
 }
 
+static void give(const gk_coupled *c, int e, effect of)
+{
+    forces_of(c->setup, &c->work->engaged[e], of);
+    give_forces(c, e);
+}
+
 static int within(const gk_coupled *c, int e) { return c->setup->mesh[e].island == c->island; }
 
-static void give_all(const gk_coupled *c, effect of)
+/* nothing has been given yet */
+static void forget_all(const gk_coupled *c)
 {
     gk_work *work = c->work;
     memset(work->sum_spin, 0, sizeof work->sum_spin);
@@ -140,8 +145,14 @@ static void give_all(const gk_coupled *c, effect of)
         memset(engaged->given_spin, 0, sizeof engaged->given_spin);
         memset(engaged->given_ground, 0, (size_t)c->setup->mesh[e].local * sizeof *engaged->given_ground);
         memset(&engaged->given_bores, 0, sizeof engaged->given_bores);
-        give(c, e, of);
     }
+}
+
+static void give_all(const gk_coupled *c, effect of)
+{
+    forget_all(c);
+    for (int e = 0; e < c->model->engagements; e++)
+        if (within(c, e)) give(c, e, of);
 }
 
 /* ---- what it takes ----------------------------------------------------------------------------------------------- */
@@ -310,8 +321,7 @@ static void sweep(const gk_island *island)
     gk_coupled *c = island->context;
     double change = INFINITY, next = INFINITY, gaps = INFINITY;
     give_all(c, WHOLE);
-    const int most = c->sweeps ? c->sweeps : SWEEPS;
-    for (int round = 0; round < most && !(next < TOLERANCE); round++) {
+    for (int round = 0; round < (c->sweeps ? c->sweeps : SWEEPS) && !(next < TOLERANCE); round++) {
         const double last = change;
         change = gaps = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
@@ -366,4 +376,25 @@ void gk_couple_recall(gk_coupled *c)
             s->stored0 += 0.5 * s->force0[i] * s->beyond[i];
         }
     }
+}
+
+/* Gives a unit force of one row, acting at once, and nothing else. */
+void gk_couple_unit(const gk_coupled *c, int from, int row)
+{
+    GK_ASSERT(within(c, from) && row < c->work->engaged[from].system.n);
+    forget_all(c);
+    for (int e = 0; e < c->model->engagements; e++) {
+        gk_forces *f = &c->work->engaged[e].forces;
+        memset(f, 0, sizeof *f);
+        if (e == from) f->once[row] = 1.0, f->far[row] = row < c->work->engaged[e].system.contacts;
+        if (within(c, e)) give_forces(c, e);
+    }
+}
+
+/* what was given does at once to the rows of another engagement */
+void gk_couple_read(const gk_coupled *c, int to, double *read)
+{
+    GK_ASSERT(within(c, to));
+    memset(read, 0, (size_t)c->work->engaged[to].system.stride * sizeof *read);
+    take(c, to, 1, read);
 }

@@ -107,8 +107,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         const int memory = engaged->place[s->place_of[i]].memory;
         s->recalled[i] = memory >= 0;
         s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
-                              : (GK_OF(data, meshing)[e].adopted ? 0.0 : s->g0[i]) +
-                                    GK_OF(data, meshing)[e].memory[memory].gap[i % GK_STRIPS(s)];
+                              : s->g0[i] + GK_OF(data, meshing)[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
@@ -158,9 +157,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     [s->port_of[i]][s->joint_of[i]] = (gk_joint_state){s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i],
                                                        s->damper[i], s->end[i]};
     meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
-    meshing->energy_error = meshing->adopted ? 0.0
-                                             : s->energy_error; /* what the change of setup took or gave is no debt */
-    meshing->adopted = 0;
+    meshing->energy_error = s->energy_error;
 }
 
 /* an engagement without rows */

@@ -30,6 +30,8 @@ static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing
     }
 }
 
+static double slid_in_step(const gk_glide *glide, int j) { return glide->slid[j] - glide->lead[j]; }
+
 /* limit at which friction works against a sliding that is more than `creep` */
 static signed char against(double sliding, double creep)
 {
@@ -42,7 +44,7 @@ static signed char first_limit(const gk_glide *glide, const gk_system *s, int i)
     static const double STUCK = 1e-6;
     if (!glide->rolls && s->force0[i] > 0.0 && fabs(glide->ratio[i]) < (1.0 - STUCK) * glide->most[i]) return 0;
     if (!glide->rolls && s->force0[i] > 0.0) return glide->ratio[i] > 0.0 ? 1 : -1;
-    return against(glide->begin[i], glide->creep[i]);
+    return against(glide->begin[i] - glide->lead[i], glide->creep[i]);
 }
 
 /* coefficient of friction of every contact by the forces of the last step, and where it fades */
@@ -65,6 +67,7 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
         at.rolls = fabs(speed[0]) * point->roll[0] + fabs(speed[1]) * point->roll[1];
         glide->most[i] = gk_lubrication_coefficient(&mesh->friction, model->engagement[e].width, &at);
         glide->creep[i] = glide->rolls ? FADES * mesh->friction.sliding * fabs(meshing->rolling) * h : 0.0;
+        glide->lead[i] = glide->rolls ? gk_glide_lead(mesh, point, speed, h) : 0.0;
         glide->limit[i] = first_limit(glide, s, i);
     }
 }
@@ -196,7 +199,7 @@ static void express_friction(gk_glide *glide, const gk_system *s)
     for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
         const int i = held[k];
         const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = glide->slid[i], *a = all_a + k * width, *x = all_x + k * width;
+        double rest = slid_in_step(glide, i), *a = all_a + k * width, *x = all_x + k * width;
         for (int r = 0; r < s->n; r++) {
             const double each = moved[r] + yielded[r];
             rest -= each * s->z[r], x[r] = -each;
@@ -271,15 +274,15 @@ static int change_status(gk_glide *glide, const gk_system *s, int patient)
         const double most = glide->rolls ? glide->most_force[j] : glide->most_end[j];
         const double p = glide->rolls ? glide->mean[j] : glide->end[j];
         if (!(most > 0.0)) { /* apart at the end: what there was may not push along the sliding */
-            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * glide->slid[j] > 0.0;
+            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * slid_in_step(glide, j) > 0.0;
             if (pushes) glide->limit[j] = glide->start_end[j] > 0.0 ? -1 : 1, count++;
             if (glide->held[j] && fabs(glide->mean[j]) > glide->most_force[j]) /* what would hold it shows the side */
                 glide->limit[j] = glide->mean[j] > 0.0 ? 1 : -1;
             else if (!(glide->most_force[j] > 0.0))
-                glide->limit[j] = against(glide->slid[j], glide->creep[j]);
+                glide->limit[j] = against(slid_in_step(glide, j), glide->creep[j]);
             continue;
         }
-        if (glide->limit[j] ? glide->limit[j] * glide->slid[j] > -glide->creep[j] * (1.0 - ALMOST)
+        if (glide->limit[j] ? glide->limit[j] * slid_in_step(glide, j) > -glide->creep[j] * (1.0 - ALMOST)
                             : fabs(p) > most * (1.0 + ALMOST)) {
             glide->limit[j] = (signed char)(glide->limit[j] ? 0 : p > 0.0 ? 1 : -1);
             count++;
@@ -341,7 +344,7 @@ static double friction_defect(const gk_glide *glide, const gk_system *s)
 static double friction_taken(const gk_glide *glide, const gk_system *s)
 {
     double taken = -faded(glide, s);
-    for (int j = 0; j < s->contacts; j++) taken -= glide->mean[j] * glide->slid[j];
+    for (int j = 0; j < s->contacts; j++) taken -= glide->mean[j] * slid_in_step(glide, j);
     return taken;
 }
 

@@ -34,16 +34,17 @@ static void slide_modes(const gk_setup *setup, gk_work *work, const gk_coefficie
     const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
     const gk_half *gaps = (const gk_half *)engaged->basis[which], *slides = (const gk_half *)glide->basis[which];
     gk_half *scaled = (gk_half *)work->scaled;
-    const int exact = 2 * flow->exact / LANES;
+    const int lanes = 2 * flow->yields / LANES;
     for (int j = 0; j < s->contacts && width; j++) {
         const gk_half *row = slides + (size_t)(j * width);
         const int at = j * s->stride;
         for (int l = 0; l < width; l++) scaled[l] = row[l] * mobility[l];
         gk_multiply_rows(scaled, gaps, s->contacts, width, width, glide->gap_moves + at);
         gk_multiply_rows(scaled, slides, s->contacts, width, width, glide->moves + at);
-        for (int first = 0; first < width && exact; first += half) { /* κ is 0 beyond */
-            for (int l = first; l < first + exact; l++) scaled[l] = -row[l] * kappa[l];
-            gk_multiply_rows(scaled + first, gaps + first, s->contacts, width, exact, glide->gap_yields + at);
+        for (int first = 0; first < width && lanes; first += half) { /* κ is 0 beyond */
+            for (int l = first; l < first + lanes; l++) scaled[l] = -row[l] * kappa[l];
+            gk_multiply_rows(scaled + first, gaps + first, s->contacts, width, lanes, glide->gap_yields + at);
+            gk_multiply_rows(scaled + first, slides + first, s->contacts, width, lanes, glide->yields + at);
         }
     }
 }
@@ -67,6 +68,7 @@ static void slide_ground(const gk_setup *setup, gk_work *work, const gk_coeffici
         gk_times_rows(engaged->ground, s->n, width, moves, glide->gap_moves + at);
         gk_times_rows(engaged->ground, s->n, width, yields, glide->gap_yields + at);
         gk_times_rows(glide->ground, s->contacts, width, moves, glide->moves + at);
+        gk_times_rows(glide->ground, s->contacts, width, yields, glide->yields + at);
     }
 }
 
@@ -82,7 +84,8 @@ static void slide_spins(const gk_setup *setup, const gk_coefficients *k, const g
             for (int i = 0; i < s->n && moves != 0.0; i++) {
                 const int at = j * s->stride + i;
                 glide->gap_moves[at] += moves * s->rigid[l][i], glide->gap_yields[at] -= yields * s->rigid[l][i];
-                if (i < s->contacts) glide->moves[at] += moves * glide->rigid[l][i];
+                if (i >= s->contacts) continue;
+                glide->moves[at] += moves * glide->rigid[l][i], glide->yields[at] -= yields * glide->rigid[l][i];
             }
         }
     }
@@ -143,4 +146,13 @@ void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, 
         }
     }
     for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
+}
+
+/* What the sliding by the row at the end of the step is ahead of that in the step: contacts move along the line of
+ * action, so that rolling gears change their row in the step. speed: of both gears on their carrier */
+double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h)
+{
+    GK_ASSERT(h > 0.0);
+    const double grows = point->slide[PHIA] < 0.0 ? point->gradient[PHIA] : -point->gradient[PHIA];
+    return mesh->cosine > 0.0 ? 0.5 * h * h * grows / mesh->cosine * speed[0] * (speed[0] - speed[1]) : 0.0;
 }

@@ -19,16 +19,16 @@ static void form_modes(const gk_setup *setup, const gk_flow *flow, gk_work *work
 {
     const gk_engaged *to = &work->engaged[s->engagement[0]], *from = &work->engaged[s->engagement[1]];
     const gk_modal *m = &setup->modal[s->gear];
-    const int width = 2 * m->n / LANES, half = width / 2, exact = 2 * flow->exact / LANES, rows = to->system.contacts;
+    const int width = 2 * m->n / LANES, half = width / 2, lanes = 2 * flow->yields / LANES, rows = to->system.contacts;
     const gk_half *a = (const gk_half *)to->turned[s->side[0]], *b = (const gk_half *)from->turned[s->side[1]];
     const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
     gk_half *scaled = (gk_half *)work->scaled;
     for (int j = 0; j < from->system.contacts; j++, b += width) {
         for (int k = 0; k < width; k++) scaled[k] = b[k] * mobility[k];
         gk_multiply_rows(scaled, a, rows, width, width, s->moves + j * s->stride);
-        for (int first = 0; first < width && exact; first += half) {
-            for (int k = first; k < first + exact; k++) scaled[k] = -b[k] * kappa[k];
-            gk_multiply_rows(scaled + first, a + first, rows, width, exact, s->yielded + j * s->stride);
+        for (int first = 0; first < width && lanes; first += half) {
+            for (int k = first; k < first + lanes; k++) scaled[k] = -b[k] * kappa[k];
+            gk_multiply_rows(scaled + first, a + first, rows, width, lanes, s->yielded + j * s->stride);
         }
     }
 }
@@ -51,7 +51,7 @@ void gk_shared_form(const gk_model *model, const gk_setup *setup, const gk_coeff
         const int quads = work->engaged[s->engagement[1]].system.contacts * s->stride / 4;
         s->far_on = setup->far_on[s->gear];
         s->dynamic = modes && GK_LANES(setup, s->gear) > 0;
-        s->yields = s->dynamic && k->flow[s->gear].exact > 0;
+        s->yields = s->dynamic && k->flow[s->gear].yields > 0;
         if (s->far_on) gk_clear(s->far, quads), gk_far_between(model, setup, work, s);
         if (s->dynamic) gk_clear(s->moves, quads);
         if (s->yields) gk_clear(s->yielded, quads);

@@ -51,8 +51,9 @@ typedef struct gk_glide {
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
     double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
     double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
-    double slid[MAX_STRIDE];                                    /* sliding in the step */
-    double damps[MAX_STRIDE];                                   /* relaxation time of a contact that sticks over h */
+    double slid[MAX_STRIDE], lead[MAX_STRIDE]; /* sliding in the step by the rows at its end; what that is ahead of its
+                                                  mean */
+    double damps[MAX_STRIDE];                  /* relaxation time of a contact that sticks over h */
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
 
@@ -133,6 +134,7 @@ struct gk_work {
     double *spread;    /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
+    double *island;                             /* the limit of the step: (2, rows, rows) of all engagements */
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     gk_bores sum_bores;
     gk_field field[2];             /* nodal contact: teeth of A and B in hand */
@@ -165,6 +167,7 @@ GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, con
 GK_HOT void gk_glide_rows(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e);
 GK_HOT void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e);
+GK_HOT double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h);
 /* gk_friction.c */
 GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k, gk_work *work, int e);
@@ -185,6 +188,8 @@ typedef struct gk_coupled { /* an island in a step */
 } gk_coupled;
 GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
 GK_HOT void gk_couple_recall(gk_coupled *coupled);
+GK_HOT void gk_couple_unit(const gk_coupled *coupled, int from, int row);
+GK_HOT void gk_couple_read(const gk_coupled *coupled, int to, double *read);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
 static inline int gk_block_end(int i)
 {

@@ -1,8 +1,8 @@
 /* A run that goes on with another setup: the physical motion of the old state, expressed in the oscillators that are
  * dynamic now. An oscillator that was compliance had the displacement f/ω² of its modal force f, and its speed is taken
- * as zero; one that becomes compliance is left out, for the residual holds its static part. Contacts keep forces and
- * gaps; where another number of strips is in use they begin as new ones do, which disturbs as much as half a step
- * without contact. What contacts owed the energy balance is forgotten. */
+ * as zero; one that becomes compliance is left out, for the residual holds its static part. Contacts keep forces, gaps
+ * and the energy that they owe; where another number of strips is in use they begin as new ones do, which disturbs as
+ * much as half a step without contact. */
 #include "run/gk_run.h"
 #include <stddef.h>
 
@@ -23,19 +23,6 @@ static int allowed(const gk_setup *old, const gk_data *from, const gk_setup *set
            !gk_scheme_of(setup->integrator)->is_explicit && old->base.set == setup->base.set;
 }
 
-/* gaps at the end of the step instead of what the old compliance made of them */
-static void take_contacts(const passage *c, int e)
-{
-    const gk_system *s = &c->work->engaged[e].system;
-    gk_meshing *meshing = &GK_OF(c->data, meshing)[e];
-    meshing->energy_error = 0.0;
-    meshing->adopted = 1;
-    if (c->old->strips != c->setup->strips) meshing->pairs = 0;
-    for (int p = 0, i = 0; p < meshing->pairs; p++)
-        for (int strip = 0; strip < c->old->strips; strip++, i++)
-            meshing->memory[p].gap[strip] = gk_solve_end_gap(s, i);
-}
-
 /* all that does not depend on the setup; the energy balance begins anew */
 static void take_head(const passage *c)
 {
@@ -50,14 +37,16 @@ static void take_head(const passage *c)
     c->data->table_h = c->data->rk_h = 0.0;
     c->data->steps = 0;
     c->data->energy = (gk_energy){0};
-    for (int e = 0; e < c->model->engagements; e++) take_contacts(c, e);
+    for (int e = 0; e < c->model->engagements && c->old->strips != c->setup->strips; e++)
+        GK_OF(c->data, meshing)[e].pairs = 0;
 }
 
-/* rigid rotations: what the scheme adds to displacement is taken off */
+/* rigid rotations: what the scheme adds to displacement and speed is taken off */
 static void take_spins(const passage *c)
 {
-    for (int d = 0; d < c->old->spins; d++)
-        GK_OF(c->data, x)[d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * GK_OF(c->from, f)[d];
+    for (int d = 0; d < c->old->spins; d++) GK_OF(c->data, x)
+    [d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * GK_OF(c->from, f)[d],
+        GK_OF(c->data, v)[d] -= c->k->rigid_lead * c->old->inverse_inertia[d] * GK_OF(c->from, f_rate)[d];
 }
 
 /* displacement, speed and force of the ground oscillators; pushed: modal forces on those that were compliance */
@@ -65,15 +54,17 @@ static void take_ground(const passage *c, const double *pushed)
 {
     const gk_base *was = &c->old->base, *is = &c->setup->base;
     const gk_ground *ground = &c->model->ground[is->set];
-    const double *x = gk_ground_seen(c->from), *kappa = c->k->ground.kappa;
+    const gk_ground_flow *k = &c->k->ground;
+    const double *x = gk_ground_seen(c->from), *v = x + was->n, *f = v + was->n, *rate = f + was->n;
     double *out = gk_ground_of(c->data);
-    memset(out, 0, 3 * (size_t)is->n * sizeof *out);
-    for (int k = 0; k < ground->n; k++) {
-        const int a = was->slot[k], b = is->slot[k];
+    memset(out, 0, OSCILLATOR_STATE * (size_t)is->n * sizeof *out);
+    for (int i = 0; i < ground->n; i++) {
+        const int a = was->slot[i], b = is->slot[i];
         if (b < 0) continue;
-        out[b] = a >= 0 ? x[a] - kappa[a] * x[2 * was->n + a] : pushed[k] / (ground->omega[k] * ground->omega[k]);
-        out[is->n + b] = a >= 0 ? x[was->n + a] : 0.0;
-        out[2 * is->n + b] = a >= 0 ? x[2 * was->n + a] : pushed[k];
+        out[b] = a >= 0 ? x[a] - k->kappa[a] * f[a] : pushed[i] / (ground->omega[i] * ground->omega[i]);
+        out[is->n + b] = a >= 0 ? (v[a] - k->lead[a] * rate[a] - k->hold[a] * f[a]) / k->unit[a] : 0.0;
+        out[2 * is->n + b] = a >= 0 ? f[a] : pushed[i];
+        out[3 * is->n + b] = a >= 0 ? rate[a] : 0.0;
     }
 }
 
@@ -82,14 +73,16 @@ static void take_gear(const passage *c, int g, const double *pushed)
 {
     const gk_modal *was = &c->old->modal[g], *is = &c->setup->modal[g];
     const double *omega = c->model->gear[g].omega;
-    const gk_real *q = gk_modal_seen(c->old, c->from, g), *kappa = c->k->flow[g].kappa;
+    const gk_flow *k = &c->k->flow[g];
+    const gk_real *q = gk_modal_seen(c->old, c->from, g), *v = q + was->n, *f = v + was->n, *rate = f + was->n;
     gk_real *out = gk_modal_of(c->setup, c->data, g);
-    memset(out, 0, 3 * (size_t)is->n * sizeof *out);
+    memset(out, 0, OSCILLATOR_STATE * (size_t)is->n * sizeof *out);
     for (int i = 0; i < is->count; i++) {
         const int b = is->lane[i], known = i < was->count, a = known ? was->lane[i] : 0;
-        out[b] = known ? q[a] - kappa[a] * q[2 * was->n + a] : (gk_real)(pushed[i] / (omega[i] * omega[i]));
-        out[is->n + b] = known ? q[was->n + a] : (gk_real)0;
-        out[2 * is->n + b] = known ? q[2 * was->n + a] : (gk_real)pushed[i];
+        out[b] = known ? q[a] - k->kappa[a] * f[a] : (gk_real)(pushed[i] / (omega[i] * omega[i]));
+        out[is->n + b] = known ? (v[a] - k->lead[a] * rate[a] - k->hold[a] * f[a]) / k->unit[a] : (gk_real)0;
+        out[2 * is->n + b] = known ? f[a] : (gk_real)pushed[i];
+        out[3 * is->n + b] = known ? rate[a] : (gk_real)0;
     }
 }
 

@@ -247,7 +247,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     if (!(data->table_h > 0.0)) data->table_h = h;
     gk_limit_run(model, setup, work, data, data->table_h);
     for (int64_t i = 0; i < steps; i++) {
-        if (i + 1 == steps) gk_outputs_bores(model, setup, data);
+        if (i + 1 == steps) gk_outputs_bores(model, setup, work, data);
         outcome = advance(model, setup, work, data, &c, (double)i * h, h, 0);
         for (int p = 0; p < model->ports; p++) GK_OF(data, shaft)[p][V_CAPACITY] = c.capacity[p];
         if (outcome) {

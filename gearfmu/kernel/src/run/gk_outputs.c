@@ -102,26 +102,30 @@ static void support_outputs(const gk_model *model, const gk_setup *setup, const 
 }
 
 /* ---- motion ------------------------------------------------------------------------------------------------------ */
-/* speed of the bore's node: spin and dynamic oscillators */
-static double bore_speed(const gk_model *model, const gk_setup *setup, const gk_data *data, int p)
+/* speeds of the bores' nodes: spins and dynamic oscillators */
+static void bore_speeds(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                        double *out)
 {
     const int n = setup->base.n;
-    const double *v = gk_ground_seen(data) + n;
-    return GK_OF(data, v)[model->port[p].rotor] + (n ? gk_dot_quads(v, setup->base.port_rows + p * n, n / 4) : 0.0);
+    double *const moved = work->tally + 4 * n, *const speed = moved + n;
+    if (n) gk_supports_motion(setup, work, data, moved, speed);
+    for (int p = 0; p < model->ports; p++)
+        out[p] = GK_OF(data, v)[model->port[p].rotor] +
+                 (n ? gk_dot_quads(speed, setup->base.port_rows + p * n, n / 4) : 0.0);
 }
 
-void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data)
+void gk_outputs_bores(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     GK_ASSERT(model->ports <= MAX_PORTS);
-    for (int p = 0; p < model->ports; p++) GK_OF(data, v_bore)[p] = bore_speed(model, setup, data, p);
+    bore_speeds(model, setup, work, data, GK_OF(data, v_bore));
 }
 
-static void port_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, int p, double h)
+static void port_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, int p, double speed, double h)
 {
     double *v = GK_OF(data, shaft)[p];
     if (setup->given_torque[p]) {
         v[V_PHI] = GK_OF(data, angle)[p];
-        v[V_W] = bore_speed(model, setup, data, p);
+        v[V_W] = speed;
         v[V_A] = h > 0.0 ? (v[V_W] - GK_OF(data, v_bore)[p]) / h : 0.0;
     }
     if (!model->port[p].chain) return;
@@ -146,7 +150,7 @@ static double transmission_error(const gk_model *model, const gk_data *data, int
 
 static void outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
 {
-    double *v = data->stage;
+    double *v = data->stage, bore[MAX_PORTS];
     int dynamic = setup->base.count;
     for (int r = 0; r < model->rotors; r++)
         GK_OF(data, rotor)[r][V_GEAR_W] = GK_OF(data, v)[r], GK_OF(data, rotor)[r][V_GEAR_PHI] = GK_OF(data, x)[r];
@@ -155,7 +159,8 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
         if (GK_ON(setup, friction)) friction_outputs(&work->engaged[e], data, e);
         joint_outputs(model, setup, work, data, &work->engaged[e].system);
     }
-    for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
+    bore_speeds(model, setup, work, data, bore);
+    for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, bore[p], h);
     support_outputs(model, setup, work, data);
     for (int e = 0; e < model->engagements; e++) GK_OF(data, mesh)[e][V_TE] = transmission_error(model, data, e);
     gk_amplitudes(model, setup, work, data);

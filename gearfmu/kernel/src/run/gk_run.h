@@ -45,7 +45,7 @@ GK_HOT void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data
                            const gk_tally *tally);
 /* gk_outputs.c */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
-void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);
+void gk_outputs_bores(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
 void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
                     const gk_tally *tally);
 int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first);

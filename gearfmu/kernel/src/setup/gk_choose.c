@@ -7,7 +7,7 @@
 static const double RESOLVED = 4.0; /* ωh up to which the step follows an oscillator */
 
 /* the longest step that a run is given which asks for none, s */
-double gk_longest_step(const gk_model *model) { return gk_min(model->h_max, model->period_min / 40.0); }
+double gk_longest_step(const gk_model *model) { return gk_min(model->h_max, model->period_min / 16.0); }
 
 /* ---- level and integrator ---------------------------------------------------------------------------------------- */
 static int has_nodes(const gk_model *model, const gk_data *data)

@@ -146,7 +146,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     for (int g = 0; g < model->gears; g++) {
         lay_out_modal(&b, &model->gear[g], &setup->modal[g], modes[g]);
         setup->modal[g].at = at;
-        at += 3 * (size_t)setup->modal[g].n;
+        at += OSCILLATOR_STATE * (size_t)setup->modal[g].n;
     }
     for (int g = 0; g < model->gears; g++)
         setup->far[g] = doubles(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * FAR : 0);
@@ -167,7 +167,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
         setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
     }
-    setup->amplitudes = 3 * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
+    setup->amplitudes = OSCILLATOR_STATE * (size_t)setup->base.n +
+                        (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
     uint32_t arrays[ARRAYS];
     gk_data_plan(model, arrays);
     setup->state_size = sizeof(gk_data) +
@@ -176,7 +177,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
 }
 
 #define FLOW_ARRAYS(f)                                                                                                 \
-    {&f->d11, &f->a12, &f->a21, &f->d22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->kappa, &f->inverse_s2}
+    {&f->d11, &f->a12,      &f->a21,   &f->d22,        &f->b0q,  &f->b0v,  &f->bq,                                     \
+     &f->bv,  &f->mobility, &f->kappa, &f->inverse_s2, &f->unit, &f->lead, &f->hold}
 
 static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
@@ -189,6 +191,7 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     double **array[] = FLOW_ARRAYS(f);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
+    f->holds = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
     f->turns = doubles(b, turning);
     f->turned = doubles(b, turning);
@@ -300,6 +303,8 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     size_t blocks;
     work->spread = doubles(&b, gk_spread_scratch(model, &blocks));
     work->blocks = reals(&b, blocks);
+    const size_t rows = (size_t)model->engagements * (MAX_PAIRS * (size_t)setup->strips + MAX_JOINTS);
+    work->island = doubles(&b, 2 * rows * rows);
     work->sum_ground = doubles(&b, ground);
     for (int w = 0; w < 2; w++) {
         gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};

@@ -312,19 +312,23 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
 {
     gk_coefficients *k = &work->explicit_rows;
     const size_t ground = (size_t)setup->base.n * sizeof(double);
-    k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = 0.0;
+    k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_lead = k->rigid_mobility = 0.0;
     k->timeless = 1;
     for (int g = 0; g < model->gears; g++) {
         const size_t size = (size_t)setup->modal[g].n * sizeof(gk_real);
         memset(k->flow[g].mobility, 0, size);
         memset(k->flow[g].kappa, 0, size);
-        for (int i = 0; i < setup->modal[g].n; i++) k->flow[g].inverse_s2[i] = 1;
+        for (int i = 0; i < setup->modal[g].n; i++) k->flow[g].inverse_s2[i] = k->flow[g].unit[i] = 1;
+        memset(k->flow[g].lead, 0, size);
+        memset(k->flow[g].hold, 0, size);
         memset(work->zero, 0, size);
-        k->flow[g].exact = 0;
+        k->flow[g].yields = 0;
     }
     memset(k->ground.mobility, 0, ground);
     memset(k->ground.kappa, 0, ground);
-    for (int i = 0; i < setup->base.n; i++) k->ground.inverse_s2[i] = 1.0;
+    memset(k->ground.lead, 0, ground);
+    memset(k->ground.hold, 0, ground);
+    for (int i = 0; i < setup->base.n; i++) k->ground.inverse_s2[i] = k->ground.unit[i] = 1.0;
     memset(work->ground_zero, 0, ground);
 }
 

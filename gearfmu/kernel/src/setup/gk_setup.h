@@ -10,11 +10,12 @@
 #include "setup/gk_spread.h"
 
 enum {
-    NODES = 88,          /* of a side's table in one pitch */
-    CACHE = 4,           /* coefficient sets kept */
-    GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
-    MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
-    GAPS = 4,            /* places along a part of a line of contact at which its gap is known */
+    NODES = 88,           /* of a side's table in one pitch */
+    CACHE = 4,            /* coefficient sets kept */
+    OSCILLATOR_STATE = 4, /* q, v, f, f_rate */
+    GAMMAS = 25,          /* γ is known at h·2^(−i/4) */
+    MAX_CANDIDATES = 24,  /* tooth pairs that can be near contact at any position, both flanks */
+    GAPS = 4,             /* places along a part of a line of contact at which its gap is known */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
     FAR = 12,     /* patterns by which engagements of one gear feel each other */
     MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
@@ -172,28 +173,28 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
                                                              the start and at the end of the step */
     gk_real *mobility; /* what a force at the end does to a gap */
     gk_real *kappa, *inverse_s2;
-    int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
+    gk_real *unit, *lead, *hold; /* v = unit ẋ + lead ḟ + hold f */
+    int yields;                  /* the first `yields` lanes of each half: κ ≠ 0 */
 } gk_flow;
 
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
-    double *pulls;          /* (supports, n) s²e/n of a dashpot */
-    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
-    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
+    double *unit, *lead, *hold;
+    double *pulls;              /* (supports, n) s²e/n of a dashpot */
+    double *turns, *turned;     /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;           /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
+    double *holds;              /* (supports, n) e times `hold` */
+    double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
+    double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
 
 typedef struct gk_coefficients {
-    double h, gamma, rigid_mobility, rigid_kappa; /* the same of a free mass, whose b0q = bq = mobility */
-    double stretched_h;                           /* step of the trapezoidal ones */
-    int timeless;                                 /* forces move nothing in the step: D = 0 */
+    double h, gamma, rigid_mobility, rigid_kappa, rigid_lead; /* of a free mass, whose b0q = bq = mobility */
+    int timeless;                                             /* forces move nothing in the step: D = 0 */
     gk_flow flow[MAX_GEARS];
     gk_ground_flow ground;
     uint64_t age;
 } gk_coefficients;
-
-/* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
-static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
 /* what an integrator is: the one place where they differ in more than their own file */
 typedef struct gk_scheme {
@@ -267,13 +268,13 @@ static inline double *gk_ground_of(gk_data *data) { return GK_OF(data, oscillato
 static inline gk_real *gk_modal_of(const gk_setup *setup, gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
+    return (gk_real *)(GK_OF(data, oscillator) + OSCILLATOR_STATE * setup->base.n) + setup->modal[g].at;
 }
 static inline const double *gk_ground_seen(const gk_data *data) { return GK_OF(data, oscillator); }
 static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (const gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
+    return (const gk_real *)(GK_OF(data, oscillator) + OSCILLATOR_STATE * setup->base.n) + setup->modal[g].at;
 }
 /* kinetic energy of a spin */
 static inline double gk_kinetic(const gk_setup *setup, int d, double speed)

@@ -1,0 +1,173 @@
+"""Error of the time step: every level against itself at 0.625 µs, from a common state.
+
+    python -m evidence.accuracy.step_error [SCENE …] [--levels fast standard] [--h 5 7.5 10] [--effects friction film]
+
+A run makes 1.2 ms with the step of the reference, then goes on with the step under test; samples at the end of every
+step over the next 8.4 ms. Error: rms of the difference over rms of the ripple, of the lines up to 10 kHz under a Hann
+window, in per cent: transmission error, mesh forces, forces of bearings and pins. Without arguments the rows of TABLE,
+written to step_error.csv beside this file. Instructions of a step: evidence/price/step_cost.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.body import load_bodies
+from gearfmu.kernel import Kernel
+from gearfmu.kernel.recording import Recording
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, Steady, assemble
+
+REFERENCE, SETTLED, WINDOW = 0.625e-6, 1.2e-3, 8.4e-3  # s
+HIGHEST = 10e3  # Hz
+LEVELS = {"fast": 1.0, "standard": 2.0}
+EFFECTS = {
+    "friction": {"effect.friction": 1.0},
+    "film": {"effect.film": 1.0},
+    "still": {"effect.gyroscopic": 0.0},
+}
+SUPPORT = re.compile(r"(bearing|pin)\.\w+\.f[xy]$")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A stage under a torque (N·m) at a speed (rad/s) of its input. by_torques: both of its ports hold a torque."""
+
+    stage: str
+    torque: float
+    speed: float
+    by_torques: bool = False
+
+    def model(self) -> StageModel:
+        spec = load_stage(self.stage)
+        model = assemble(spec, load_bodies(spec))
+        return model if self.by_torques else model.driven_by_springs()
+
+    def inputs(self, model: StageModel, parameters: dict[str, float]) -> Callable[[float], dict[str, float]]:
+        """Inputs by time; what a run starts with is among them."""
+        if not self.by_torques:
+            return Steady(model, self.speed, self.torque, parameters=parameters)
+        ratio, source, out = float(model.shafts.ratio), model.shafts.input, model.shafts.output
+        torques = {f"{source}.tau": self.torque, f"{out}.tau": -self.torque * ratio}
+        start = {f"{source}.w_start": self.speed, f"{out}.w_start": self.speed / ratio}
+        return lambda time: torques if time else torques | start
+
+
+SCENES = {
+    "pair": Scene("fzg_c", 302.0, 432.0),
+    "relieved": Scene("fzg_c/stage_relief", 302.0, 200.0),
+    "helical": Scene("helical_demo", 300.0, 200.0),
+    "train": Scene("two_stage", 100.0, 150.0),
+    "set": Scene("planetary54", 600.0, 85.0, by_torques=True),
+    "helical_set": Scene("helical_set", 300.0, 60.0, by_torques=True),
+}
+
+
+def channels(model: StageModel, kernel: Kernel) -> dict[str, list[str]]:
+    """Names of the outputs that are judged together."""
+    names = [v.name for v in kernel.variables.values() if v.causality == "output"]
+    return {
+        "te": [f"{shaft}.gear.phi" for shaft in (model.shafts.input, model.shafts.output)],
+        "force": [name for name in names if name.endswith(".force")],
+        "support": [name for name in names if SUPPORT.match(name)],
+    }
+
+
+def run(
+    model: StageModel, scene: Scene, parameters: dict[str, float], h: float
+) -> tuple[dict[str, np.ndarray], str, int]:
+    """Samples (n, k) of each kind of channel at the ends of steps, from the end of the common part on; what the kernel
+    says of the step; unsolved steps."""
+    inputs = scene.inputs(model, parameters)
+    kernel = Kernel(model.blob, parameters | {"h": h})
+    for name, value in inputs(0.0).items():
+        kernel.set(name, value)
+    kernel.initialize()
+    wanted = channels(model, kernel)
+    names = [name for group in wanted.values() for name in group]
+    for first, count, step in ((0, round(SETTLED / REFERENCE), REFERENCE), (1, round(WINDOW / h), h)):
+        record = Recording(kernel, names, count, step)
+        for i in range(count):
+            now = first * SETTLED + i * step
+            for name, value in inputs(now).items() if now else ():
+                kernel.set(name, value)
+            kernel.step(now, step)
+            record.rows[i + 1] = [kernel.get(name) for name in names]
+    ends = np.cumsum([len(group) for group in wanted.values()])[:-1]
+    found = dict(zip(wanted, np.split(record.rows, ends, axis=1), strict=True))
+    found["te"] = found["te"] @ np.array([[1.0], [-float(model.shafts.ratio)]])
+    return found, kernel.warning, int(kernel.get("solver.retried_steps"))
+
+
+def error(reference: np.ndarray, found: np.ndarray, h: float) -> float:
+    """Of channels (n, k) sampled every h, in per cent."""
+    window = np.hanning(len(found))[:, None]
+    kept = np.fft.rfftfreq(len(found), h) <= HIGHEST
+
+    def lines(rows: np.ndarray) -> np.ndarray:
+        return np.fft.rfft(window * (rows - rows.mean(axis=0)), axis=0)[kept]
+
+    return float(100 * np.linalg.norm(lines(found) - lines(reference)) / np.linalg.norm(lines(reference)))
+
+
+COLUMNS = ("scene", "level", "effect", "h_us", "te", "force", "support", "gamma", "unsolved")
+FILE = Path(__file__).with_suffix(".csv")
+TABLE = (  # scene, level, effects other than by default, steps in µs
+    ("pair", "fast", (), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", (), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", ("friction",), (5.0, 10.0, 15.0)),
+    ("relieved", "fast", ("film",), (5.0, 10.0)),
+    ("helical", "fast", (), (5.0, 10.0)),
+    ("helical", "fast", ("friction",), (5.0, 10.0)),
+    ("train", "fast", (), (5.0, 12.5)),
+    ("set", "fast", (), (5.0, 10.0, 12.5)),
+    ("set", "fast", ("friction",), (5.0, 10.0)),
+    ("set", "fast", ("still",), (12.5,)),
+    ("set", "standard", (), (10.0, 12.5)),
+    ("helical_set", "fast", (), (5.0, 10.0)),
+)
+
+
+def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) -> Iterator[list[str]]:
+    """A row of COLUMNS a step (µs)."""
+    scene = SCENES[name]
+    model = scene.model()
+    parameters = {"level": LEVELS[level]} | {key: value for effect in effects for key, value in EFFECTS[effect].items()}
+    reference, _, _ = run(model, scene, parameters, REFERENCE)
+    for h in steps:
+        found, said, unsolved = run(model, scene, parameters, 1e-6 * h)
+        every = round(1e-6 * h / REFERENCE)
+        errors = [error(reference[kind][::every][: len(found[kind])], found[kind], 1e-6 * h) for kind in found]
+        lowered = re.search(r"gamma lowered to ([\d.]+\d)", said)
+        gamma = lowered[1] if lowered else "1"
+        yield [name, level, "+".join(effects), f"{h:g}", *(f"{e:.3g}" for e in errors), gamma, f"{unsolved}"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", choices=[[], *SCENES])
+    parser.add_argument("--levels", nargs="+", default=["fast"], choices=LEVELS)
+    parser.add_argument("--h", nargs="+", type=float, default=[5.0, 7.5, 10.0, 12.5, 15.0], help="µs, of 0.625 µs")
+    parser.add_argument("--effects", nargs="+", default=[], choices=EFFECTS)
+    chosen = parser.parse_args()
+    own = [(name, level, chosen.effects, chosen.h) for name in chosen.scenes for level in chosen.levels]
+    found = [list(COLUMNS)]
+    print(",".join(COLUMNS))
+    for name, level, effects, steps in own or TABLE:
+        for row in rows(name, level, effects, steps):
+            print(",".join(row), flush=True)
+            found.append(row)
+    if not own:
+        with FILE.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(found)
+
+
+if __name__ == "__main__":
+    main()
