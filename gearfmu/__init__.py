@@ -22,6 +22,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gearfmu.api.bodies import frf
     from gearfmu.api.models import assemble, load, load_scene, reduce
     from gearfmu.api.plans import plan, run_plan
     from gearfmu.api.results import compare, convert, export, write_report
@@ -54,6 +55,7 @@ __all__ = [
     "effects",
     "efficiency",
     "export",
+    "frf",
     "load",
     "load_scene",
     "modes",
@@ -70,6 +72,7 @@ __all__ = [
     "write_report",
 ]
 _HOMES = {
+    "api.bodies": ("frf",),
     "api.models": ("assemble", "load", "load_scene", "reduce"),
     "api.plans": ("plan", "run_plan"),
     "api.results": ("compare", "convert", "export", "write_report"),

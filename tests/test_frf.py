@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from verbs import call
 
+import gearfmu as gf
 from gearfmu import cli
 
 
@@ -65,7 +66,10 @@ def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path) -> None:
     ("arguments", "message"),
     [
         (["planetary54", "wheel"], "no body 'wheel'; the stage has sun, planet, ring, carrier"),
-        (["planetary54", "carrier", "--methods", "guyan"], "'guyan' is no method; there are modal, craig_bampton"),
+        (
+            ["planetary54", "carrier", "--methods", "guyan"],
+            "methods = guyan: is no method; there are modal, craig_bampton",
+        ),
         (["planetary54", "carrier", "--scale", 0.4, "--methods", "krylov", "--size", 20], "give at least that"),
         (["planetary54", "carrier", "--band", "5 kHz", "1 kHz", "--scale", 0.4], "from a lower to a higher frequency"),
     ],
@@ -74,3 +78,12 @@ def test_bad_input_is_one_clear_message_and_nothing_written(arguments, message, 
     code, _, err = call("frf", *arguments, "--out", tmp_path / "none")
     assert code in (1, cli.USAGE_ERROR) and not (tmp_path / "none").exists()
     assert re.search(message, " ".join(err.split()))
+
+
+def test_the_function_is_the_verb(tmp_path) -> None:
+    options = ["--scale", 0.2, "--lines", 5, "--methods", "rubin:24,modal", "--size", 30, "--out", tmp_path]
+    code, _, err = call("frf", "planetary54", "carrier", *options)
+    assert code == 0, err
+    found = gf.frf("planetary54", "carrier", ["rubin:24", "modal"], size=30, lines=5, scale=0.2, band=("50 Hz", 1e4))
+    assert {t.method: pytest.approx(t.error, rel=1e-4) for t in found.trials} == errors(tmp_path / "carrier_frf.csv")
+    assert found.rows[0] == "bolt0.ux" and [t.size for t in found.trials] == [24, 30]

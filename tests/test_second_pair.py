@@ -15,7 +15,6 @@ import pytest
 from evidence.fmu_probes.everything import findings
 from gearfmu.body import reduce_bodies
 from gearfmu.fmu import export
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, loaded_te
@@ -59,7 +58,7 @@ def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(f"both bodies: {made:.0f} s of processor time, {memory:.2f} GB")
 
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     result = loaded_te(model, [LOAD], 32, rigid_bearings=True)
     force = LOAD / pair.gears[0].r_b
     pairs = (result.shares[0] > 1e-6).sum(axis=1).mean()

@@ -27,7 +27,7 @@ from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.parts import kept_offsets, tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
-from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
@@ -82,7 +82,7 @@ def _gear(gear: GearSpec, scale: float) -> GearSpec:
 def bodies_of(spec: StageSpec) -> list[ReducedBody]:
     """Bodies of both gears with static tables and a dozen modes of their own, without pictures and gyroscopic terms."""
     stored = load_bodies(load_stage("helical_demo"))
-    return [_body(*entry) for entry in zip(stored, spec.gears, PairGeometry.of(spec).gears, strict=True)]
+    return [_body(*entry) for entry in zip(stored, spec.gears, spec.geometry.gears, strict=True)]
 
 
 def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBody:
@@ -119,7 +119,7 @@ def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBo
 def iso_stiffness(spec: StageSpec) -> float:
     """c_gamma_alpha (N/m²) of ISO 6336-1 method B for steel discs: c' = c'_th C_M C_R C_B cos β with C_M = 0.8 and
     C_R = 1, c_gamma_alpha = c' (0.75 ε_α + 0.25)."""
-    pair, beta = PairGeometry.of(spec), spec.pair.helix_angle
+    pair, beta = spec.geometry, spec.pair.helix_angle
     z = [gear.teeth / math.cos(beta) ** 3 for gear in spec.gears]
     x = [gear.profile_shift for gear in spec.gears]
     q = 0.04723 + 0.15551 / z[0] + 0.25791 / z[1] - 0.00635 * x[0] - 0.11654 * x[0] / z[0]
@@ -133,7 +133,7 @@ def iso_stiffness(spec: StageSpec) -> float:
 def row(overlap: float) -> dict[str, Any]:
     """The table's row of an overlap ratio."""
     spec = stage_at(overlap)
-    pair, model = PairGeometry.of(spec), assemble(spec, bodies_of(spec))
+    pair, model = spec.geometry, assemble(spec, bodies_of(spec))
     torques = [load * WIDTH * pair.gears[0].r_b for load in LINE_LOADS]
     result = loaded_te(model, torques, POSITIONS, rigid_bearings=True, slices=SLICES)
     found: dict[str, Any] = {

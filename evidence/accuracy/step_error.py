@@ -27,6 +27,7 @@ from gearfmu.stage import StageModel, Steady, assemble
 
 REFERENCE, SETTLED, WINDOW = 0.625e-6, 1.2e-3, 8.4e-3  # s
 HIGHEST = 10e3  # Hz
+PUSHED = (3.19999e-3, 3.24999e-3)  # s: from the step at 3.2 ms to that before 3.25 ms
 LEVELS = {"fast": 1.0, "standard": 2.0}
 EFFECTS = {
     "friction": {"effect.friction": 1.0},
@@ -38,12 +39,14 @@ SUPPORT = re.compile(r"(bearing|pin)\.\w+\.f[xy]$")
 
 @dataclass(frozen=True)
 class Scene:
-    """A stage under a torque (N·m) at a speed (rad/s) of its input. by_torques: both of its ports hold a torque."""
+    """A stage under a torque (N·m) at a speed (rad/s) of its input. by_torques: both of its ports hold a torque,
+    that of the output changed by this part of it for 50 µs (`pulse`)."""
 
     stage: str
     torque: float
     speed: float
     by_torques: bool = False
+    pulse: float = 0.0
 
     def model(self) -> StageModel:
         spec = load_stage(self.stage)
@@ -57,7 +60,8 @@ class Scene:
         ratio, source, out = float(model.shafts.ratio), model.shafts.input, model.shafts.output
         torques = {f"{source}.tau": self.torque, f"{out}.tau": -self.torque * ratio}
         start = {f"{source}.w_start": self.speed, f"{out}.w_start": self.speed / ratio}
-        return lambda time: torques if time else torques | start
+        pushed = torques | {f"{out}.tau": (1.0 + self.pulse) * torques[f"{out}.tau"]}
+        return lambda time: (pushed if PUSHED[0] <= time < PUSHED[1] else torques) if time else torques | start
 
 
 SCENES = {
@@ -66,6 +70,7 @@ SCENES = {
     "helical": Scene("helical_demo", 300.0, 200.0),
     "train": Scene("two_stage", 100.0, 150.0),
     "set": Scene("planetary54", 600.0, 85.0, by_torques=True),
+    "frozen": Scene("planetary54", 600.0, 0.0, by_torques=True, pulse=0.02),
     "helical_set": Scene("helical_set", 300.0, 60.0, by_torques=True),
 }
 
@@ -131,6 +136,7 @@ TABLE = (  # scene, level, effects other than by default, steps in µs
     ("set", "fast", ("friction",), (5.0, 10.0)),
     ("set", "fast", ("still",), (12.5,)),
     ("set", "standard", (), (10.0, 12.5)),
+    ("frozen", "fast", (), (5.0, 10.0, 12.5)),
     ("helical_set", "fast", (), (5.0, 10.0)),
 )
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.tables.gear import Bearing, GearSpec
@@ -93,7 +92,7 @@ class FreePair:
 
     def place(self, start: Rattle) -> bytes:
         """Blob of the model turned to where `start` begins."""
-        shapes, sections = PairGeometry.of(self.spec).gears, dict(self.sections(start))
+        shapes, sections = self.spec.geometry.gears, dict(self.sections(start))
         turn = 2 * math.pi * start.position
         free = start.load == 0.0 and start.play > 0
         back = (0.5 * start.play - start.offset) / shapes[0].r_b if free else 0.0
@@ -127,7 +126,7 @@ def started(
 ) -> Kernel:
     """A kernel of the pair at its start; `parameters` go over CONSERVING. Momenta along the mesh cancel: the pair
     stays where it is."""
-    geometry, inertia = PairGeometry.of(pair.spec), pair.sections(start)["inertia"]
+    geometry, inertia = pair.spec.geometry, pair.sections(start)["inertia"]
     r_b = [gear.r_b for gear in geometry.gears]
     mass = [inertia[i] / r_b[i] ** 2 for i in (0, 1)]
     share = [mass[1 - i] / sum(mass) for i in (0, 1)]

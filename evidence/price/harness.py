@@ -23,13 +23,12 @@ from typing import Any
 import numpy as np
 
 from gearfmu import fmu
-from gearfmu.cosim.drivetrain import build, stage_joints, stage_signals, stage_start
 from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.masters import Cut, master
 from gearfmu.cosim.ports import KEYS
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.recorder import DRIVE, Recorder
-from gearfmu.cosim.scene_run import stage_model
+from gearfmu.cosim.scene_run import drive_of, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import load_scene
 
@@ -88,11 +87,12 @@ def run(chosen: Any, recorder: Recorder, timed: Clocked) -> tuple[float, float, 
 def measure(source: Source, recorded: str) -> dict[str, object]:
     """One row: times in µs."""
     scene = load_scene("clutch_closure")
-    shafts = source.model.shafts
-    stage = source.unit({"level": "rigid", "slices": 1} | stage_start(scene, shafts))
-    timed, drive = Clocked(stage), PyUnit(build(scene, shafts))
-    chosen = master("gs_mean", Cut(timed, drive, (shafts.input, shafts.output), stage_signals(scene, shafts)))
-    recorder = Recorder(timed, drive, RECORDED[recorded], STEPS, stage_joints(scene, shafts))
+    drive = drive_of(scene, source.model.stage)
+    stage = source.unit({"level": "rigid", "slices": 1} | drive.start())
+    timed = Clocked(stage)
+    unit = PyUnit(drive.partner(lambda torques: {}))
+    chosen = master("gs_mean", Cut(timed, unit, tuple(drive.ports), drive.signals))
+    recorder = Recorder(timed, unit, RECORDED[recorded], STEPS, drive.silent)
     chosen.begin(0.0)
     whole, inside, outside = run(chosen, recorder, timed)
     empty = loop(empty_call(stage))

@@ -60,7 +60,7 @@ class Pair(Bench):
     @property
     def geometry(self) -> PairGeometry:
         """Of the two gears."""
-        return PairGeometry.of(self.model.spec)
+        return self.model.spec.geometry
 
     @property
     def ratio(self) -> float:

@@ -207,8 +207,8 @@ def recorded_deformation(trace: Trace, home: Path) -> Deformation | None:
 def convert(trace: Trace | PathLike, path: PathLike, channels: Sequence[str] | None = None) -> Path:
     """Write a trace, or the trace in a file, in the format of the suffix of `path`; returns the path.
 
-    .csv, .mat (MATLAB 5), .parquet, .uff or .unv (Universal File Format, data sets 58); Parquet and UFF
-    need gearfmu[data].
+    .csv, .mat (MATLAB 5), .parquet, .uff or .unv (Universal File Format, data sets 58), .mf4 (ASAM MDF 4);
+    Parquet and UFF need gearfmu[data], MDF gearfmu[mdf].
     channels : names of those to write, all when None.
 
     Raises GearfmuError for another suffix, TraceError for a channel that there is not.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,24 +12,12 @@ import numpy as np
 from gearfmu.commands.shared import Quantity, stage_names
 
 if TYPE_CHECKING:
-    from gearfmu.reduction.basis import Size
     from gearfmu.reduction.full_order import FullOrder
-    from gearfmu.reduction.transfer import Judging, Reference
+    from gearfmu.reduction.judged import Judgement, Trial
+    from gearfmu.reduction.transfer import Reference
 
+GIVEN = ("size", "band", "damping", "lines", "free", "scale")
 HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "CPU s")
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A method on the body: matrix (F, m, m) of the oscillators alone, error (F,) of it, mended (F,) with the static
-    residual, seconds of processor time beyond what methods before it had made."""
-
-    method: str
-    size: int
-    matrix: np.ndarray
-    error: np.ndarray
-    mended: np.ndarray
-    seconds: float
 
 
 @click.command()
@@ -66,84 +52,40 @@ def frf(stage: str, body: str, **options: Any) -> None:
     Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error), a chart, and the transfer matrices
     themselves: <body>_H.npz for numpy.load.
     """
-    from gearfmu.reduction.transfer import Judging, reference
+    from gearfmu.api.bodies import frf as judge
 
-    entries = _entries(options)
-    full = full_order_of(stage, body, options["scale"])
-    full = full if options["free"] else full.grounded()
-    judging = Judging.over(tuple(options["band"]), options["lines"], options["damping"])
-    exact = reference(full, judging)
-    trials = [_tried(full, exact, judging, *entry) for entry in entries]
+    methods, sized = options["methods"].split(","), {key: options[key] for key in GIVEN}
+    found = judge(stage, body, methods, **sized)
+    full, exact, trials = found.full, found.exact, found.trials
     how = f"rotations times {1e3 * full.length:.4g} mm, {100 * options['damping']:g} % damping"
     click.echo(f"{body}: {full.size} unknowns, {len(exact.labels)} inputs, {_ground(full, options)}, {how}")
-    for line in [*_table(trials, judging), *_shortfalls(trials, entries)]:
+    for line in [*_table(found), *_shortfalls(trials, methods, options["size"])]:
         click.echo(line)
     click.echo(f"reference: {exact.size} vectors, last change {exact.change:.1e}")
-    path = _write_matrices(full, exact, trials, options["out"] / f"{body}_H.npz")
+    path = _write_matrices(found, options["out"] / f"{body}_H.npz")
     written = _write(exact, trials, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
     click.echo(", ".join(map(str, [*written, path])))
 
 
-def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
-    """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
-    from gearfmu.spec.forms.members import body_names, members
-    from gearfmu.spec.stage import load_stage
-
-    spec = load_stage(stage)
-    factor: dict[str, Any] = {} if scale is None else {"scale": scale}
-    toothed, names = members(spec), body_names(spec)
-    if body not in names:
-        raise click.BadParameter(f"no body '{body}'; the stage has {', '.join(names)}", param_hint="BODY")
-    from gearfmu.body.imported import imported_full_order
-    from gearfmu.reduction.carrier import carrier_full_order
-    from gearfmu.reduction.toothed import gear_full_order, ring_full_order
-
-    imported = toothed[body].gear.imported if body in toothed else spec.carrier.imported
-    if imported is not None and scale is not None:
-        remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave --scale away"
-        raise click.BadParameter(remedy, param_hint="--scale")
-    if body not in toothed:
-        return carrier_full_order(spec, **factor)
-    if imported is not None:
-        return imported_full_order(toothed[body])
-    if toothed[body].gear.kind == "ring":
-        return ring_full_order(spec, name=body, **factor)
-    return gear_full_order(spec, body, **factor)
-
-
-def _tried(full: FullOrder, exact: Reference, judging: Judging, method: str, size: Size) -> Trial:
-    from gearfmu.reduction.methods import METHODS
-    from gearfmu.reduction.oscillators import oscillators
-    from gearfmu.reduction.transfer import relative_error, transfer
-
-    clock = time.process_time()
-    model = oscillators(full, METHODS[method](full, size), judging.damping_ratio)
-    seconds = time.process_time() - clock
-    matrix = transfer(model, judging, full.ground)
-    mended = transfer(model, judging, full.ground, residual=True)
-    errors = relative_error(exact.matrix, matrix), relative_error(exact.matrix, mended)
-    return Trial(method, model.size, matrix, *errors, seconds)
-
-
-def _table(trials: Sequence[Trial], judging: Judging) -> list[str]:
+def _table(found: Judgement) -> list[str]:
     """The trials as lines of text."""
     rows: list[tuple[str, ...]] = [HEADER]
-    for t in trials:
+    for t in found.trials:
         errors = (f"{np.median(t.error):.1e}", f"{t.mended.max():.1e}", f"{t.seconds:.1f}")
-        at = f"{judging.frequency[t.error.argmax()]:.0f}"
+        at = f"{found.frequency[t.error.argmax()]:.0f}"
         rows.append((t.method, str(t.size), f"{t.error.max():.1e}", at, *errors))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(text.rjust(w) for text, w in zip(row, widths, strict=True)) for row in rows]
 
 
-def _shortfalls(trials: Sequence[Trial], entries: Sequence[tuple[str, Size]]) -> list[str]:
-    """Trials, in the order of their entries, that have fewer vectors than were asked for."""
+def _shortfalls(trials: Sequence[Trial], methods: Sequence[str], size: int) -> list[str]:
+    """Trials, in the order of their methods, that have fewer vectors than were asked for."""
     return [
-        f"{t.method} has {t.size} vectors where {size.count} were asked for: it takes "
+        f"{t.method} has {t.size} vectors where {count} were asked for: it takes "
         + ("whole blocks of one vector per input" if t.method == "krylov" else "what there is")
         + f"; a method of the same size is rubin:{t.size}"
-        for t, (_, size) in zip(trials, entries, strict=True)
-        if t.size < size.count
+        for t, method in zip(trials, methods, strict=True)
+        if t.size < (count := int(method.partition(":")[2] or size))
     ]
 
 
@@ -158,33 +100,16 @@ def _write(exact: Reference, trials: Sequence[Trial], base: Path, title: str) ->
     return [path, *write_error_chart(curves, base, title)]
 
 
-def _write_matrices(full: FullOrder, exact: Reference, trials: Sequence[Trial], path: Path) -> Path:
+def _write_matrices(found: Judgement, path: Path) -> Path:
     """The transfer matrices as <path>.npz: frequency_Hz (F,), rows (m,) "bolt0.ux", length_m by which rotations are
     multiplied and moments divided, H_reference (F, m, m) and H_<method>_<n>, all in m/N; complex."""
     from gearfmu.files import written_whole
 
-    matrices: dict[str, Any] = {f"H_{t.method}_{t.size}": t.matrix for t in trials}
-    rows = np.array([".".join(label) for label in exact.labels])
+    matrices: dict[str, Any] = {f"H_{t.method}_{t.size}": t.matrix for t in found.trials}
     with written_whole(path) as temporary:
-        np.savez_compressed(temporary, frequency_Hz=exact.judging.frequency, rows=rows, length_m=full.length,
-                            H_reference=exact.matrix, **matrices)  # fmt: skip
+        np.savez_compressed(temporary, frequency_Hz=found.frequency, rows=np.array(found.rows),
+                            length_m=found.full.length, H_reference=found.exact.matrix, **matrices)  # fmt: skip
     return path
-
-
-def _entries(options: dict[str, Any]) -> list[tuple[str, Size]]:
-    from gearfmu.reduction.basis import Size
-    from gearfmu.reduction.methods import METHODS
-
-    entries = []
-    for text in options["methods"].split(","):
-        name, _, own = text.strip().partition(":")
-        if name not in METHODS or (own and not own.isdigit()):
-            raise click.BadParameter(
-                f"'{text.strip()}' is no method; there are {', '.join(METHODS)}, each with ':n' behind it for a size",
-                param_hint="--methods",
-            )
-        entries.append((name, Size(int(own or options["size"]), tuple(options["band"]))))
-    return entries
 
 
 def _ground(full: FullOrder, options: dict[str, Any]) -> str:

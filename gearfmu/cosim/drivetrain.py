@@ -1,4 +1,4 @@
-"""Drivetrains as networks around a stage, and the stage's ports that belong to them.
+"""Passenger car and test rig: networks round a stage, and the stage's ports that belong to them.
 
 Pinion and wheel stand for the stage's input and output, whatever is between them. Angles and speeds behind the output
 are those of the output shaft: of a single pair, negative while the pinion turns positively.
@@ -7,8 +7,9 @@ are those of the output shaft: of a single pair, negative while the pinion turns
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.signals import Constant, Ramp, Signal
 from gearfmu.spec.forms.turning import Shafts
@@ -21,31 +22,45 @@ SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffen
 JOINED = 1e6  # N·m: capacity that keeps the clutch of the wheel's chain closed, so that both its inertias are one
 
 
-def build(scene: SceneSpec, shafts: Shafts) -> Network:
-    """The drivetrain of a scene: torque ports named as the shafts."""
-    if scene.passenger_car:
-        return _car(scene, scene.passenger_car, shafts)
-    assert scene.test_rig is not None, "a scene has one of the two"
-    return _rig(scene, scene.test_rig, shafts)
+def car_drive(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Drive:
+    """A passenger car round a stage: engine, clutch and vehicle; with `chain_in_fmu` the clutch is in the stage.
 
-
-def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
-    """What the stage's ports must be in this drivetrain: the cut runs through compliant elements, which belong to the
-    stage."""
-    if scene.test_rig:
-        rig = scene.test_rig
-        return {
-            shafts.input: PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping),
-            shafts.output: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
+    Behind an open clutch the gears turn with the vehicle, not with the engine. The wheel's chain is a clutch that stays
+    closed, whose outputs say nothing."""
+    if not car.chain_in_fmu:
+        ports = {
+            shafts.input: PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping),
+            shafts.output: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
         }
-    car = scene.passenger_car
-    assert car is not None, "a scene has one of the two"
-    if car.chain_in_fmu:
-        return {shafts.input: _clutch_chain(car), shafts.output: _final_drive_chain(car)}
-    return {
-        shafts.input: PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping),
-        shafts.output: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
+        return Drive(ports, lambda rest: _car(scene, car, shafts), watched=("*",))
+    start = {
+        f"{shafts.input}.disc.w_start": scene.start.pinion_speed,
+        f"{shafts.output}.disc.w_start": _wheel_speed(scene, shafts),
+        f"{shafts.output}.clutch.capacity": JOINED,
     }
+    return Drive(
+        {shafts.input: _clutch_chain(car), shafts.output: _final_drive_chain(car)},
+        lambda rest: _car(scene, car, shafts),
+        start.copy,
+        signals=((f"{shafts.input}.clutch.capacity", capacity(scene)),),
+        silent=(f"{shafts.output}.clutch.*", f"{shafts.output}.disc.*"),
+    )
+
+
+def rig_drive(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Drive:
+    """A test rig round a stage: a drive with its controller, and a brake that holds its speed."""
+    ports = {
+        shafts.input: PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping),
+        shafts.output: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
+    }
+
+    def with_shafts(own: Mapping[str, PortSpec]) -> SceneSpec:
+        ends = {"pinion_shaft": own[shafts.input], "wheel_shaft": own[shafts.output]}
+        numbers = {f"{end}_stiffness": port.k for end, port in ends.items()}
+        numbers |= {f"{end}_damping": port.c for end, port in ends.items()}
+        return scene.model_copy(update={"test_rig": rig.model_copy(update=numbers)})
+
+    return Drive(ports, lambda rest: _rig(scene, rig, shafts), with_shafts=with_shafts)
 
 
 def _clutch_chain(car: PassengerCar) -> PortSpec:
@@ -76,30 +91,6 @@ def _final_drive_chain(car: PassengerCar) -> PortSpec:
 def capacity(scene: SceneSpec) -> Signal:
     """Clutch capacity of the scene over time, N·m."""
     return Ramp(scene.clutch.capacity) if scene.clutch else Constant(0.0)
-
-
-def stage_signals(scene: SceneSpec, shafts: Shafts) -> tuple[tuple[str, Signal], ...]:
-    """Inputs of the stage that follow from the scene alone."""
-    in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
-    return ((f"{shafts.input}.clutch.capacity", capacity(scene)),) if in_stage else ()
-
-
-def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
-    """Start values of the stage that follow from the drivetrain: behind an open clutch the gears turn with the
-    vehicle, not with the engine; the wheel's chain is closed."""
-    if scene.passenger_car is None or not scene.passenger_car.chain_in_fmu:
-        return {}
-    return {
-        f"{shafts.input}.disc.w_start": scene.start.pinion_speed,
-        f"{shafts.output}.disc.w_start": _wheel_speed(scene, shafts),
-        f"{shafts.output}.clutch.capacity": JOINED,
-    }
-
-
-def stage_joints(scene: SceneSpec, shafts: Shafts) -> tuple[str, ...]:
-    """Patterns of stage outputs that say nothing: of the clutch that only joins two inertias."""
-    in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
-    return (f"{shafts.output}.clutch.*", f"{shafts.output}.disc.*") if in_stage else ()
 
 
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:

@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from gearfmu.cosim.drive import Drive
 from gearfmu.errors import Problem, SpecError
 from gearfmu.fmu.opened import OpenedFmu
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
 
 UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": "kg*m^2"}
 UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}
-RIG = ("pinion_shaft", "wheel_shaft")  # of the test rig: input, output
 
 
 def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
@@ -42,20 +43,21 @@ def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
 
 
 def fitted(
-    scene: SceneSpec, opened: OpenedFmu, in_drivetrain: Callable[[SceneSpec, Any], Any]
+    scene: SceneSpec, opened: OpenedFmu, drive_of: Callable[[SceneSpec, Stage], Drive]
 ) -> tuple[SceneSpec, tuple[str, ...]]:
-    """The scene with the FMU's shafts, and in words what is other there than the scene says. in_drivetrain : gives a
-    stage the ports that the scene needs. SpecError with every port that does not fit, and every gear that
-    the scene records and the FMU does not show."""
+    """The scene with the FMU's shafts, and in words what is other there than the scene says. drive_of : of
+    `scene_run`. SpecError with every port that does not fit, and every gear that the scene records and the FMU does not
+    show."""
     export = f"export it with `gearfmu export {opened.model.name} --scene SCENE`"
     problems = list(_recording(scene, opened, export))
     own: Mapping[str, PortSpec] = opened.model.spec.ports
     try:
-        wanted: Mapping[str, PortSpec] = in_drivetrain(scene, opened.model.spec).ports
+        drive = drive_of(scene, opened.model.stage)
     except SpecError as error:
         remedy = f"stage {opened.model.name} does not fit scene {scene.name}: choose another scene or FMU"
         ports = Problem(str(opened.path), "ports", ", ".join(own), remedy)
         raise SpecError([ports, *error.problems, *problems]) from error
+    wanted = {**own, **drive.ports}
     problems += [found for name in own for found in _misfits(scene, opened, name, wanted[name], export)]
     if problems:
         raise SpecError(problems)
@@ -63,7 +65,7 @@ def fitted(
     if not remarks:
         return scene, ()
     head = f"{opened.path} keeps its own shafts, which are not those of scene {scene.name} ({export})"
-    return _with_shafts(scene, opened), (f"{head}: {'; '.join(remarks)}",)
+    return drive.with_shafts(own) if drive.with_shafts else scene, (f"{head}: {'; '.join(remarks)}",)
 
 
 def _usual(scene: SceneSpec) -> Any:
@@ -101,20 +103,3 @@ def _others(name: str, own: PortSpec, wanted: PortSpec) -> Iterator[str]:
         first, second = (getattr(port, field, None) or getattr(port.chain, field, 0.0) for port in (own, wanted))
         if first != second:
             yield f"ports.{name}.{field} {first:g} {unit}, in the scene {second:g} {unit}"
-
-
-def _with_shafts(scene: SceneSpec, opened: OpenedFmu) -> SceneSpec:
-    """The scene with the stiffness and damping of the FMU's ports, where its start follows from them."""
-    shafts, ports = opened.model.shafts, opened.model.spec.ports
-    if scene.test_rig is not None:
-        ends = dict(zip(RIG, (ports[shafts.input], ports[shafts.output]), strict=True))
-        numbers = {f"{end}_stiffness": port.k for end, port in ends.items()}
-        numbers |= {f"{end}_damping": port.c for end, port in ends.items()}
-        return scene.model_copy(update={"test_rig": scene.test_rig.model_copy(update=numbers)})
-    if (parts := scene.drivetrain) is not None:
-        held = {
-            name: part.model_copy(update={"stiffness": ports[name].k, "damping": ports[name].c})
-            for name, part in parts.ports.items()
-        }
-        return scene.model_copy(update={"drivetrain": parts.model_copy(update={"ports": held})})
-    return scene

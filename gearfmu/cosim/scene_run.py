@@ -14,16 +14,16 @@ from gearfmu import fmu
 from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
-from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.drive import Drive
+from gearfmu.cosim.drivetrain import car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Wiring
-from gearfmu.cosim.parts import part_network, part_ports
+from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, start_speeds, torque_ports
+from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
 from gearfmu.cosim.source import Source, UnitSource
-from gearfmu.cosim.start import start_of, start_speeds_of
 from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
@@ -31,9 +31,10 @@ from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.turning import require_driven, shafts_of, with_ports
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.observed import gear_hashes
 from gearfmu.stage.run.deformation import FILE_NAME
@@ -74,7 +75,7 @@ class Staged:
         file that is no FMU of ours, SpecError with everything that does not fit the scene."""
         opened = read_fmu(path)
         scene = of_scene(scene, opened, spec)
-        scene, remarks = fitted(scene, opened, in_drivetrain)
+        scene, remarks = fitted(scene, opened, drive_of)
         return cls(scene, opened.model, opened.path, remarks)
 
 
@@ -141,17 +142,25 @@ def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
     return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
-def in_drivetrain(scene: SceneSpec, spec: StageSpec | Stage) -> StageSpec | Stage:
-    """The stage with the ports that the scene's drivetrain needs. SpecError where it leaves a spring port alone, or has
-    something for a port that the stage does not have."""
-    general = as_general(spec)
-    shafts = shafts_of(general)
+def drive_of(scene: SceneSpec, stage: Stage) -> Drive:
+    """The drive of a scene on this stage: the only place that asks which table it has. SpecError where it leaves a
+    spring port alone, or has something for a port that the stage does not have."""
+    shafts = shafts_of(stage)
     if scene.shaft_loads is not None:
-        return with_ports(spec, torque_ports(scene, general))
+        return loads_drive(scene, scene.shaft_loads, stage, shafts.input)
     if scene.drivetrain is not None:
-        return with_ports(spec, part_ports(scene, general))
-    require_driven(general, (shafts.input, shafts.output), "a scene")
-    return with_ports(spec, stage_ports(scene, shafts))
+        return parts_drive(scene, scene.drivetrain, stage)
+    require_driven(stage, (shafts.input, shafts.output), "a scene")
+    if scene.passenger_car is not None:
+        return car_drive(scene, scene.passenger_car, shafts)
+    assert scene.test_rig is not None, "a scene has one of the four"
+    return rig_drive(scene, scene.test_rig, shafts)
+
+
+def in_drivetrain(scene: SceneSpec, spec: Form) -> Form:
+    """The stage with the ports that the scene's drive needs. SpecError: `drive_of`."""
+    changed: Form = with_ports(spec, dict(drive_of(scene, as_general(spec)).ports))
+    return changed
 
 
 @contextmanager
@@ -175,20 +184,22 @@ def run_once(
 ) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected; frames: of moving gears, from a
     model that observes them, as `stage_model` makes it."""
-    stage = source.unit(_parameters(scene, source.model))
+    drive = drive_of(scene, source.model.stage)
+    stage = source.unit(_parameters(scene, drive))
     try:
-        return run_coupled(*_coupled(scene, stage, source.model, (progress, wiring, frames)))
+        return run_coupled(*_coupled(scene, drive, (stage, source.model), (progress, wiring, frames)))
     finally:
         stage.close()
 
 
 def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None = None) -> CoupledRun:
     """A run of the scene that is stepped from outside; not begun."""
-    stage = source.unit(_parameters(scene, source.model))
-    return CoupledRun(*_coupled(scene, stage, source.model, (progress, WHOLE, None)))
+    drive = drive_of(scene, source.model.stage)
+    stage = source.unit(_parameters(scene, drive))
+    return CoupledRun(*_coupled(scene, drive, (stage, source.model), (progress, WHOLE, None)))
 
 
-def _parameters(scene: SceneSpec, model: StageModel) -> dict[str, float | str]:
+def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
     """Of the stage: what the scene chooses and what follows from it."""
     choice = scene.stage
     return {
@@ -198,46 +209,27 @@ def _parameters(scene: SceneSpec, model: StageModel) -> dict[str, float | str]:
         "slices": choice.slices,
         "h": choice.h,
         **{f"effect.{name}": 0.0 for name in choice.effects.off},
-        **_start(scene, model),
+        **drive.start(),
     }
 
 
 def _coupled(
-    scene: SceneSpec, stage: Unit, model: StageModel, how: tuple[Progress | None, Wiring, FramePlan | None]
+    scene: SceneSpec,
+    drive: Drive,
+    of: tuple[Unit, StageModel],
+    how: tuple[Progress | None, Wiring, FramePlan | None],
 ) -> tuple[Cut | Loaded, Plan]:
-    """The cut and how it is stepped. how: progress, wiring, frames."""
-    progress, wiring, frames = how
-    cut = _cut(scene, stage, model, _parameters(scene, model), wiring)
-    omit = stage_joints(scene, model.shafts) if scene.drivetrain is None else ()
-    coupling = scene.coupling
-    return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames)
-
-
-def _start(scene: SceneSpec, model: StageModel) -> dict[str, float]:
-    """Start values of the stage that follow from the scene."""
-    if scene.drivetrain is not None:
-        speeds, ports = start_speeds_of(scene, model.stage), model.stage.ports
-        free = {name: model.stage.rotor_of(port.body) for name, port in ports.items() if port.kind == "torque"}
-        return {f"{name}.w_start": speeds.get(f"stage.{rotor}", 0.0) for name, rotor in free.items()}
-    if scene.shaft_loads is None:
-        return stage_start(scene, model.shafts)
-    speeds = start_speeds(scene, model.stage, model.shafts.input)
-    return {f"{name}.w_start": speed for name, speed in speeds.items()}
-
-
-def _cut(
-    scene: SceneSpec, stage: Unit, model: StageModel, parameters: Mapping[str, float | str], wiring: Wiring
-) -> Cut | Loaded:
-    """The stage with its drivetrain, or with the torques on its shafts. parameters: of the stage, for where it rests
-    under the torques of the start."""
-    shafts, micro = model.shafts, scene.coupling.micro_step or None
-    if scene.shaft_loads is not None:
-        return Loaded(stage, ShaftLoads(scene.shaft_loads), start_speeds(scene, model.stage, shafts.input))
-    if (parts := scene.drivetrain) is not None:
-        start = start_of(scene, model.stage, lambda torques: _rest(model, parameters, torques))
-        return Cut(stage, PyUnit(part_network(parts, start), micro), tuple(parts.ports), (), wiring)
-    drive = PyUnit(build(scene, shafts), micro)
-    return Cut(stage, drive, (shafts.input, shafts.output), stage_signals(scene, shafts), wiring)
+    """The cut and how it is stepped. of: the stage and its model; how: progress, wiring, frames."""
+    (stage, model), (progress, wiring, frames), coupling = of, how, scene.coupling
+    parameters = _parameters(scene, drive)
+    cut: Cut | Loaded
+    if callable(drive.partner):
+        network = drive.partner(lambda torques: _rest(model, parameters, torques))
+        cut = Cut(stage, PyUnit(network, coupling.micro_step or None), tuple(drive.ports), drive.signals, wiring)
+    else:
+        speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
+        cut = Loaded(stage, ShaftLoads(drive.partner), speeds)
+    return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, drive.silent, frames)
 
 
 def _rest(

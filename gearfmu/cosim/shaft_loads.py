@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from gearfmu.cosim.drive import Drive, Loads, frequencies_of
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import CouplingError, Problem, SpecError
@@ -185,26 +186,32 @@ class TorqueMaster:
         return np.array([getattr(law, what)(*when, w) for law, w in laws])
 
 
-def torque_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
+def loads_drive(scene: SceneSpec, loads: Loads, stage: Stage, input_port: str) -> Drive:
+    """Torques as functions of time and speed on a stage. SpecError: `torque_ports`."""
+
+    def start() -> dict[str, float]:
+        return {f"{name}.w_start": speed for name, speed in start_speeds(scene, stage, input_port, loads).items()}
+
+    return Drive(torque_ports(scene.name, loads, stage), loads, start, frequencies=frequencies_of(loads))
+
+
+def torque_ports(file: str, loads: Collection[str], stage: Stage) -> dict[str, PortSpec]:
     """The stage's loaded ports as torque ports. SpecError with every load of a port that the stage does not have, and
     every spring port that nothing would drive."""
-    assert scene.shaft_loads is not None
     remedy = f"the stage has no such port; it has {', '.join(stage.ports)}"
-    problems = [
-        Problem(scene.name, f"shaft_loads.{name}", "", remedy) for name in scene.shaft_loads if name not in stage.ports
-    ]
-    problems += undriven(stage, scene.shaft_loads, "nothing drives it: write [shaft_loads.{name}]")
+    problems = [Problem(file, f"shaft_loads.{name}", "", remedy) for name in loads if name not in stage.ports]
+    problems += undriven(stage, loads, "nothing drives it: write [shaft_loads.{name}]")
     if problems:
         raise SpecError(problems)
-    return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}
+    return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in loads}
 
 
-def start_speeds(scene: SceneSpec, stage: Stage, input_port: str) -> dict[str, float]:
-    """Speed (rad/s) of every torque port at the start: that of the input, and what is geared to it by its teeth; others
-    begin at rest."""
+def start_speeds(scene: SceneSpec, stage: Stage, input_port: str, loaded: Collection[str] = ()) -> dict[str, float]:
+    """Speed (rad/s) of every torque port, those `loaded` among them, at the start: that of the input, and what is
+    geared to it by its teeth; others begin at rest."""
     turning = turns(stage, input_port)
     return {
         name: scene.start.pinion_speed * float(turning.get(stage.rotor_of(port.body), 0))
         for name, port in stage.ports.items()
-        if port.kind == "torque"
+        if port.kind == "torque" or name in loaded
     }

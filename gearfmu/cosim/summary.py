@@ -47,7 +47,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "master": scene.coupling.master,
         "settle": scene.settle,
         "unit": "kernel" if source.fmu_path is None else "fmu",
-        "chain_in_fmu": bool(scene.passenger_car and scene.passenger_car.chain_in_fmu),
+        "chain_in_fmu": scene.chain_in_fmu,
         "meshes": {mesh: known.plain for mesh, known in meshings(source.model.stage).items()},
     }
 

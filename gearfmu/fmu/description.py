@@ -24,7 +24,7 @@ LOG_CATEGORIES = {
 class Identity:
     """What modelDescription.xml says about the FMU as a whole.
 
-    identifier: modelIdentifier, a C name; guid: hash of the model, checked by the binary; native: the binary needs
+    identifier: modelIdentifier, a C name; guid: of the model, checked by the binary; native: the binary needs
     nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/;
     rights: author, copyright and license of the model, which are its maker's; nominals: size of outputs by unit."""
 

@@ -140,7 +140,7 @@ def _python_files(model: StageModel, libraries: Mapping[str, Path], extras: Extr
             raise FmuError(f"pythonfmu has no binary for {name}: export with runtime native")
         files[f"binaries/{name}/{identifier}{library.suffix}"] = binary.read_bytes()
         files[f"resources/{identifier}_kernel{library.suffix}"] = binaries[name]
-    slave = slave.replace("@MODEL_HASH@", model.hash).replace("@LIBRARY@", f"{identifier}_kernel")
+    slave = slave.replace("@GUID@", model.guid).replace("@LIBRARY@", f"{identifier}_kernel")
     files[f"resources/{identifier}.py"] = slave.encode()
     files["resources/slavemodule.txt"] = identifier.encode()
     for source in sorted(frame.glob("*.py")):
@@ -155,7 +155,7 @@ def _common_files(
     identity = Identity(
         model.name,
         identifier,
-        model.hash,
+        model.guid,
         metadata.version("gearfmu"),
         model.spec.description,
         native,

@@ -1,6 +1,6 @@
 """Slave of a `--runtime python` FMU. It stands in the FMU's resources beside the kernel library and the model, needs
 nothing but Python's standard library, and hands every call to the library's own FMI 2 face: one set of rules, the same
-bits as the native FMU. MODEL_HASH and LIBRARY are filled in at export."""
+bits as the native FMU. GUID and LIBRARY are filled in at export."""
 
 import ctypes
 import os
@@ -10,7 +10,7 @@ import sys
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-MODEL_HASH = "@MODEL_HASH@"
+GUID = "@GUID@"
 LIBRARY = "@LIBRARY@"
 OK = 0
 LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -47,7 +47,7 @@ class GearStage(Fmi2Slave):
         self.callbacks = Callbacks(logger=LOGGER(self._take_message))
         location = pathlib.Path(self.resources).resolve().as_uri()
         self.instance = self.library.fmi2Instantiate(
-            self.instance_name.encode(), 1, MODEL_HASH.encode(), location.encode(), ctypes.byref(self.callbacks), 0, 0
+            self.instance_name.encode(), 1, GUID.encode(), location.encode(), ctypes.byref(self.callbacks), 0, 0
         )
         if not self.instance:
             raise RuntimeError("the kernel refused to make an instance: " + self._messages())

@@ -13,8 +13,9 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from gearfmu.errors import FmuError, Problem
+from gearfmu.errors import FmuError, ModelError, Problem
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, read_stage_file
+from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import SUFFIX, host_platform
 
 TIMEOUT = 600  # s without an end of the first run: big stages take long to initialise
@@ -97,11 +98,17 @@ def _stage(folder: Path, description: ModelDescription) -> Iterator[tuple[str, s
         return
     try:
         named = read_stage_file((folder / STAGE_FILE).read_bytes(), "")["hashes"]["model"]
+        kernel = Kernel((folder / MODEL_FILE).read_bytes())
     except FmuError as error:
         yield "", "", str(error)
         return
-    if named != description.guid:
-        yield f"{STAGE_FILE}: hashes.model", named, f"the guid is {description.guid}: {EXPORT_AGAIN}"
+    except ModelError as error:
+        yield MODEL_FILE, "", f"{error}: {EXPORT_AGAIN}"
+        return
+    if named != kernel.hash:
+        yield f"{STAGE_FILE}: hashes.model", named, f"the model beside it is {kernel.hash}: {EXPORT_AGAIN}"
+    if kernel.guid != description.guid:
+        yield "modelDescription.xml: guid", description.guid, f"that of the model is {kernel.guid}: {EXPORT_AGAIN}"
 
 
 def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:

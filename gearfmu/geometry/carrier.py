@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-
-from gearfmu.geometry.planetary import planet_angles
 
 
 @dataclass(frozen=True)
@@ -28,16 +25,6 @@ class CarrierGeometry:
     thickness: float
     gap: float
     seat: float
-
-    @classmethod
-    def of(cls, spec: Any) -> CarrierGeometry:
-        """The geometry of the carrier of a PlanetarySpec."""
-        carrier = spec.carrier
-        return cls(
-            angles=planet_angles(spec), a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
-            r_o=carrier.outer_diameter / 2, r_bolt=carrier.bolt_diameter / 2, thickness=carrier.thickness,
-            gap=carrier.gap, seat=spec.planet.face_width,
-        )  # fmt: skip
 
     @property
     def planets(self) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,18 +31,6 @@ class GearGeometry(ReferenceGear):
     tip_edge: float
     h_fp: float
     rho_fp: float
-
-    @classmethod
-    def of(cls, gear: Any, pair: Any, hand: int = 0) -> GearGeometry:
-        """The geometry of a GearSpec of a PairSpec. hand: of a helical pair, +1 for the pinion and −1 for the wheel,
-        whose hand is the opposite one (`PairGeometry.of` knows)."""
-        assert hand or not pair.helix_angle, "which gear of a helical pair is meant?"
-        m = pair.normal_module
-        return cls(
-            z=gear.teeth, m=m, alpha=pair.pressure_angle, x=gear.profile_shift, r_a=gear.tip_diameter / 2,
-            r_bore=gear.bore_diameter / 2, tip_edge=gear.tip_edge_radius,
-            h_fp=gear.rack.dedendum * m, rho_fp=gear.rack.fillet_radius * m, beta=hand * pair.helix_angle + 0.0,
-        )  # fmt: skip
 
     @property
     def r_f(self) -> float:

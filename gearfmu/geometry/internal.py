@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,18 +35,6 @@ class InternalGearGeometry(ReferenceGear):
     r_rim: float
     tip_edge: float
     fillet: float
-
-    @classmethod
-    def of(cls, ring: Any, gear_set: Any, hand: int = 0) -> InternalGearGeometry:
-        """The geometry of the RingSpec of a SetSpec. hand: of a helical one, the sign of its helix angle over that of
-        `gear_set`."""
-        assert hand or not gear_set.helix_angle, "of which hand is the ring?"
-        m, beta = gear_set.normal_module, hand * gear_set.helix_angle + 0.0
-        return cls(
-            z=ring.teeth, m=m, alpha=gear_set.pressure_angle, x=ring.profile_shift, r_a=ring.tip_diameter / 2,
-            r_f=m * (ring.teeth / 2 / math.cos(beta) + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
-            tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m, beta=beta,
-        )  # fmt: skip
 
     @property
     def s_a(self) -> float:

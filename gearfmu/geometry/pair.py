@@ -5,10 +5,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
+
+
+class HasGeometry(Protocol):
+    """A stage that is a pair."""
+
+    @property
+    def geometry(self) -> PairGeometry:
+        """Its pair."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +37,9 @@ class PairGeometry:
             raise ValueError("the centre distance is smaller than the sum of the base radii")
 
     @classmethod
-    def of(cls, stage: Any) -> PairGeometry:
-        """The geometry of a StageSpec."""
-        pinion, wheel = (GearGeometry.of(g, stage.pair, hand) for g, hand in zip(stage.gears, (1, -1), strict=True))
-        return cls(gears=(pinion, wheel), a=stage.pair.center_distance, backlash=stage.pair.backlash)
+    def of(cls, stage: HasGeometry) -> PairGeometry:
+        """The pair of a stage: another name of its `geometry`, for scripts of release 0.2."""
+        return stage.geometry
 
     @property
     def alpha_wt(self) -> float:

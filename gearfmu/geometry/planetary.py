@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
@@ -150,13 +149,6 @@ class PlanetaryGeometry:
     ring_mesh: RingMesh
     angles: tuple[float, ...]
 
-    @classmethod
-    def of(cls, spec: Any) -> PlanetaryGeometry:
-        """The geometry of a PlanetarySpec."""
-        sun, planet, ring = set_geometries(spec)
-        a, backlash = spec.set.center_distance, spec.set.backlash
-        return cls(PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), planet_angles(spec))
-
     @property
     def ratio(self) -> float:
         """Speed of the sun over that of the carrier with the ring at rest, 1 + z_r/z_s."""
@@ -171,28 +163,6 @@ class PlanetaryGeometry:
 def set_ratio(sun: int, ring: int) -> float:
     """1 + z_r/z_s: speed of the sun over that of the carrier with the ring at rest; numbers of teeth."""
     return 1 + ring / sun
-
-
-def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
-    """The geometry of sun, planet or ring of a PlanetarySpec."""
-    kind = InternalGearGeometry if name == "ring" else GearGeometry
-    return kind.of(getattr(spec, name), spec.set, HANDS[name])
-
-
-def set_geometries(spec: Any) -> tuple[GearGeometry, GearGeometry, InternalGearGeometry]:
-    """Sun, planet and ring of a PlanetarySpec."""
-    sun, planet, ring = (set_geometry(spec, name) for name in HANDS)
-    assert isinstance(sun, GearGeometry) and isinstance(planet, GearGeometry)
-    assert isinstance(ring, InternalGearGeometry)
-    return sun, planet, ring
-
-
-def planet_angles(spec: Any) -> tuple[float, ...]:
-    """Angles (rad) of the planets of a PlanetarySpec with the carrier at 0, the first 0: as its `positions` say, or
-    2πk/N."""
-    if spec.set.positions is None:
-        return tuple(2 * math.pi * k / spec.set.planets for k in range(spec.set.planets))
-    return tuple(2 * math.pi * place / (spec.sun.teeth + spec.ring.teeth) for place in spec.set.positions)
 
 
 def least_apart(angles: tuple[float, ...]) -> float:

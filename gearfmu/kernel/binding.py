@@ -74,6 +74,7 @@ _SIGNATURES = {
     "gk_model_open": (c_int, [c_void_p, c_void_p, c_size_t, c_char_p]),
     "gk_model_name": (c_char_p, [c_void_p]),
     "gk_model_hash": (c_char_p, [c_void_p]),
+    "gk_model_guid": (c_char_p, [c_void_p]),
     "gk_variable_count": (c_int, [c_void_p]),
     "gk_variable": (c_int, [c_void_p, c_int, POINTER(VariableInfo)]),
     "gk_setup_size": (c_size_t, [c_void_p]),

@@ -111,6 +111,11 @@ class Kernel:
         return self._lib.gk_model_hash(self._model).decode()
 
     @property
+    def guid(self) -> str:
+        """GUID of an FMU with this model, 64 hex digits."""
+        return self._lib.gk_model_guid(self._model).decode()
+
+    @property
     def time(self) -> float:
         """The last time (s) the state is good at."""
         return self._lib.gk_time(self._data)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.cosim.scene_run import coupled_run
+from gearfmu.cosim.scene_run import coupled_run, drive_of
 from gearfmu.cosim.source import Source
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Window, pilot_choice
@@ -48,7 +48,7 @@ def parts(scene: SceneSpec, model: StageModel, request: Request) -> Iterator[Par
     if scene.settle > 0.0:
         speed = scene.start.pinion_speed
         length, settle = first_window(model, request, speed, torque)
-        window = Window(max(scene.settle, settle), whole_periods(scene, length), settle)
+        window = Window(max(scene.settle, settle), whole_periods(scene, model, length), settle)
         yield Part("steady", 0.0, scene.duration, "loaded", window, LONGEST, speed)
         return
     trace = _pilot_run(scene, model)
@@ -66,7 +66,7 @@ def _transient(
     length, settle = first_window(*known)
     room = end - start
     settle = min(settle, 0.4 * room)
-    length = min(whole_periods(scene, max(length, min(LOOKED_AT, room))), room - settle)
+    length = min(whole_periods(scene, known[0], max(length, min(LOOKED_AT, room))), room - settle)
     return Part(name, start, end, "transient", Window(start + settle, length, settle), room - settle, known[2])
 
 
@@ -74,9 +74,8 @@ def _pilot_run(scene: SceneSpec, model: StageModel) -> Trace:
     """The whole scene by the pilot, recorded as far as cuts need it."""
     meshes = tuple(f"{mesh.name}.open_time" for mesh in model.stage.engagements)
     names = (*meshes, *(v.name for v in model.kernel_variables() if v.name.endswith((LOCKED, ".gear.w"))))
-    clutches = tuple(f"drive.{name}{LOCKED}" for name in (scene.drivetrain.clutches if scene.drivetrain else ()))
-    car = () if scene.passenger_car is None or scene.passenger_car.chain_in_fmu else ("drive.*" + LOCKED,)
-    record = {"record": (*names, *clutches, *car)}
+    clutches = tuple(f"drive.{name}{LOCKED}" for name in drive_of(scene, model.stage).watched)
+    record = {"record": (*names, *clutches)}
     run = coupled_run(pilot_choice(scene).of(scene.model_copy(update=record)), Source(model))
     run.go()
     return run.recorder.trace({})

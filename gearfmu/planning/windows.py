@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from gearfmu.cosim.scene_run import drive_of
 from gearfmu.errors import GearfmuError
 from gearfmu.modes.linear import linearised
 from gearfmu.planning.choice import Choice
@@ -76,10 +77,9 @@ def first_window(model: StageModel, request: Request, speed: float, torque: floa
     return max(meshing, decay, BAND_PERIODS / request.band[0]), min(SETTLE[1], max(SETTLE[0], decay))
 
 
-def whole_periods(scene: SceneSpec, length: float) -> float:
+def whole_periods(scene: SceneSpec, model: StageModel, length: float) -> float:
     """The length (s), rounded up to whole periods of the alternating torques of the scene."""
-    loads = [*(scene.shaft_loads or {}).values()] + [*(scene.drivetrain.torques.values() if scene.drivetrain else ())]
-    frequencies = [load.alternating.frequency for load in loads if load.alternating is not None]
+    frequencies = drive_of(scene, model.stage).frequencies
     if not frequencies:
         return length
     period = 1.0 / min(frequencies)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
@@ -20,6 +19,7 @@ from gearfmu.rexs.gears import (
 )
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.forms.shapes import gears_in_mesh
 from gearfmu.spec.proposals.draft import (
     BACKLASH_PER_MODULE,
     PITCH_SPEED,
@@ -174,7 +174,7 @@ def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:
     if pair is None or len(known) < 2:
         return
     try:
-        geometry = PairGeometry.of(_Stage(pair, known))
+        geometry = gears_in_mesh(pair, known)
         if any(gear.r_a <= gear.r_b for gear in geometry.gears):
             return
         nominal = geometry.nominal_backlash
@@ -188,10 +188,3 @@ def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:
         for name in NAMES:
             text = millimetres(rounded_up(width, 2))
             draft.assume(f"gears.{name}.body.strip_half_width", text, "1.5 Hertz half-widths at torque_max")
-
-
-class _Stage:
-    """What PairGeometry reads of a stage."""
-
-    def __init__(self, pair: PairSpec, gears: list[GearSpec]):
-        self.pair, self.gears = pair, gears

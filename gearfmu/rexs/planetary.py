@@ -188,10 +188,9 @@ def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, 
 def _tip_that_clears(draft: Draft, distance: float) -> float:
     """Smallest tip radius (m) of the ring that does not meet the planet below its form circle; 0 where that cannot be
     told before the rest is put right."""
-    from gearfmu.geometry.gear import GearGeometry
-    from gearfmu.geometry.internal import InternalGearGeometry
     from gearfmu.geometry.planetary import HANDS, RingMesh
     from gearfmu.spec.forms.planetary import RingSpec, SetGearSpec, SetSpec
+    from gearfmu.spec.forms.shapes import gear_geometry, ring_geometry
     from gearfmu.spec.reading.base import validate
 
     ring_table = {"tip_diameter": "1 mm", "rim_diameter": "1 m"} | {
@@ -202,7 +201,7 @@ def _tip_that_clears(draft: Draft, distance: float) -> float:
     ring, _ = validate(RingSpec, ring_table, "")
     if shared is None or planet is None or ring is None:
         return 0.0
-    shapes = (GearGeometry.of(planet, shared, HANDS["planet"]), InternalGearGeometry.of(ring, shared, HANDS["ring"]))
+    shapes = (gear_geometry(planet, shared, HANDS["planet"]), ring_geometry(ring, shared, HANDS["ring"]))
     try:
         return RingMesh(*shapes, distance, 0.0).least_tip_radius
     except ValueError:

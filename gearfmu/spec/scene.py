@@ -127,6 +127,11 @@ class SceneSpec(Spec):
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     @property
+    def chain_in_fmu(self) -> bool:
+        """Whether the clutch of a passenger car is inside the stage."""
+        return self.passenger_car is not None and self.passenger_car.chain_in_fmu
+
+    @property
     def steps(self) -> int:
         """Number of communication steps."""
         return round(self.duration / self.coupling.step)
@@ -213,7 +218,7 @@ def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
 
 def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:
     yield from time_problems(clutch.capacity, file, "clutch.capacity")
-    if clutch.peak != 1.0 and scene.passenger_car is not None and scene.passenger_car.chain_in_fmu:
+    if clutch.peak != 1.0 and scene.chain_in_fmu:
         yield Problem(
             file,
             "clutch.peak",

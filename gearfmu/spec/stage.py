@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
@@ -176,5 +175,5 @@ def _set_with_paths(spec: PlanetarySpec, layers: Layers) -> PlanetarySpec:
 
 def _with_relief_rolls(spec: StageSpec) -> StageSpec:
     """The same stage with points of single contact turned into rolls."""
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     return spec.model_copy(update={"gears": tuple(with_rolls(gear, pair, i) for i, gear in enumerate(spec.gears))})

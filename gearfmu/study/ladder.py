@@ -33,7 +33,7 @@ def points(scene: SceneSpec, quick: bool = False) -> list[Point]:
     wishes = QUICK_STEPS if quick else STEPS
     steps = sorted({fitting(scene.coupling.step, h) for h in wishes}, reverse=True)
     found = [Point(level, h=h, slices=own) for level in LEVELS for h in (0.0, *steps)]
-    if has_clutch(scene) or of_set(scene):
+    if scene.chain_in_fmu or of_set(scene):  # rk45 knows no clutch on the stage's port
         found += [Point("paper", slices=own)]
     else:
         found += [Point("paper", h=RK45_OUTER, slices=own), Point("full", "rk45", RK45_OUTER, own)]
@@ -41,11 +41,6 @@ def points(scene: SceneSpec, quick: bool = False) -> list[Point]:
     if not quick:
         found += [Point(level, h=h, slices=count) for count in others for level in SLICED for h in (0.0, *steps)]
     return found
-
-
-def has_clutch(scene: SceneSpec) -> bool:
-    """Whether a clutch hangs on the stage's port: rk45 does not know it."""
-    return scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
 
 
 def of_set(scene: SceneSpec) -> bool:

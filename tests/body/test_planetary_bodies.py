@@ -23,9 +23,8 @@ from gearfmu.body.layout import RIM_ENTRIES
 from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.forms.members import body_names
+from gearfmu.spec.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
@@ -71,7 +70,7 @@ def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands(
 
 
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
-    ring, carrier = InternalGearGeometry.of(SPEC.ring, SPEC.set), CarrierGeometry.of(SPEC)
+    ring, carrier = ring_geometry(SPEC.ring, SPEC.set), carrier_geometry(SPEC)
     (area, moment), (middle, about) = section(ring), carrier_moments(carrier)
     volume = ring.z * area * SPEC.ring.face_width
     assert shipped["ring"].mass == pytest.approx(7850 * volume, rel=1e-5)

@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body import body_path, load_bodies, reduce_bodies
-from gearfmu.geometry import GearGeometry
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.reading.library import library_roots, shipped_stages
 from gearfmu.spec.stage import load_stage
 
@@ -87,7 +87,7 @@ def pair_stiffness(bodies, spec, twist: bool) -> float:
         total += at_roll(body, bore_held(body), roll)
         total += 2 / (np.pi * modulus * width) * (np.log(4 * body.strip_half_width / hertz) - 1)
         if not twist:
-            root = GearGeometry.of(gear, pair).r_f
+            root = gear_geometry(gear, pair).r_f
             shear = 206e9 / 2.6
             total -= body.r_b**2 / (4 * np.pi * shear * width) * (4 / gear.bore_diameter**2 - 1 / root**2)
     return 1e-9 / (total * width)

@@ -13,7 +13,6 @@ from gearfmu.body.layout import entries_of
 from gearfmu.body.reduced import value_of
 from gearfmu.errors import MeshError
 from gearfmu.femesh import sector_mesh
-from gearfmu.geometry import PairGeometry
 from gearfmu.reduction import memory
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need, gear_need, whole_need
@@ -85,7 +84,7 @@ def test_the_estimate_is_near_what_was_measured() -> None:
 
 
 def test_a_finer_mesh_needs_more(spec: object) -> None:
-    gear, geometry = spec.gears[0], PairGeometry.of(spec).gears[0]  # type: ignore[attr-defined]
+    gear, geometry = spec.gears[0], spec.geometry.gears[0]  # type: ignore[attr-defined]
     needs = []
     for scale in (1.0, 2.0, 4.0):
         mesh = gear.body.mesh.model_copy(update={"scale": scale})

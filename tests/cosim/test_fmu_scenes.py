@@ -13,7 +13,7 @@ import gearfmu as gf
 from gearfmu import cosim, fmu
 from gearfmu.api.results import stage_and_bodies
 from gearfmu.cosim.given_fmu import fitted, of_scene
-from gearfmu.cosim.scene_run import Staged, in_drivetrain
+from gearfmu.cosim.scene_run import Staged, drive_of
 from gearfmu.errors import BodyError, FmuError, SpecError
 from gearfmu.fmu.opened import OpenedFmu
 from gearfmu.fmu.package import write_archive
@@ -96,7 +96,7 @@ def test_an_fmu_keeps_its_shafts_and_the_run_says_so(plain: Path) -> None:
 def test_parts_hang_on_the_shafts_of_the_fmu() -> None:
     scene, spec = gf.load_scene("train_runup"), gf.load("two_stage")
     opened = OpenedFmu(Path("train.fmu"), StageModel(spec, b"", ("",) * len(spec.gears)), {})
-    own, (remark,) = fitted(scene.model_copy(update={"deformation": None}), opened, in_drivetrain)
+    own, (remark,) = fitted(scene.model_copy(update={"deformation": None}), opened, drive_of)
     assert own.drivetrain is not None and own.drivetrain.ports["input"].stiffness == spec.ports["input"].k
     assert "ports.input.k 20000 N*m/rad, in the scene 2000 N*m/rad" in remark
 
@@ -158,7 +158,7 @@ def test_another_kind_of_port_is_named() -> None:
     spec = gf.assemble("fzg_c", ports={"wheel": "torque"}).spec
     opened = OpenedFmu(Path("pair.fmu"), StageModel(spec, b"", ("", "")), {})
     with pytest.raises(SpecError, match=r"pair.fmu: ports.wheel.kind = torque: scene pair_loaded needs .* kind spring"):
-        fitted(gf.load_scene("pair_loaded"), opened, in_drivetrain)
+        fitted(gf.load_scene("pair_loaded"), opened, drive_of)
 
 
 def test_an_fmu_that_does_not_show_a_recorded_gear_is_refused(plain: Path) -> None:
@@ -195,5 +195,5 @@ def test_an_fmu_for_a_scene_shows_the_gears_that_it_records() -> None:
     choice = gf.load_scene("planetary_paper").deformation.model_copy(update={"gears": ("wheel",)})
     scene = short("pair_loaded", deformation=choice)
     opened = OpenedFmu(Path("shown.fmu"), gf.assemble_in_scene(scene, "fzg_c", observe=["pinion", "wheel"]), {})
-    assert opened.observed == ("pinion", "wheel") and fitted(scene, opened, in_drivetrain) == (scene, ())
+    assert opened.observed == ("pinion", "wheel") and fitted(scene, opened, drive_of) == (scene, ())
     assert OpenedFmu(Path("own.fmu"), gf.assemble_in_scene(scene, "fzg_c"), {}).observed == ("wheel",)

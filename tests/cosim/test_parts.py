@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from gearfmu.cosim.network import Driven
-from gearfmu.cosim.parts import part_network, part_ports
+from gearfmu.cosim.parts import Rest, Start, part_network, part_ports, start_of, start_speeds_of
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.start import start_of, start_speeds_of
 from gearfmu.errors import SpecError
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.ports import PortSpec
 
 SHIFT = "planetary_shift"
 PAIR = """
@@ -49,6 +49,14 @@ stiffness = "800 N*m/rad"
 air_gap = { on = "motor", constant = "60 N*m" }
 load = { on = "machine", proportional = { torque = "45 N*m", speed = "-66.66666666666667 rad/s" } }
 """
+
+
+def ports_of(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:
+    return part_ports(scene.name, scene.drivetrain, stage)
+
+
+def speeds_of(scene: SceneSpec, stage: Stage) -> dict[str, float]:
+    return start_speeds_of(scene, scene.drivetrain, stage)
 
 
 @pytest.fixture(scope="module")
@@ -91,19 +99,19 @@ def test_a_drivetrain_is_one_of_four_and_brings_its_own_clutches(tmp_path: Path)
 def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path: Path, pair: Stage) -> None:
     scene = scene_of(tmp_path, PAIR.replace("ports.wheel", "ports.whel").replace('damping = "0.2 N*m*s/rad"\n', ""))
     with pytest.raises(SpecError) as told:
-        part_ports(scene, pair)
+        ports_of(scene, pair)
     remedies = {problem.field: problem.remedy for problem in told.value.problems}
     assert remedies["drivetrain.ports.whel"].endswith("it has pinion, wheel")
     assert remedies["ports.wheel.kind"] == "nothing drives it: write [drivetrain.ports.wheel]"
 
 
 def test_what_a_port_does_not_say_is_the_stage_s(tmp_path: Path, pair: Stage) -> None:
-    ports = part_ports(scene_of(tmp_path, PAIR.replace('stiffness = "2e4 N*m/rad"\n', "")), pair)
+    ports = ports_of(scene_of(tmp_path, PAIR.replace('stiffness = "2e4 N*m/rad"\n', "")), pair)
     assert ports["pinion"].k == pair.ports["pinion"].k and ports["pinion"].c == 0.2 and ports["wheel"].k == 5e4
 
 
 def test_speeds_follow_shafts_and_meshes(tmp_path: Path, pair: Stage) -> None:
-    speeds = start_speeds_of(scene_of(tmp_path, PAIR), pair)
+    speeds = speeds_of(scene_of(tmp_path, PAIR), pair)
     wheel = -100.0 * 16 / 24
     assert (speeds["motor"], speeds["flange"], speeds["machine"]) == pytest.approx((100.0, wheel, wheel), rel=1e-14)
 
@@ -112,10 +120,10 @@ def test_speeds_that_nothing_decides_or_that_contradict_each_other(tmp_path: Pat
     alone = PAIR.replace("[drivetrain.shafts.half_shaft]", "[drivetrain.clutches.coupling]")
     alone = alone.replace('stiffness = "800 N*m/rad"', 'capacity = [["0 s", "5 N*m"]]')
     with pytest.raises(SpecError, match=r"drivetrain\.inertias\.machine\.speed.*nothing decides its speed"):
-        start_speeds_of(scene_of(tmp_path, alone), pair)
+        speeds_of(scene_of(tmp_path, alone), pair)
     wrong = PAIR.replace('inertia = "0.2 kg*m^2"', 'inertia = "0.2 kg*m^2", speed = "66 rad/s"')
     with pytest.raises(SpecError, match="do not allow these speeds together"):
-        start_speeds_of(scene_of(tmp_path, wrong), pair)
+        speeds_of(scene_of(tmp_path, wrong), pair)
 
 
 def rest_at(angles: dict[str, float], seen: dict[str, float]):
@@ -132,7 +140,7 @@ def test_everything_gathers_speed_together_and_shafts_carry_what_that_takes(tmp_
     """Ratio i: (J_m + (J_f + J_l)/i²) a = T_m + T_l/i; the pinion's shaft carries T_m − J_m a, the half shaft of the
     machine J_l a_l − T_l."""
     scene, seen = scene_of(tmp_path, PAIR), {}
-    start = start_of(scene, pair, rest_at({"pinion": 2e-3, "wheel": -1e-3}, seen))
+    start = begin(scene, pair, rest_at({"pinion": 2e-3, "wheel": -1e-3}, seen))
     i, drive, load = -1.5, 60.0, 45.0
     a = (drive + load / i) / (0.03 + 0.21 / i**2)
     assert seen["pinion"] == pytest.approx(drive - 0.03 * a) and seen["wheel"] == pytest.approx(-i * seen["pinion"])
@@ -147,6 +155,10 @@ def test_everything_gathers_speed_together_and_shafts_carry_what_that_takes(tmp_
     assert found.tolist() == pytest.approx([a, a / i, a / i])
 
 
+def begin(scene: SceneSpec, stage: Stage, rest: Rest) -> Start:
+    return start_of(scene, scene.drivetrain, stage, rest)
+
+
 def brake_of(scene: SceneSpec, capacity: float, peak: float = 1.0) -> SceneSpec:
     brake = scene.drivetrain.clutches["brake"].model_copy(update={"capacity": ((0.0, capacity),), "peak": peak})
     parts = scene.drivetrain.model_copy(update={"clutches": {"brake": brake}})
@@ -158,15 +170,15 @@ def test_a_brake_that_holds_carries_the_ring_and_one_that_does_not_slips() -> No
     With less capacity than that the brake carries what it can."""
     scene, stage = load_scene(SHIFT), as_general(load_stage("planetary54/stage_ring_port"))
     seen: dict[str, float] = {}
-    start = start_of(scene, stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
+    start = begin(scene, stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
     assert start.speed == pytest.approx({"turbine": 85.0, "drum": 0.0, "output": 340.0, "vehicle": 340.0})
     assert seen == pytest.approx({"carrier": 200.0, "sun": -50.0, "ring": -150.0})
     assert start.angle["drum"] == pytest.approx(-150.0 / stage.ports["ring"].k) and start.ground == {"ground": 0.0}
-    start_of(brake_of(scene, 160.0), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
+    begin(brake_of(scene, 160.0), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
     assert seen["ring"] == pytest.approx(-150.0)
-    start_of(brake_of(scene, 100.0), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
+    begin(brake_of(scene, 100.0), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
     assert abs(seen["ring"]) < 150.0 and seen["carrier"] == pytest.approx(-4.0 * seen["sun"])
-    start_of(brake_of(scene, 100.0, peak=1.6), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
+    begin(brake_of(scene, 100.0, peak=1.6), stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
     assert seen["ring"] == pytest.approx(-150.0)
 
 
@@ -175,7 +187,7 @@ def test_a_port_on_the_ground_is_held_at_the_angle_its_torque_needs(tmp_path: Pa
     text = text.replace('between = ["drum", "ground"]', 'between = ["drum", "turbine"]')
     scene, stage = scene_of(tmp_path, text), as_general(load_stage("planetary54/stage_ring_port"))
     scene = brake_of(scene, 0.0)
-    start = start_of(scene, stage, rest_at({"carrier": 0.0, "sun": 0.0, "ring": 1e-3}, {}))
+    start = begin(scene, stage, rest_at({"carrier": 0.0, "sun": 0.0, "ring": 1e-3}, {}))
     assert start.ground == {"ground.ring": pytest.approx(1e-3 - 150.0 / stage.ports["ring"].k)}
     network = part_network(scene.drivetrain, start)
     assert network.torque_ports["ring"] == "ground.ring"
@@ -185,7 +197,7 @@ def test_a_port_on_the_ground_is_held_at_the_angle_its_torque_needs(tmp_path: Pa
 def test_parts_swing_as_their_shafts_say(tmp_path: Path, pair: Stage) -> None:
     """Flange and machine on the half shaft alone: ω² = k (1/J₁ + 1/J₂), slips and torques by name."""
     scene = scene_of(tmp_path, PAIR.replace("45 N*m", "0 N*m"))
-    start = start_of(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, {}))
+    start = begin(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, {}))
     unit = PyUnit(part_network(scene.drivetrain, start))
     unit.initialize(0.0)
     omega, twist = math.sqrt(800.0 * (1 / 0.01 + 1 / 0.2)), start.angle["flange"] - start.angle["machine"]
@@ -202,7 +214,7 @@ def test_the_drivetrain_of_the_page_loads_and_starts_with_a_clutch_that_slips(tm
     page = (Path(__file__).resolve().parents[2] / "docs" / "howto-scene.md").read_text(encoding="utf-8")
     block = next(text for text in page.split("```toml\n") if text.startswith('name = "two_machines"'))
     scene, seen = scene_of(tmp_path, block.partition("```")[0]), {}
-    start = start_of(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, seen))
+    start = begin(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, seen))
     i, friction = -1.5, 20.0  # N·m: the machine, slower by 26.7 rad/s, holds the flange back
     assert start.speed == pytest.approx({"motor": 100.0, "flange": 100.0 / i, "machine": -40.0})
     a = (10.0 + friction / i) / (0.03 + 0.01 / i**2)

@@ -11,18 +11,11 @@ import pytest
 from scipy.linalg import eigh
 
 from evidence.pages.drivetrain import page
-from gearfmu.cosim.drivetrain import (
-    Shafts,
-    build,
-    capacity,
-    engine_torque,
-    road_load,
-    stage_ports,
-    stage_signals,
-    stage_start,
-)
+from gearfmu.cosim.drive import Drive
+from gearfmu.cosim.drivetrain import capacity, car_drive, engine_torque, rig_drive, road_load
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.spec.forms.turning import Shafts
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.scenes.drivetrain import PassengerCar
 
@@ -33,6 +26,14 @@ CAR = PassengerCar()
 def closure(**changes) -> SceneSpec:
     scene = load_scene("clutch_closure")
     return scene.model_copy(update={"passenger_car": CAR.model_copy(update=changes)})
+
+
+def drive_of(scene: SceneSpec) -> Drive:
+    return car_drive(scene, scene.passenger_car, SHAFTS)
+
+
+def network_of(drive: Drive) -> Network:
+    return drive.partner(lambda torques: {})
 
 
 def test_docs_show_the_table():
@@ -99,7 +100,7 @@ def test_kinetic_energy_is_that_of_the_moving_vehicle():
     """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive,
     engine, flywheel and disc."""
     scene = closure(chain_in_fmu=False)
-    unit = PyUnit(build(scene, SHAFTS))
+    unit = PyUnit(network_of(drive_of(scene)))
     wheel_w = scene.start.pinion_speed / SHAFTS.ratio
     road_w = wheel_w / CAR.final_drive_ratio
     v, engine_w = road_w * CAR.road_wheel_radius, scene.start.pinion_speed + scene.start.slip
@@ -119,7 +120,7 @@ def test_kinetic_energy_is_that_of_the_moving_vehicle():
 def test_vehicle_side_frequencies():
     """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to
     slip."""
-    network = build(closure(chain_in_fmu=False, tyre_slip_stiffness=1e-6, dmf_stiffness=1e-6), SHAFTS)
+    network = network_of(drive_of(closure(chain_in_fmu=False, tyre_slip_stiffness=1e-6, dmf_stiffness=1e-6)))
     unit = PyUnit(network)
     mass = np.diag([node.inertia for node in network.nodes])
     rows = unit.dynamics.extension
@@ -132,19 +133,21 @@ def test_vehicle_side_frequencies():
 def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
     """Chain inside or outside the FMU: the same sum of inertias, the same stiffnesses."""
     inside, outside = closure(), closure(chain_in_fmu=False)
-    ports_in, ports_out = stage_ports(inside, SHAFTS), stage_ports(outside, SHAFTS)
+    ports_in, ports_out = drive_of(inside).ports, drive_of(outside).ports
     chains = [port.chain for port in ports_in.values()]
-    total_in = sum(node.inertia for node in build(inside, SHAFTS).nodes)
+    total_in = sum(node.inertia for node in network_of(drive_of(inside)).nodes)
     total_in += sum(chain.inertia + chain.disc_inertia for chain in chains)
-    assert total_in == pytest.approx(sum(node.inertia for node in build(outside, SHAFTS).nodes), rel=1e-14)
-    springs_out = [spring.k for spring in build(outside, SHAFTS).springs] + [port.k for port in ports_out.values()]
+    assert total_in == pytest.approx(sum(node.inertia for node in network_of(drive_of(outside)).nodes), rel=1e-14)
+    springs_out = [spring.k for spring in network_of(drive_of(outside)).springs] + [
+        port.k for port in ports_out.values()
+    ]
     springs_in = (
-        [spring.k for spring in build(inside, SHAFTS).springs]
+        [spring.k for spring in network_of(drive_of(inside)).springs]
         + [port.k for port in ports_in.values()]
         + [chain.shaft_k for chain in chains]
     )
     assert sorted(springs_in) == pytest.approx(sorted(springs_out))
-    assert stage_signals(outside, SHAFTS) == () and stage_start(outside, SHAFTS) == {}
+    assert drive_of(outside).signals == () and drive_of(outside).start() == {}
 
 
 def test_capacity_of_the_closure():
@@ -155,7 +158,7 @@ def test_capacity_of_the_closure():
 def test_rig_holds_speed_and_starts_twisted():
     """The brake is a driven node; the drive's torque balances at nominal speed."""
     scene = load_scene("pair_loaded")
-    network = build(scene, SHAFTS)
+    network = network_of(rig_drive(scene, scene.test_rig, SHAFTS))
     drive, brake = network.nodes
     assert isinstance(brake, Driven) and brake.w == pytest.approx(-drive.w / 1.5)
     rig = scene.test_rig

@@ -6,18 +6,24 @@ import numpy as np
 import pytest
 from analytic_stage import Plant
 
-from gearfmu.cosim.drivetrain import Shafts, build
 from gearfmu.cosim.network import Clutch, Inertia, Network, Spring
 from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.scene_run import drive_of
 from gearfmu.cosim.signals import Ramp
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import load_scene
+from gearfmu.spec.stage import load_stage
 
 SHAFTS = ("pinion", "wheel")
 
 
+def network(name: str) -> Network:
+    return drive_of(load_scene(name), as_general(load_stage("fzg_c"))).partner(lambda torques: {})
+
+
 def drivetrain(name: str) -> PyUnit:
-    return PyUnit(build(load_scene(name), Shafts("pinion", "wheel", -1.5)))
+    return PyUnit(network(name))
 
 
 def torques(n: int) -> list[float]:
@@ -59,7 +65,7 @@ def test_ahead_changes_nothing():
 def test_ahead_ends_where_the_step_ends():
     """φ + wH + ½aH² is the angle after the step under the held torque, with micro-steps too."""
     for micro_step in (None, 1e-4):
-        unit = PyUnit(build(load_scene("clutch_closure"), Shafts("pinion", "wheel", -1.5)), micro_step)
+        unit = PyUnit(network("clutch_closure"), micro_step)
         ports, motion, h = ports_of(unit, SHAFTS), np.zeros(6), 1e-3
         ports.begin(0.0)
         ports.hold([-50.0, 70.0])

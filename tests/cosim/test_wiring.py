@@ -7,11 +7,10 @@ import pytest
 
 from gearfmu import fmu
 from gearfmu.cosim.accuracy import rms
-from gearfmu.cosim.drivetrain import stage_start
 from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Wiring
-from gearfmu.cosim.scene_run import run_once, stage_model
+from gearfmu.cosim.scene_run import drive_of, run_once, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.spec.scene import load_scene
@@ -27,7 +26,7 @@ def model() -> StageModel:
 
 def started(model: StageModel, **more) -> KernelUnit:
     scene = load_scene("clutch_closure")
-    unit = KernelUnit(model.blob, {"level": "rigid", "slices": 1, "h": H} | stage_start(scene, model.shafts) | more)
+    unit = KernelUnit(model.blob, {"level": "rigid", "slices": 1, "h": H} | drive_of(scene, model.stage).start() | more)
     give(unit, {"pinion.w": 202.0, "wheel.w": -100.0})
     unit.initialize(0.0)
     return unit
@@ -93,7 +92,7 @@ def test_several_values_are_set_all_or_none(model):
 def test_logs_write_what_get_gives(model, tmp_path):
     """FMU and kernel: reals, integers and booleans of some steps, and no more rows than there is room for."""
     scene = load_scene("clutch_closure")
-    parameters = {"level": "rigid", "slices": 1, "h": H} | stage_start(scene, model.shafts)
+    parameters = {"level": "rigid", "slices": 1, "h": H} | drive_of(scene, model.stage).start()
     with FmuUnit(fmu.export(model, tmp_path / "stage.fmu"), parameters) as stage:
         stage.set(stage.resolve(["pinion.w", "wheel.w"]), [202.0, -100.0])
         stage.initialize(0.0)

@@ -14,6 +14,7 @@ from gearfmu.errors import Problem
 from gearfmu.femesh import gear_sector, scaled_jacobian, volume
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.spec.forms.pair_checks import geometry_problems
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.tables.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
 
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)
@@ -52,7 +53,7 @@ def pair_of(teeth, shifts, module, widths, bores, widening) -> tuple[PairSpec, l
 
 def check_meshes(pair: PairSpec, gears: list[GearSpec], scale: float) -> None:
     for gear in gears:
-        shape = GearGeometry.of(gear, pair)
+        shape = gear_geometry(gear, pair)
         mesh = gear_sector(shape, gear.face_width, MeshSpec(scale=scale))
         assert scaled_jacobian(mesh).min() > 0.35
         assert volume(mesh) == pytest.approx(section(shape)[0] * gear.face_width, rel=5e-4)

@@ -20,12 +20,13 @@ from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.forms.planetary import CarrierMeshSpec
+from gearfmu.spec.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 SPEC = load_stage("planetary54")
-RING, WIDTH = InternalGearGeometry.of(SPEC.ring, SPEC.set), SPEC.ring.face_width
-CARRIER = CarrierGeometry.of(SPEC)
+RING, WIDTH = ring_geometry(SPEC.ring, SPEC.set), SPEC.ring.face_width
+CARRIER = carrier_geometry(SPEC)
 UNIT = SimpleNamespace(youngs_modulus=1.0, poisson_ratio=0.3, density=1.0)
 COUNTS = MeshSpec(flank=6, thickness=2, root=3, rim=2, width=2)
 
@@ -133,7 +134,7 @@ def test_carriers_with_other_numbers_of_planets_mesh(planets):
 def test_bolts_stand_where_unequally_spaced_planets_are():
     """72 teeth of sun and ring, five planets: two of the steps are longer than the others."""
     uneven = SPEC.set.model_copy(update={"planets": 5, "positions": (0, 14, 29, 43, 58)})
-    g = CarrierGeometry.of(SPEC.model_copy(update={"set": uneven}))
+    g = carrier_geometry(SPEC.model_copy(update={"set": uneven}))
     sector = carrier_sector(g, CarrierMeshSpec(scale=0.5))
     mesh = whole_carrier(g, sector)
     for k, turn in enumerate((0, 14, 29, 43, 58)):

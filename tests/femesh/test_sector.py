@@ -13,11 +13,12 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.section import graded, transfinite
 from gearfmu.geometry import GearGeometry
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 STAGE = load_stage("fzg_c")
-SHAPES = [GearGeometry.of(gear, STAGE.pair) for gear in STAGE.gears]
+SHAPES = [gear_geometry(gear, STAGE.pair) for gear in STAGE.gears]
 WIDTH = STAGE.gears[0].face_width
 COARSE = MeshSpec(scale=0.4)
 

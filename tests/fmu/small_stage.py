@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 
@@ -26,7 +25,7 @@ def small_model(stage: str = "fzg_c/stage_relief", name: str | None = None, **po
     spec = load_stage(stage)
     changed = {shaft: port.model_copy(update=ports.get(shaft, {})) for shaft, port in spec.ports.items()}
     spec = spec.model_copy(update={"ports": changed, "name": name or spec.name})
-    geometry = PairGeometry.of(spec)
+    geometry = spec.geometry
     return assemble(spec, [body(spec.gears[i], geometry.gears[i]) for i in (0, 1)])
 
 

@@ -78,7 +78,7 @@ def test_description_is_the_kernels_table(model, native):
         assert theirs.description.endswith(ours.description)
         if ours.causality != "output" and ours.type != "Boolean":
             assert float(theirs.start) == ours.start
-    assert description.guid == model.hash
+    assert description.guid == model.guid
     assert description.coSimulation.canSerializeFMUstate and not description.coSimulation.providesDirectionalDerivative
 
 

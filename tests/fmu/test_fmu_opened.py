@@ -156,13 +156,15 @@ def test_validate_looks_at_the_stage(members, model, other_model, tmp_path: Path
     assert not list(stage_findings(tmp_path, SimpleNamespace(guid="of another maker")))
     (tmp_path / MODEL_FILE).write_bytes(model.blob)
     assert [found[:2] for found in stage_findings(tmp_path, SimpleNamespace())] == [(STAGE_FILE, "is missing")]
-    for content, field, words in (
-        (stage_file(model), None, ""),
-        (stage_file(other_model), f"{STAGE_FILE}: hashes.model", f"the guid is {model.hash}: export the FMU again"),
-        (with_field(members, "teeth", {}), "", f"{STAGE_FILE}: was changed after the export"),
+    guid, stale = "modelDescription.xml: guid", other_model.guid
+    for content, named, field, words in (
+        (stage_file(model), model.guid, None, ""),
+        (stage_file(model), stale, guid, f"that of the model is {model.guid}: export the FMU again"),
+        (stage_file(other_model), model.guid, f"{STAGE_FILE}: hashes.model", f"is {model.hash}: export the FMU again"),
+        (with_field(members, "teeth", {}), model.guid, "", f"{STAGE_FILE}: was changed after the export"),
     ):
         (tmp_path / STAGE_FILE).write_bytes(content)
-        found = list(stage_findings(tmp_path, SimpleNamespace(guid=model.hash)))
+        found = list(stage_findings(tmp_path, SimpleNamespace(guid=named)))
         assert [f for f, _, _ in found] == ([] if field is None else [field])
         assert all(words in remedy for _, _, remedy in found)
 

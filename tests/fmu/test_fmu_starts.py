@@ -17,7 +17,6 @@ from gearfmu import cli
 from gearfmu.api.results import with_windup
 from gearfmu.errors import ModelError
 from gearfmu.fmu import export
-from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.blob import read_blob, write_blob
 
@@ -84,7 +83,7 @@ def test_windup_carries_the_torque_from_the_start(pinion: str, wheel: str) -> No
     for name, value in inputs.items():
         kernel.set(name, value)
     kernel.initialize(0.0)
-    force = 200.0 / PairGeometry.of(model.spec).gears[0].r_b
+    force = 200.0 / model.spec.geometry.gears[0].r_b
     assert kernel.get("mesh.force") == pytest.approx(force, rel=0.05 if pinion == "spring" else 1e-3)
     assert set(inputs) <= {"pinion.phi", "pinion.w", "pinion.tau", "wheel.phi", "wheel.w", "wheel.tau"}
 

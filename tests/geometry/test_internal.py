@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.spec.forms.shapes import carrier_geometry, set_geometry
 from gearfmu.spec.stage import load_stage
 
 SPEC = load_stage("planetary54")
-SET = PlanetaryGeometry.of(SPEC)
+SET = set_geometry(SPEC)
 RING = SET.ring_mesh.ring
 
 
@@ -100,7 +99,7 @@ def test_tips_collide_when_the_ring_has_few_teeth_more_than_the_planet():
 
 
 def test_carrier_volume_is_a_sum_of_cylinders():
-    g = CarrierGeometry.of(SPEC)
+    g = carrier_geometry(SPEC)
     plate, bolt = math.pi * (60e-3**2 - 20e-3**2) * 12e-3, math.pi * 8e-3**2 * 22e-3
     assert g.volume == pytest.approx(plate + 4 * bolt)
     assert g.bolt_axis(1) == pytest.approx([0, 45e-3, 0], abs=1e-15)

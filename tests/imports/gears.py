@@ -10,7 +10,7 @@ from decks import write_deck
 
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh, gear_sector
-from gearfmu.geometry import GearGeometry
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import StageSpec, load_stage
 
@@ -37,7 +37,7 @@ def stage(folder: Path, section: str = "") -> StageSpec:
 def pinion(whole: bool = True) -> FeMesh:
     """The coarse mesh of fzg_c's pinion, all teeth or one sector."""
     spec = load_stage("fzg_c")
-    geometry = GearGeometry.of(spec.gears[0], spec.pair)
+    geometry = gear_geometry(spec.gears[0], spec.pair)
     mesh = spec.gears[0].body.mesh.model_copy(update={"flank": 6, "thickness": 2, "root": 3, "rim": 2, "width": 2})
     sector = gear_sector(geometry, spec.gears[0].face_width, mesh)
     return sector.full() if whole else sector

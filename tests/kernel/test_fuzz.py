@@ -115,5 +115,5 @@ def test_energy_at_rest_that_overflows_is_refused(fuzzer: Path) -> None:
 
 @pytest.mark.full
 @pytest.mark.parametrize("part", range(10))
-def test_a_hundred_thousand_damaged_blobs(fuzzer: Path, part: int) -> None:
-    check(feed(fuzzer, damaged, range(10_000 * part, 10_000 * (part + 1))), 10_000 * part, 10_000)
+def test_forty_thousand_damaged_blobs(fuzzer: Path, part: int) -> None:
+    check(feed(fuzzer, damaged, range(10_000 * part, 10_000 * part + 4_000)), 10_000 * part, 4_000)

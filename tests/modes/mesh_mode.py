@@ -15,7 +15,6 @@ from scipy.optimize import brentq
 
 from evidence.study.dashpot import own_path
 from gearfmu.body import load_bodies
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble, loaded_te
 
@@ -31,7 +30,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     model = assemble(spec, bodies)
     result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
     stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
-    gears = PairGeometry.of(spec).gears
+    gears = spec.geometry.gears
     path = own_path(model, torque)
     mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
     width = min(gear.face_width for gear in spec.gears)

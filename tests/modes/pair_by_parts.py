@@ -12,7 +12,6 @@ import scipy.linalg as sl
 from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import ReducedBody
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.build.tables import excited_modes, resampling, symmetric_functions
@@ -34,7 +33,7 @@ class Contact:
 
 def loaded_contacts(spec: StageSpec, kernel: Kernel, torque: float, position: float) -> list[Contact]:
     """The slices that carry load at a position, wheel held, by the static contact routine."""
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     pinion, wheel = pair.gears
     forces = kernel.transmission(-position * 2 * math.pi / wheel.z, torque).forces
     found = []
@@ -62,7 +61,7 @@ class Gear:
 def gear_at(
     spec: StageSpec, bodies: Sequence[ReducedBody], index: int, position: float, contacts: Sequence[Contact]
 ) -> Gear:
-    pair, body = PairGeometry.of(spec), bodies[index]
+    pair, body = spec.geometry, bodies[index]
     shape, side = pair.gears[index], (1.0, -1.0)[index]
     degrees = symmetric_functions(min(b.width_functions for b in bodies))
     chosen = excited_modes(body, degrees)

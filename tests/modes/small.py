@@ -8,9 +8,9 @@ import numpy as np
 
 from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
-from gearfmu.geometry import GearGeometry
 from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import Material
 
@@ -22,7 +22,7 @@ def pinion() -> tuple[FeMesh, Material]:
     spec = load_stage("fzg_c")
     gear = spec.gears[0]
     counts = gear.body.mesh.model_copy(update={"scale": 0.25})
-    return gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts), gear.material
+    return gear_sector(gear_geometry(gear, spec.pair), gear.face_width, counts), gear.material
 
 
 def set_body(name: str, scale: float) -> tuple[FeMesh, Material]:

@@ -15,7 +15,6 @@ from flank_reader import full_tables
 from pair_by_parts import Contact, couple, gear_at, slice_weights, tangents
 
 from gearfmu.body import load_bodies
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.assembly import general_sections
 from gearfmu.stage.build.free import read_tables
@@ -102,7 +101,7 @@ def frequencies_from_sections(spec, sections, contacts, number):
 def test_frequencies_in_loaded_contact_are_those_of_the_parts(held):
     spec = load_stage("fzg_c")
     bodies = load_bodies(spec)
-    grids = [np.linspace(shape.s_form, shape.s_tip, ROLLS) for shape in PairGeometry.of(spec).gears]
+    grids = [np.linspace(shape.s_form, shape.s_tip, ROLLS) for shape in spec.geometry.gears]
     contacts = [
         Contact(teeth, k, (grids[0][rolls[0]], grids[1][rolls[1]]), 1200.0) for teeth, rolls in PLACES for k in range(5)
     ]

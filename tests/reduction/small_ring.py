@@ -23,6 +23,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
 from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.forms.planetary import MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.spec.forms.shapes import ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 
@@ -43,7 +44,7 @@ def set_spec(**changes) -> PlanetarySpec:
     return load_stage("planetary54").model_copy(update={"ring": ring_spec(**changes)})
 
 
-GEOMETRY = InternalGearGeometry.of(ring_spec(), load_stage("planetary54").set)
+GEOMETRY = ring_geometry(ring_spec(), load_stage("planetary54").set)
 STEEL = ring_spec().material
 
 

@@ -8,26 +8,25 @@ from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import sector_mesh
-from gearfmu.geometry import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
+from gearfmu.spec.forms.shapes import gear_geometry, ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
 CASES = {
-    "pinion": (FZG.gears[0], FZG.pair, GearGeometry, 20),
-    "sun": (SET.sun, SET.set, GearGeometry, 12),
-    "ring": (SET.ring, SET.set, InternalGearGeometry, 12),
+    "pinion": (FZG.gears[0], FZG.pair, gear_geometry, 20),
+    "sun": (SET.sun, SET.set, gear_geometry, 12),
+    "ring": (SET.ring, SET.set, ring_geometry, 12),
 }
 
 
 @pytest.mark.parametrize("name", ["pinion", "sun", pytest.param("ring", marks=pytest.mark.full)])
 def test_compliance_between_roll_points_is_within_half_a_percent(name):
-    gear, pair, kind, elements = CASES[name]
-    shape = kind.of(gear, pair)
+    gear, pair, made, elements = CASES[name]
+    shape = made(gear, pair)
     flank, points = tooth_flank(shape, gear, name == "ring")
     fine, nodes = np.linspace(*flank.roll_range, 81), points.rolls
     mesh = MeshSpec(flank=elements, thickness=3, root=3, rim=2, width=2, thickness_grading=1.8)

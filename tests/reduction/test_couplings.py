@@ -15,11 +15,11 @@ from gearfmu.fem import hex20
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.factor import Factor
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
+from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.stage import load_stage
 
 SPEC = load_stage("planetary54")
@@ -43,7 +43,7 @@ def averaged() -> FullOrder:
 
 @pytest.fixture(scope="module")
 def elements() -> Elements:
-    mesh = carrier_sector(CarrierGeometry.of(SPEC), SPEC.carrier.mesh.model_copy(update={"scale": SCALE})).full()
+    mesh = carrier_sector(carrier_geometry(SPEC), SPEC.carrier.mesh.model_copy(update={"scale": SCALE})).full()
     return Elements(mesh.nodes, mesh.elements, *hex20.assemble(mesh.nodes, mesh.elements, SPEC.carrier.material))
 
 
@@ -69,7 +69,7 @@ def test_rigid_motion_costs_nothing_and_every_node_follows_it(name, request):
 
 
 def test_mass_and_inertia_are_the_analytic_ones(carrier):
-    geometry, mass = CarrierGeometry.of(SPEC), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
+    geometry, mass = carrier_geometry(SPEC), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
     centre, polar = carrier_moments(geometry)
     assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=2e-3)
     assert mass[5, 5] == pytest.approx(7850 * polar, rel=2e-3)
@@ -151,6 +151,6 @@ def test_a_whole_gear_has_one_node_a_tooth_and_its_bore():
 
 
 def _seat(elements: Elements, bolt: int) -> np.ndarray:
-    axis = CarrierGeometry.of(SPEC).bolt_axis(bolt)
+    axis = carrier_geometry(SPEC).bolt_axis(bolt)
     distance = np.hypot(elements.nodes[:, 0] - axis[0], elements.nodes[:, 1] - axis[1])
     return np.flatnonzero((np.abs(distance - 8e-3) < 1e-9) & (elements.nodes[:, 2] > -10e-3 - 1e-9))

@@ -16,7 +16,7 @@ import pytest
 from gearfmu.body import reduce_bodies
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh.mesh import rotated
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.spec.forms.shapes import set_geometry
 from gearfmu.spec.stage import load_stage
 
 FOLDER = Path(__file__).resolve().parents[2] / "evidence" / "reduction" / "in_time"
@@ -37,7 +37,7 @@ def test_rows_of_contact_points_are_derivatives_of_their_gaps(modules: SimpleNam
     """Rigid motion of either gear by 0.1 µm and 0.1 µm/r_b: the gaps' closed form moves as the rows say. Faces of a
     coarse mesh follow the involute to some 1e-3 of the normal's arm."""
     spec = load_stage("planetary54")
-    geometry = PlanetaryGeometry.of(spec)
+    geometry = set_geometry(spec)
     sun = modules.scenes.placed_gear(
         spec.sun,
         geometry.sun_mesh.gears[0],
@@ -68,7 +68,7 @@ def test_backlash_is_shared_by_both_flanks(modules: SimpleNamespace) -> None:
     """The hammering scene begins in the middle: the smallest gaps of both flanks are half of j_wt cos α_wt."""
     scene = modules.scenes.hammering(modules.scenes.Meshes(0.35, 0.17))
     spec = load_stage("planetary54")
-    mesh = PlanetaryGeometry.of(spec).sun_mesh
+    mesh = set_geometry(spec).sun_mesh
     for side in (1, -1):
         least = scene.points.gap[scene.points.side == side].min()
         assert least == pytest.approx(mesh.normal_backlash / 2, rel=2e-3)

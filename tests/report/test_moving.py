@@ -166,7 +166,7 @@ def test_a_pair_without_shafts_has_its_gears_alone(view: View) -> None:
 @pytest.mark.parametrize("phi", np.linspace(0, 2 * math.pi / 16, 7))
 def test_teeth_touch_where_both_flanks_are(sg: int, phi: float) -> None:
     """The flank points of both gears at the rolls found coincide in space, to rounding."""
-    pair = PairGeometry.of(load_stage("fzg_c/stage_relief"))
+    pair = load_stage("fzg_c/stage_relief").geometry
     angles = meshing_angles(pair, phi, sg)
     contacts = contacts_at(pair, angles, sg)
     assert 1 <= len(contacts) <= 2

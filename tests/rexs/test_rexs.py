@@ -11,7 +11,6 @@ import pytest
 
 from gearfmu.cli import outcome
 from gearfmu.errors import SpecError
-from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.reading import read_rexs
@@ -124,12 +123,12 @@ def test_units_of_a_file_are_kept_in_their_meaning(tmp_path: Path) -> None:
 def test_missing_profile_shifts_follow_from_the_centre_distance(tmp_path: Path) -> None:
     made = stage_of(changed(tmp_path, PAIR, without("addendum_modification_coefficient")), tmp_path)
     assert sum(gear.profile_shift for gear in made.gears) == pytest.approx(0.1817 + 0.1715, abs=3e-5)
-    assert abs(PairGeometry.of(made).nominal_backlash) < 5e-9
+    assert abs(made.geometry.nominal_backlash) < 5e-9
 
 
 def test_missing_tip_diameters_keep_the_tip_clearance(tmp_path: Path) -> None:
     made = stage_of(changed(tmp_path, PAIR, without("tip_diameter")), tmp_path)
-    pair = PairGeometry.of(made)
+    pair = made.geometry
     for own, other in (pair.gears, pair.gears[::-1]):
         assert pair.a - own.r_a - other.r_f == pytest.approx(0.25 * 4.5e-3, abs=1e-5)
 

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.topography import read_topography
 
 BASE = f'base = "{find_stage("fzg_c").as_posix()}"\nname = "other"\n'
-PINION = PairGeometry.of(load_stage("fzg_c")).gears[0]
+PINION = load_stage("fzg_c").geometry.gears[0]
 
 
 def stage_file(folder: Path, text: str) -> Path:
@@ -33,7 +32,7 @@ def problems_of(path: Path) -> list[str]:
 def test_points_of_single_contact_become_rolls(tmp_path: Path) -> None:
     text = '[gears.wheel.root_relief]\namount = "10 um"\nkind = "linear"\n'
     spec = load_stage(stage_file(tmp_path, text))
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     assert spec.gears[1].root_relief.start_roll == pair.inner_single_contact(1) > pair.gears[1].s_form
 
 

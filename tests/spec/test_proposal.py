@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.planetary import PlanetaryGeometry, mount_spaces
+from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.spec.forms.expand import motion_problems
+from gearfmu.spec.forms.shapes import set_geometry
 from gearfmu.spec.proposals.numbers import Wish, draft_of, new_from_numbers
 from gearfmu.spec.stage import load_stage
 
@@ -27,7 +27,7 @@ def refused(wish: Wish) -> list[str]:
 
 def test_a_pair_is_valid_as_it_is_written(tmp_path: Path) -> None:
     spec = load_stage(new_from_numbers("mine", PAIR, tmp_path))
-    geometry = PairGeometry.of(spec)
+    geometry = spec.geometry
     assert [gear.teeth for gear in spec.gears] == [31, 73] and spec.pair.center_distance == pytest.approx(0.141)
     assert geometry.nominal_backlash == pytest.approx(0.0, abs=1e-8) and geometry.contact_ratio > 1.4
     assert spec.pair.backlash == pytest.approx(5e-5)
@@ -37,7 +37,7 @@ def test_a_pair_is_valid_as_it_is_written(tmp_path: Path) -> None:
 def test_a_set_is_valid_as_it_is_written(tmp_path: Path) -> None:
     spec = load_stage(new_from_numbers("mine", SET, tmp_path))
     assert (spec.sun.teeth, spec.planet.teeth, spec.ring.teeth, spec.set.planets) == (30, 20, 70, 5)
-    geometry = PlanetaryGeometry.of(spec)
+    geometry = set_geometry(spec)
     assert geometry.neighbour_clearance > 0
     assert spec.ring.mounts.points == 6 and len(spec.carrier.coupling) == 6
     for mesh in (geometry.sun_mesh, geometry.ring_mesh):

@@ -14,7 +14,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.errors import SpecError
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.pair_checks import at_most, largest_half_width
 from gearfmu.spec.proposals.new import stage_text
 from gearfmu.spec.reading.base import read_toml
@@ -92,7 +91,7 @@ def test_shipped_stage_in_si() -> None:
 
 def test_relief_stage_differs_only_in_its_relief() -> None:
     plain, relieved = load_stage("fzg_c"), load_stage("fzg_c/stage_relief")
-    pair = PairGeometry.of(relieved)
+    pair = relieved.geometry
     for index, gear in enumerate(relieved.gears):
         assert gear.tip_relief is not None
         assert (gear.tip_relief.amount, gear.tip_relief.kind) == (15e-6, "parabolic")
@@ -188,7 +187,7 @@ def zero_shift_pair(teeth: int, shift: float = 0.0) -> dict[str, Any]:
 def test_seventeen_teeth_need_no_profile_shift(write: Write) -> None:
     """Undercut is judged at the rack's addendum, whatever its fillet: it was judged where the rack's straight flank
     ends, and 17 teeth without profile shift were refused for a fillet of 0.25."""
-    shape = PairGeometry.of(load_stage(write(zero_shift_pair(17)))).gears[0]
+    shape = load_stage(write(zero_shift_pair(17))).geometry.gears[0]
     assert shape.rounding.form_roll < 0 and math.hypot(shape.r_b, shape.s_form) - shape.r_b < 0.002 * shape.m
 
 
@@ -300,7 +299,7 @@ def test_all_problems_come_at_once_geometry_too(write: Write) -> None:
 
 def test_the_named_strip_is_wide_enough_and_a_little_less_is_not(write: Write) -> None:
     stage = load_stage("fzg_c")
-    b = largest_half_width(stage.gears, PairGeometry.of(stage), stage.torque_max)
+    b = largest_half_width(stage.gears, stage.geometry, stage.torque_max)
     assert b == pytest.approx(0.3527e-3, abs=1e-7)  # √(4·1.2669e6·8.731e-3/(π·113.19e9)) with ρ = L/4
     for factor, fine in ((1.5001, True), (1.4999, False)):
         width = f"{factor * b * 1e3:.9f} mm"
@@ -312,14 +311,14 @@ def test_backlash_is_judged_after_the_allowance(write: Write) -> None:
     """The FZG pair has −0.07 µm as given: no problem, because the file declares 0.1 mm; with a hundredth of a module
     in hand.
     """
-    assert PairGeometry.of(load_stage("fzg_c")).nominal_backlash < 0
+    assert load_stage("fzg_c").geometry.nominal_backlash < 0
     assert not problems_or_none(write({"pair.backlash": "0 mm"}))
 
 
 @pytest.mark.parametrize(("share", "fine"), [(0.099, True), (0.101, False)])
 def test_teeth_are_thinned_by_a_tenth_of_the_module_at_most(write: Write, share: float, fine: bool) -> None:
     stage = load_stage("fzg_c")
-    backlash = PairGeometry.of(stage).nominal_backlash + share * stage.pair.normal_module
+    backlash = stage.geometry.nominal_backlash + share * stage.pair.normal_module
     found = problems_or_none(write({"pair.backlash": f"{1e3 * backlash:.9f} mm"}))
     assert ("pair.center_distance" not in found) == fine
 

@@ -30,7 +30,7 @@ class Pair:
 
     @property
     def geometry(self) -> PairGeometry:
-        return PairGeometry.of(self.spec)
+        return self.spec.geometry
 
     @property
     def width(self) -> float:

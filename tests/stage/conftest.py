@@ -27,7 +27,7 @@ def bodies(spec: StageSpec) -> list[ReducedBody]:
 
 @pytest.fixture(scope="session")
 def pair(spec: StageSpec) -> PairGeometry:
-    return PairGeometry.of(spec)
+    return spec.geometry
 
 
 @pytest.fixture(scope="session")

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.geometry.planetary import set_geometries
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
 from gearfmu.spec.forms.expand import spread
 from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.shapes import set_geometries
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble

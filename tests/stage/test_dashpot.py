@@ -10,7 +10,6 @@ import pytest
 
 from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import ReducedBody
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import Steady, assemble
 
@@ -21,7 +20,7 @@ STEP, SETTLED, SAMPLES = 30e-6, 700, 1400
 def by_hand(spec: StageSpec, bodies: list[ReducedBody], force: float) -> float:
     """Local law (theory, eq. 7) of one tooth pair that carries `force`, and 95 % of what both teeth yield beyond their
     stored modes under 1 N over the width, mean over the roll, m/N."""
-    pair, width = PairGeometry.of(spec), min(gear.face_width for gear in spec.gears)
+    pair, width = spec.geometry, min(gear.face_width for gear in spec.gears)
     local = [2 * (1 - g.material.poisson_ratio**2) / (np.pi * g.material.youngs_modulus) for g in spec.gears]
     curvature = sum(1 / np.sqrt(gear.r**2 - gear.r_b**2) for gear in pair.gears)
     half_width = np.sqrt(2 * sum(local) * force / width / curvature)
@@ -70,7 +69,7 @@ def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(
     contact is near it."""
     torque = 0.5 * relief_spec.torque_max
     have = own_path(assemble(relief_spec, bodies), torque)
-    want = by_hand(relief_spec, bodies, 0.5 * torque / PairGeometry.of(relief_spec).gears[0].r_b)
+    want = by_hand(relief_spec, bodies, 0.5 * torque / relief_spec.geometry.gears[0].r_b)
     print(f"own path {have:.4e} m/N, at the pitch point {want:.4e}")
     assert have == pytest.approx(want, rel=0.1)
 

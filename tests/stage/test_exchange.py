@@ -55,6 +55,17 @@ def test_parquet(trace: gf.Trace, tmp_path: Path) -> None:
     assert b"fzg_c" in found.schema.metadata[b"meta"]
 
 
+@pytest.mark.needs("asammdf")
+def test_mdf(trace: gf.Trace, tmp_path: Path) -> None:
+    import asammdf
+
+    with asammdf.MDF(gf.convert(trace, tmp_path / "a.mf4")) as file:
+        for name, channel in trace.channels.items():
+            found = file.get(name)
+            assert np.array_equal(found.samples, channel.values) and np.array_equal(found.timestamps, trace.time)
+            assert (found.unit, found.comment) == (channel.unit, channel.description)
+
+
 @pytest.mark.needs("pyuff")
 @pytest.mark.parametrize("step", [STEP, 2e-5])
 def test_universal_file_format(trace: gf.Trace, tmp_path: Path, step: float) -> None:
@@ -87,7 +98,7 @@ def test_xarray_shares_the_numbers(trace: gf.Trace) -> None:
 
 
 def test_what_cannot_be_written_is_told(trace: gf.Trace, tmp_path: Path) -> None:
-    with pytest.raises(gf.GearfmuError, match="there are .csv, .mat, .parquet, .uff, .unv"):
+    with pytest.raises(gf.GearfmuError, match="there are .csv, .mat, .mf4, .parquet, .uff, .unv"):
         gf.convert(trace, tmp_path / "a.xlsx")
     with pytest.raises(TraceError, match="no channel 'mesh.forc'"):
         gf.convert(trace, tmp_path / "a.csv", ["mesh.forc"])
@@ -107,4 +118,4 @@ def test_the_verb_writes_the_same(trace: gf.Trace, tmp_path: Path) -> None:
     assert cli.outcome(["convert", str(tmp_path), str(tmp_path / "verb.csv"), "--channel", "mesh.force"]) == 0
     gf.convert(trace, tmp_path / "api.csv", ["mesh.force"])
     assert (tmp_path / "verb.csv").read_bytes() == (tmp_path / "api.csv").read_bytes()
-    assert set(WRITERS) == {".csv", ".mat", ".parquet", ".uff", ".unv"}
+    assert set(WRITERS) == {".csv", ".mat", ".mf4", ".parquet", ".uff", ".unv"}

@@ -40,7 +40,7 @@ PROFILES: dict[str, dict[str, Any]] = {
 
 def changed(spec: StageSpec, pinion: dict[str, Any], wheel: dict[str, Any] | None = None) -> StageSpec:
     """The stage with other fields of its gears; reliefs begin in the middle of single contact, said or not."""
-    pair, gears = PairGeometry.of(spec), []
+    pair, gears = spec.geometry, []
     for i, update in enumerate((pinion, wheel or {})):
         middle = (pair.inner_single_contact(i) + pair.outer_single_contact(i)) / 2
         reliefs = {
@@ -155,7 +155,7 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
 def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: StageSpec, bodies: list[ReducedBody]) -> None:
     """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
     e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
-    psi, pair = 0.7, PairGeometry.of(spec)
+    psi, pair = 0.7, spec.geometry
     model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6, angle=psi)}), bodies)
     te = revolution(model, 16, 4, 0.01)
     phi = 2 * math.pi * np.arange(te.size) / te.size
@@ -174,7 +174,7 @@ class Turn:
     def of(cls, spec: StageSpec, bodies: list[ReducedBody], positions: int, torque: float, e: float) -> Turn:
         """Where the pinion's teeth lie at C, the pair is the true one at the centre distance |C_B − C|, turned by that
         line's angle, with the torque about C. True pairs at five distances, and the polynomial between them."""
-        psi, pair = 0.7, PairGeometry.of(spec)
+        psi, pair = 0.7, spec.geometry
         base, pitch = [gear.r_b for gear in pair.gears], 2 * math.pi / spec.gears[1].teeth
         wheel = -pitch * np.arange(spec.gears[0].teeth * positions) / positions
         eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e, angle=psi)}), bodies)
@@ -188,7 +188,7 @@ class Turn:
         curves = []
         for a in nodes:
             other = spec.model_copy(update={"pair": spec.pair.model_copy(update={"center_distance": a})})
-            shift = pair.wheel_phase - PairGeometry.of(other).wheel_phase
+            shift = pair.wheel_phase - other.geometry.wheel_phase
             curves.append(cls._te(assemble(other, bodies), wheel - turned + shift, about))
         weights = np.array([[lagrange(nodes, k, a) for k in range(len(nodes))] for a in distance])
         phases = np.array([replace(pair, a=a).wheel_phase for a in distance]) - pair.wheel_phase
@@ -263,7 +263,7 @@ def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: StageSpec, 
     """Wheel at rest at angle 0, its toothing leaning towards +x (from +z: the centre distance grows) or +y: the pair
     with that parallelism error, to the last digits."""
     tilt, span = 2e-4, 0.1
-    phase = PairGeometry.of(spec).wheel_phase
+    phase = spec.geometry.wheel_phase
     wobble = Wobble(amount=tilt, angle=quarter * math.pi / 2 - phase)
     error = {"in_plane": tilt * span} if quarter == 0 else {"out_of_plane": tilt * span}
     misaligned = spec.model_copy(
@@ -358,7 +358,7 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     from gearfmu.body import load_bodies
 
     spec = load_stage("helical_demo")
-    bodies, pair = load_bodies(spec), PairGeometry.of(spec)
+    bodies, pair = load_bodies(spec), spec.geometry
     modified = changed(
         spec,
         {"tip_relief": None, "lead": None, "profile": ProfileSpec(crowning=20e-6)},
@@ -385,7 +385,7 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
 
 def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody]) -> None:
     """Lead and profile crowning as said and as a topography: nodes of flanks run alike; and not as without."""
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     shape, gear = pair.gears[0], spec.gears[0]
     roll = np.linspace(shape.s_form, shape.s_tip, 7)
     z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)

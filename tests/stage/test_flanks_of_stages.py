@@ -11,10 +11,9 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.body import load_bodies
-from gearfmu.geometry.planetary import planet_angles
 from gearfmu.spec.forms.expand import expand_set
 from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.forms.shapes import gear_shape, planet_angles
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
 from gearfmu.stage import assemble

@@ -16,7 +16,6 @@ import gearfmu as gf
 from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
@@ -148,7 +147,7 @@ def swing(
 ) -> Swings:
     """A started kernel against the exact solution. `act`: what is done before each step; of `potential` (J)."""
     h, torque = kernel.get("h"), kernel.get("wheel.tau")
-    geometry = PairGeometry.of(spec)
+    geometry = spec.geometry
     s_a, s_b = rolls(blob, kernel, geometry.alpha_wt)
     r_a, r_b = (gear.r_b for gear in geometry.gears)
     block = dict(r_a=r_a, r_b=r_b, s_a=s_a, s_b=s_b, mu=MU, tau=torque)
@@ -192,7 +191,7 @@ def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: StageSpec, bod
     weight, times, torque, h = 0.175, 60.0, 7.5, 1e-5
     blob = swinging(spec, bodies, PortSpec(kind="torque"))
     kernel = Kernel(blob, {**FROZEN, "friction_coefficient": MU, "h": h})
-    r_a, r_b = (gear.r_b for gear in PairGeometry.of(spec).gears)
+    r_a, r_b = (gear.r_b for gear in spec.geometry.gears)
     kernel.set("wheel.tau", torque)
     kernel.set("pinion.tau", torque * r_a / r_b)
     kernel.initialize()
@@ -216,7 +215,7 @@ def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list
     kernel.initialize()
     kernel.set("pinion.phi", -0.1e-3)
     kernel.set("pinion.w", 0.0)
-    s_a, s_b = rolls(blob, kernel, PairGeometry.of(spec).alpha_wt)
+    s_a, s_b = rolls(blob, kernel, spec.geometry.alpha_wt)
     slid = []
     for i in range(100):
         kernel.step(i * 1e-3, 1e-3)
@@ -256,7 +255,7 @@ def test_force_across_the_line_of_action_jumps_at_the_pitch_point(
     spec: StageSpec, bodies: list[ReducedBody], rpm: float
 ) -> None:
     """The off-line force of the pinion's bearing changes by 2 µ F where sliding changes its sign, at any speed."""
-    mu, speed, angle = 0.06, rpm * math.pi / 30, PairGeometry.of(spec).alpha_wt
+    mu, speed, angle = 0.06, rpm * math.pi / 30, spec.geometry.alpha_wt
     model = assemble(spec, bodies)
     pitch = 2 * math.pi / (16 * speed)
     run = {**RIGID, "friction_coefficient": mu, "h": 10e-6}
@@ -276,7 +275,7 @@ def test_force_across_the_line_of_action_jumps_at_the_pitch_point(
 def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[ReducedBody]) -> None:
     """Mean power of a slow run against µ Σ λ |v| over a pitch, the load shared as statics without friction say."""
     mu, speed = 0.05, 10.0
-    model, geometry = assemble(spec, bodies), PairGeometry.of(spec)
+    model, geometry = assemble(spec, bodies), spec.geometry
     undamped = {**RIGID, "friction_coefficient": mu, "effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
     pitch = 2 * math.pi / 16
     count = 2000
@@ -303,7 +302,7 @@ def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[R
 
 def test_the_tooth_loss_factor_is_the_integral_of_an_evenly_shared_load(spec: StageSpec) -> None:
     """Ohlendorf's H_V against Σ |v| of all pairs on the path, each with its share, over a base pitch."""
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     path, p = pair.path, pair.base_pitch
     positions = (np.arange(20000) + 0.5) / 20000 * p
     slides, pairs = np.zeros(20000), np.zeros(20000)
@@ -362,7 +361,7 @@ def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
     def ratio(speed: float = 100.0, **settings: float) -> float:
         return float(simulate(helical, drives[speed], 4e-4, 1e-4, common | settings)["mesh.friction_ratio"][-1])
 
-    pair = PairGeometry.of(helical.spec)
+    pair = helical.spec.geometry
     a, b = pair.gears
     trace = simulate(helical, drives[100.0], 4e-4, 1e-4, {"level": 0.0, "slices": 1.0})
     cosine = math.cos(a.beta_b)

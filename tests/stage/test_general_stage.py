@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import ModelError
-from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
-from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.spec.forms.shapes import gears_in_mesh, mesh_shape
 from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.groups import mount
@@ -116,12 +115,11 @@ def test_seats_carry_the_whole_torque_and_bearings_the_mesh_force(train, bodies)
 def test_teeth_touch_in_every_engagement_at_angle_zero(train):
     """Drive gap of tooth 0 on tooth 0 is a whole number of pitches, from the closed form at the actual positions."""
     phases = tooth_phases(train)
-    assert phases["wheel1"] == PairGeometry.of(SimpleNamespace(
-        gears=(train.bodies["pinion1"], train.bodies["wheel1"]),
-        pair=SimpleNamespace(
-            normal_module=0.0045, pressure_angle=math.radians(20), helix_angle=0.0, center_distance=A, backlash=1e-4
-        ),
-    )).wheel_phase  # fmt: skip
+    rack = SimpleNamespace(
+        normal_module=0.0045, pressure_angle=math.radians(20), helix_angle=0.0, center_distance=A, backlash=1e-4
+    )
+    pair = gears_in_mesh(rack, (train.bodies["pinion1"], train.bodies["wheel1"]))
+    assert phases["wheel1"] == pair.wheel_phase
     for mesh in train.engagements:
         pair = mesh_shape(train, mesh)
         a, b = pair.gears

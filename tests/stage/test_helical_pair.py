@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gearfmu.body import ReducedBody, load_bodies
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.tables.lead import LeadSpec, Misalignment
@@ -27,7 +26,7 @@ SHAFTS = ("pinion", "wheel")
 @pytest.fixture(scope="module")
 def demo() -> SimpleNamespace:
     spec = load_stage("helical_demo")
-    return SimpleNamespace(spec=spec, pair=PairGeometry.of(spec), bodies=load_bodies(spec))
+    return SimpleNamespace(spec=spec, pair=spec.geometry, bodies=load_bodies(spec))
 
 
 def plain(spec: StageSpec, **pair: object) -> StageSpec:
@@ -150,7 +149,7 @@ def test_lead_and_misalignment_load_one_end(relief_spec: StageSpec, bodies: list
     turned about the direction across the line of action; the other end carries more."""
     spec = with_bearings(relief_spec)
     width, f = spec.gears[0].face_width, 20e-6
-    alpha = PairGeometry.of(spec).alpha_wt
+    alpha = spec.geometry.alpha_wt
 
     def slope(value: float) -> StageSpec:
         gears = (spec.gears[0].model_copy(update={"lead": LeadSpec(slope=value)}), spec.gears[1])

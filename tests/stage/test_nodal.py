@@ -45,7 +45,7 @@ def test_default_penalty_gives_hertz_half_width(relief_spec: StageSpec, pair: Pa
 
 def rigid_error(spec: StageSpec, bodies: list[ReducedBody], along: int, nodes_of: str = "both") -> float:
     """Largest error of the force (share of the largest) while rigid teeth meet and part, one pair in contact."""
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     a = pair.gears[0]
     roll = a.r_b * (a.psi_b + pair.alpha_wt + math.pi / a.z)  # half a pitch after the flanks of tooth 0 met
     radius = roll * (pair.length - roll) / pair.length

@@ -14,9 +14,9 @@ from scipy.interpolate import BarycentricInterpolator
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.mounted import turned_rows
 from gearfmu.errors import ModelError
-from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.shapes import set_geometry
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.blob import read_blob
@@ -137,7 +137,7 @@ def loads(spec: PlanetarySpec, model: StageModel, at_rest: Kernel) -> list[tuple
     in the equilibrium of `at_rest`, on drive flanks: from the statics at the same angle of the sun."""
     statics = model.kernel(level=FULL)
     statics.prepare()
-    geometry, ring_phase = PlanetaryGeometry.of(spec).ring_mesh, tooth_phases(model.stage)["ring"]
+    geometry, ring_phase = set_geometry(spec).ring_mesh, tooth_phases(model.stage)["ring"]
     ring, carrier, found = geometry.ring, at_rest.get("carrier.gear.phi"), []
     shifts = np.asarray(read_blob(model.blob)["tooth_shift"])
     for number, mesh in enumerate(model.stage.engagements):

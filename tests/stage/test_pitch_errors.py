@@ -112,7 +112,8 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
         body_hash(body_inputs(spec, name)) for name in ("pinion", "wheel")
     ]
     assert assemble(changed, bodies).hash != plain.hash
-    assert assemble(with_deviations(spec, {3: 0.0}, {}), bodies).blob == plain.blob
+    none, own = (read_blob(m.blob) for m in (assemble(with_deviations(spec, {3: 0.0}, {}), bodies), plain))
+    assert all(np.array_equal(none[name], own[name]) for name in own if name not in ("made_of", "guid"))
 
 
 def test_the_kernel_refuses_what_are_no_index_deviations(spec: StageSpec, bodies: list[ReducedBody]) -> None:

@@ -100,6 +100,19 @@ def test_lines_integrate_and_stay_outside() -> None:
     assert list(winding_torques(np.array([3.0, 3.0]))) == [3.0]
 
 
+def test_a_measured_table_is_read_as_it_comes(tmp_path: Path) -> None:
+    """As measuring programs write: names in capitals, units in parentheses or below, a running clock."""
+    plain = read_profile(written(tmp_path, "time_[s],torque_[N*m],speed_[rpm]\n0,1,600\n0.5,2,900\n"))
+    for text in (
+        "Time (s);Torque (N*m);Oil (degC);Speed (1/min)\n12,5;1;80,5;600\n13;2;81;900\n",
+        "Time\tTorque\tSpeed\tRemark\ns\tNm\trpm\t\n12.5\t1\t600\tstart\n13\t2\t900\tend\n",
+        "TIME [ms],SPEED [U/min],TORQUE [kN*m]\n0,600,0.001\n500,900,0.002\n",
+    ):
+        found = read_profile(written(tmp_path, text))
+        for name in ("time", "torque", "speed"):
+            assert getattr(found, name) == pytest.approx(getattr(plain, name), rel=1e-14), text
+
+
 def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) -> None:
     text = "time_[s],torque_[N],speed,angle_[rad]\n0,1,2,3\n1,x,2\n"
     with pytest.raises(SpecError) as refused:
@@ -109,7 +122,6 @@ def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) ->
         "torque_[N]: ",
         "is a unit of another kind",
         "speed: the unit is missing",
-        "angle_[rad]",
         "line 3",
         "3 values",
     ):
@@ -127,11 +139,9 @@ def test_everything_that_is_wrong_with_a_file_is_said_at_once(tmp_path: Path) ->
         ("time_[s]\n0\n1\n", "neither torque nor speed"),
         ("time_[s],speed_[rpm],speed_[rad/s]\n0,1,1\n1,1,1\n", "speed is there twice"),
         ("time_[s],speed_[rpm]\n0,1\n", "at least two points"),
-        ("time_[s],speed_[rpm]\n1,1\n2,1\n", "begins at the time 0"),
         ("time_[s],speed_[rpm]\n0,1\n2,1\n1,5\n", "sort the points"),
         ("time_[s],speed_[rpm]\n0,1\n2,1\n2,5\n", "two points at one time: for a step"),
         ("time_[s],torqe_[N*m]\n0,1\n2,1\n", "did you mean torque"),
-        ("time_[s],speed_[rpm],angle_[rad]\n0,1,2\n2,1,2\n", "angle.*remove it"),
         ("time_[s],speed_[rpm]\n0,0,1\n0,5,2\n", "with decimal commas, separate the columns by semicolons"),
         ("time_[s];speed_[rpm]\n0;1\n0,5;1.234,5\n", "expected a finite number"),
     ],

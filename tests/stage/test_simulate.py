@@ -83,7 +83,7 @@ def test_every_level_runs_and_carries_the_load(relieved: StageModel, level: int,
     antisymmetric about mid-width: no symmetric load excites them, the model leaves them out."""
     trace = simulate(relieved, Steady(relieved, SPEED, LOAD), 4e-3, H, {"level": level})
     assert trace.meta["outcome"] == "completed" and trace.meta["n_dyn"] == modes
-    force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / PairGeometry.of(relieved.spec).gears[0].r_b
+    force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / relieved.spec.geometry.gears[0].r_b
     print(f"level {level}: {trace.meta['n_dyn']} modes, h {trace.meta['h']:.3g} s, force {force:.0f} N")
     assert force == pytest.approx(expected, rel=0.03)
 

@@ -26,8 +26,8 @@ from evidence.peers.calculix.positions import read
 from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
-from gearfmu.geometry import GearGeometry
 from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import Material
 
@@ -70,7 +70,7 @@ def body_of(case: Case) -> tuple[Material, FeMesh]:
         return getattr(spec, case.body).material, body_sector(spec, case.body, case.scale)
     (gear,) = (gear for gear in spec.gears if gear.name == case.body)
     counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
-    return gear.material, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)
+    return gear.material, gear_sector(gear_geometry(gear, spec.pair), gear.face_width, counts)
 
 
 def ours(case: Case) -> np.ndarray:

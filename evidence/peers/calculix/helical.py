@@ -130,7 +130,7 @@ def ours(case: Case, gears: list[ReducedBody]) -> Ours:
     state = kernel.transmission(at, torque)
     ends = [kernel.transmission(at, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
     slices = np.sum(list(state.forces.values()), axis=0).reshape(LAYERS, -1).sum(axis=1)
-    lever = PairGeometry.of(spec).gears[0].r_b
+    lever = spec.geometry.gears[0].r_b
     return Ours(state.te, 2 * TANGENT * torque / lever / (ends[1] - ends[0]), slices / slices.sum())
 
 
@@ -155,7 +155,7 @@ def levels_of(divisions: tuple[int, ...]) -> np.ndarray:
 def problem_at(case: Case, te: float) -> Problem:
     """The contact problem of a case at the transmission error te (m)."""
     spec = stage(case.helix, case.axes)
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     turn = 2 * math.pi / pair.gears[0].z * case.position / POSITIONS
     contacts = touching(pair, turn)
     steel = spec.gears[0].material
@@ -187,7 +187,7 @@ def problem_at(case: Case, te: float) -> Problem:
 def row(case: Case, gears: list[ReducedBody], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
     2 % where ccx does not settle. RuntimeError when ccx gives up."""
-    mine, r_b = ours(case, gears), PairGeometry.of(stage(case.helix, case.axes)).gears[0].r_b
+    mine, r_b = ours(case, gears), stage(case.helix, case.axes).geometry.gears[0].r_b
     folder = work / f"helical_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "load_0.inp"

@@ -83,7 +83,7 @@ def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> C
 def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of one torque and position, made by running it unless `known` comes from the same deck."""
     torque, position = place.torque, place.position
-    pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES[spec.name].index(torque)
+    pair, width, row = spec.geometry, spec.gears[0].face_width, TORQUES[spec.name].index(torque)
     prefix = "" if spec.name == "fzg_c" else f"{spec.name}_"
     folder = work / f"{prefix}position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
     case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)

@@ -10,9 +10,9 @@ from dataclasses import replace
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
-from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.stage import StageSpec
 
 
@@ -24,7 +24,7 @@ def rigid_bore_bodies(spec: StageSpec) -> list[ReducedBody]:
 
 def _with_rigid_bore(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
     gear = spec.gears[index]
-    geometry = GearGeometry.of(gear, spec.pair, (1, -1)[index])
+    geometry = gear_geometry(gear, spec.pair, (1, -1)[index])
     sector = gear_sector(geometry, gear.face_width, gear.body.mesh)
     body = SectorBody(sector, gear.material, *tooth_flank(geometry, gear), rigid_bore=True)
     tables = static_tables(body, [])

@@ -23,7 +23,6 @@ from evidence.reduction.in_time.scenes import GRID, Solid, gear, joint_rows, nom
 from evidence.reduction.in_time.tables import write_columns, write_rows
 from evidence.reduction.in_time.transient import Assembly, Joints, Member, Scheme, integrate
 from gearfmu.body import reduce_bodies
-from gearfmu.geometry import PairGeometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
@@ -41,7 +40,7 @@ SAMPLE = 1e-6
 def finite_elements(spec: StageSpec) -> tuple[dict[str, Solid], Assembly, np.ndarray]:
     """Both gears unreduced, in the place and with the speeds of START; sign of every joint in the force of the mesh:
     1 drive flanks, −1 coast flanks, 0 a bearing."""
-    mesh = PairGeometry.of(spec)
+    mesh = spec.geometry
     r_b = [shape.r_b for shape in mesh.gears]
     turn, back = 2 * np.pi * START.position, 0.5 * START.play / mesh.gears[0].r_b
     angles = (turn / mesh.gears[0].z - back, mesh.wheel_phase - turn / mesh.gears[1].z)

@@ -26,6 +26,7 @@ from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
 from gearfmu.spec.forms.members import carrier_of
+from gearfmu.spec.forms.shapes import set_geometry
 from gearfmu.spec.stage import load_stage
 
 TORQUE, RAMP = 150.0, 0.1e-3  # N·m, s
@@ -81,7 +82,7 @@ def carrier_planet(meshes: Meshes) -> Scene:
 def hammering(meshes: Meshes) -> Scene:
     """Fig. 4: the planet's teeth meet those of the sun."""
     spec = load_stage("planetary54")
-    geometry = PlanetaryGeometry.of(spec)
+    geometry = set_geometry(spec)
     planet, sun = _planet(spec, meshes), _sun(spec, meshes, geometry)
     mesh = geometry.sun_mesh
     play = (mesh.normal_backlash - nominal_play(mesh)) / 2
@@ -126,7 +127,7 @@ def _carrier(spec: Any, meshes: Meshes) -> Solid:
 
 def _planet(spec: Any, meshes: Meshes) -> Placed:
     """The planet of bolt 0, tooth 0 on +x."""
-    geometry = PlanetaryGeometry.of(spec)
+    geometry = set_geometry(spec)
     centre = np.array([spec.set.center_distance, 0.0])
     return placed_gear(spec.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
 

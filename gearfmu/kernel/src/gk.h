@@ -64,6 +64,7 @@ GK_API size_t gk_model_size(void);
 GK_API gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE]);
 GK_API const char *gk_model_name(const gk_model *model); /* stage name                        */
 GK_API const char *gk_model_hash(const gk_model *model); /* 64 hex digits, SHA-256 of the blob */
+GK_API const char *gk_model_guid(const gk_model *model); /* GUID of an FMU with this model     */
 
 /* variables: only those that exist in this model (ports decide), in the table's order */
 GK_API int gk_variable_count(const gk_model *model);

@@ -13,7 +13,7 @@ from gearfmu.spec.forms.members import Form, carrier_of
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque, ring_half_width
-from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.spec.forms.shapes import mesh_shape, set_geometry
 
 
 def derived(spec: Form) -> dict[str, Any]:
@@ -22,7 +22,7 @@ def derived(spec: Form) -> dict[str, Any]:
         return _derived_set(spec)
     if not isinstance(spec, StageSpec):
         return {mesh.name: _derived_pair(mesh_shape(spec, mesh), mesh.gears) for mesh in spec.engagements}
-    pair = PairGeometry.of(spec)
+    pair = spec.geometry
     helix = _derived_helix(spec, pair) if spec.pair.helix_angle else {}
     return _derived_pair(pair, [gear.name for gear in spec.gears]) | helix
 
@@ -55,7 +55,7 @@ def _derived_helix(spec: StageSpec, pair: PairGeometry) -> dict[str, Any]:
 
 def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
     """What follows from the numbers of a planetary set."""
-    g = PlanetaryGeometry.of(spec)
+    g = set_geometry(spec)
     shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
     carrier = carrier_of(spec).geometry
     return {

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.planetary import planet_angles
 from gearfmu.spec.forms.general import (
     CarrierBody,
     EngagementSpec,
@@ -21,6 +20,7 @@ from gearfmu.spec.forms.members import CARRIER, Form, body_names, members, set_g
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque
+from gearfmu.spec.forms.shapes import planet_angles
 from gearfmu.spec.tables.gear import Bearing
 
 Body = TypeVar("Body")

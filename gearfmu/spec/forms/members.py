@@ -11,7 +11,7 @@ from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.forms.general import GearBody, RingBody, Stage, ToothedBody
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
-from gearfmu.spec.forms.shapes import GearShape, gear_shape
+from gearfmu.spec.forms.shapes import GearShape, carrier_geometry, gear_shape
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 
 CARRIER = "carrier"
@@ -69,7 +69,7 @@ def member_of(spec: Form, name: str) -> Member:
 
 def carriers(spec: Form) -> dict[str, CarrierMember]:
     """Carriers by name: one of a planetary set, else none."""
-    return {CARRIER: CarrierMember(spec.carrier, CarrierGeometry.of(spec))} if isinstance(spec, PlanetarySpec) else {}
+    return {CARRIER: CarrierMember(spec.carrier, carrier_geometry(spec))} if isinstance(spec, PlanetarySpec) else {}
 
 
 def carrier_of(spec: Form) -> CarrierMember:

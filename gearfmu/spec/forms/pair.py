@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, field_validator, model_validator
 
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.forms.shapes import gears_in_mesh
 from gearfmu.spec.reading.base import Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
@@ -40,6 +42,11 @@ class StageSpec(Spec):
     def limits(self) -> Limits:
         """Torque and speed of the pinion that the model is made for."""
         return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
+
+    @property
+    def geometry(self) -> PairGeometry:
+        """Pinion and wheel at their centre distance. ValueError where the axes are too near."""
+        return gears_in_mesh(self.pair, self.gears)
 
     @property
     def load_sharing(self) -> float:

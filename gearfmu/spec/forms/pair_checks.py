@@ -14,6 +14,7 @@ from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.hertz import common_width, contact_modulus, half_width, largest_relative_radius
 from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.spec.forms.flank_checks import flank_problems
+from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.tables.flanks import TOOTHING
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 
@@ -27,7 +28,7 @@ Found = Iterator[tuple[str, float | str, str]]
 
 def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torque_max: float | None) -> list[Problem]:
     """Everything that is wrong with pair and gears; without `torque_max` (N·m) the load strip is not judged."""
-    shapes = [GearGeometry.of(gear, pair, hand) for gear, hand in zip(gears, (1, -1), strict=True)]
+    shapes = [gear_geometry(gear, pair, hand) for gear, hand in zip(gears, (1, -1), strict=True)]
     found = [
         (f"gears.{gear.name}.{field}", value, remedy)
         for gear, shape in zip(gears, shapes, strict=True)

@@ -13,11 +13,10 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import involute
-from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import common_width, contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles, set_geometries, set_geometry, set_ratio
+from gearfmu.geometry.planetary import RingMesh, least_apart, set_ratio
 from gearfmu.ranges import range_of
 from gearfmu.spec.forms.flank_checks import flank_problems
 from gearfmu.spec.forms.pair_checks import (
@@ -32,6 +31,7 @@ from gearfmu.spec.forms.pair_checks import (
     rounded_up,
 )
 from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.shapes import carrier_geometry, gear_geometry, planet_angles, ring_geometry, set_geometries
 from gearfmu.spec.tables.gear import PairSpec
 
 _THINNEST_RIM = 0.5  # of the tooth height: thinner rims are outside the rim thickness factor of ISO 6336-3
@@ -68,7 +68,7 @@ class RingPair:
 
 def ring_pair_problems(file: str, pair: RingPair) -> list[Problem]:
     """Everything that is wrong with a pinion in a ring, fields "gears.<name>.…" and "pair.…" as in a pair."""
-    pinion, ring = GearGeometry.of(pair.planet, pair.set, 1), InternalGearGeometry.of(pair.ring, pair.set, 1)
+    pinion, ring = gear_geometry(pair.planet, pair.set, 1), ring_geometry(pair.ring, pair.set, 1)
     names = {"planet": f"gears.{pair.planet.name}", "ring": f"gears.{pair.ring.name}", "set": "pair"}
     found = [(f"planet.{field}", value, remedy) for field, value, remedy in gear_problems(pair.planet, pinion)]
     found += _ring(pair, ring)
@@ -185,7 +185,7 @@ def _ring_strips(spec: PlanetarySpec | RingPair, mesh: RingMesh, half_width: flo
 
 def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
     """Largest Hertz half-width b (m) of planet and ring, one tooth pair carrying the most loaded planet's force."""
-    force = mesh_torque(spec) / set_geometry(spec, "sun").r_b
+    force = mesh_torque(spec) / set_geometries(spec)[0].r_b
     return internal_half_width((spec.planet, spec.ring), mesh, force)
 
 
@@ -241,7 +241,7 @@ def _mounts(spec: PlanetarySpec) -> Found:
 
 
 def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
-    g, carrier = CarrierGeometry.of(spec), spec.carrier
+    g, carrier = carrier_geometry(spec), spec.carrier
     if 2 * g.r_bolt >= spec.planet.bore_diameter:
         largest = millimetres(spec.planet.bore_diameter)
         yield "carrier.bolt_diameter", carrier.bolt_diameter, f"does not fit the planet's bore: less than {largest}"

@@ -1,22 +1,89 @@
-"""The geometry of what a general stage declares: a toothed body alone, and an engagement."""
+"""The geometry of what a stage file declares: toothed bodies, a carrier, pairs, a set, and the engagements of any
+stage."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TypeAlias
 
 from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.general import EngagementSpec, RingBody, Stage, ToothedBody
+from gearfmu.geometry.planetary import HANDS, PlanetaryGeometry, RingMesh
+from gearfmu.spec.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
+from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
 
 GearShape = GearGeometry | InternalGearGeometry
 MeshShape = PairGeometry | RingMesh
+Rack: TypeAlias = PairSpec | SetSpec | GearBody | RingBody  # has normal module, pressure angle and helix angle
+
+
+def gear_geometry(gear: GearSpec | SetGearSpec, rack: Rack, hand: int = 0) -> GearGeometry:
+    """An external gear. hand: sign of its helix angle over that of `rack`, needed where that is helical."""
+    assert hand or not rack.helix_angle, "which gear of a helical pair is meant?"
+    m = rack.normal_module
+    return GearGeometry(
+        z=gear.teeth, m=m, alpha=rack.pressure_angle, x=gear.profile_shift, r_a=gear.tip_diameter / 2,
+        r_bore=gear.bore_diameter / 2, tip_edge=gear.tip_edge_radius,
+        h_fp=gear.rack.dedendum * m, rho_fp=gear.rack.fillet_radius * m, beta=hand * rack.helix_angle + 0.0,
+    )  # fmt: skip
+
+
+def ring_geometry(ring: RingSpec, rack: Rack, hand: int = 0) -> InternalGearGeometry:
+    """An internal gear. hand: as of `gear_geometry`."""
+    assert hand or not rack.helix_angle, "of which hand is the ring?"
+    m, beta = rack.normal_module, hand * rack.helix_angle + 0.0
+    return InternalGearGeometry(
+        z=ring.teeth, m=m, alpha=rack.pressure_angle, x=ring.profile_shift, r_a=ring.tip_diameter / 2,
+        r_f=m * (ring.teeth / 2 / math.cos(beta) + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
+        tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m, beta=beta,
+    )  # fmt: skip
+
+
+def gears_in_mesh(pair: PairSpec, gears: Sequence[GearSpec]) -> PairGeometry:
+    """Pinion and wheel at their centre distance. ValueError where the axes are too near."""
+    pinion, wheel = (gear_geometry(gear, pair, hand) for gear, hand in zip(gears, (1, -1), strict=True))
+    return PairGeometry(gears=(pinion, wheel), a=pair.center_distance, backlash=pair.backlash)
+
+
+def set_geometries(spec: PlanetarySpec) -> tuple[GearGeometry, GearGeometry, InternalGearGeometry]:
+    """Sun, planet and ring of a set."""
+    sun, planet = (gear_geometry(gear, spec.set, HANDS[gear.name]) for gear in (spec.sun, spec.planet))
+    return sun, planet, ring_geometry(spec.ring, spec.set, HANDS["ring"])
+
+
+def set_geometry(spec: PlanetarySpec) -> PlanetaryGeometry:
+    """The two meshes of a set and the places of its planets. ValueError where axes are too near."""
+    sun, planet, ring = set_geometries(spec)
+    a, backlash = spec.set.center_distance, spec.set.backlash
+    return PlanetaryGeometry(
+        PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), planet_angles(spec)
+    )
+
+
+def planet_angles(spec: PlanetarySpec) -> tuple[float, ...]:
+    """Angles (rad) of the planets with the carrier at 0, the first 0: as `positions` say, or 2πk/N."""
+    if spec.set.positions is None:
+        return tuple(2 * math.pi * k / spec.set.planets for k in range(spec.set.planets))
+    return tuple(2 * math.pi * place / (spec.sun.teeth + spec.ring.teeth) for place in spec.set.positions)
+
+
+def carrier_geometry(spec: PlanetarySpec) -> CarrierGeometry:
+    """The carrier of a set."""
+    carrier = spec.carrier
+    return CarrierGeometry(
+        angles=planet_angles(spec), a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
+        r_o=carrier.outer_diameter / 2, r_bolt=carrier.bolt_diameter / 2, thickness=carrier.thickness,
+        gap=carrier.gap, seat=spec.planet.face_width,
+    )  # fmt: skip
 
 
 def gear_shape(gear: ToothedBody) -> GearShape:
     """The geometry of a toothed body in its own frame."""
-    return InternalGearGeometry.of(gear, gear, 1) if isinstance(gear, RingBody) else GearGeometry.of(gear, gear, 1)
+    return ring_geometry(gear, gear, 1) if isinstance(gear, RingBody) else gear_geometry(gear, gear, 1)
 
 
 def mesh_shape(stage: Stage, mesh: EngagementSpec) -> MeshShape:

@@ -1,7 +1,9 @@
 """Torque and speed over time: CSV files with a head like `time_[s],torque_[N*m],speed_[rpm]`, as traces are exported.
 
 A row is a point; between points the values follow straight lines, outside they stay. Columns in any order, each with
-its unit; `torque` or `speed` may be missing. Separators and decimal signs: gearfmu.spec.tables.rows.
+its unit; `torque` or `speed` may be missing. Tables are read as measuring programs write them: names in capitals too,
+units in brackets, parentheses or a row of their own, other columns beside these, and a clock that began before the
+table, whose first point is time 0. Separators and decimal signs: gearfmu.spec.tables.rows.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from gearfmu.units import to_si
 UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
 EXAMPLE = "time_[s],torque_[N*m],speed_[rpm]"
 MOST_SHOWN = 20
-_HEADING = re.compile(r"(\w+?)[_ ]?\[(.+)\]")
+_HEADING = re.compile(r"(\w+?)[_ ]*[\[(](.+)[\])]")
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,7 @@ class _Reader:
         if not rows:
             self.refuse("", "", f"the file holds no rows: give a head {EXAMPLE} and points")
             return None
+        rows = with_units(rows)
         scales = self.head(*rows[0])
         points = [self.row(where, cells, scales) for where, cells in rows[1:]]
         if len(points) < 2:
@@ -83,13 +86,14 @@ class _Reader:
             return None
         columns = {name: np.array([point[name] for point in points]) for name in UNITS if name in points[0]}
         self.times(columns["time"], [where for where, _ in rows[1:]])
+        columns["time"] = columns["time"] - columns["time"][0]
         return Profile(**columns)
 
     def head(self, where: str, cells: list[str]) -> list[tuple[str, float]]:
         """Of every column its name ("" where it is none of ours) and the SI size of its unit."""
         found = [self.column(where, cell) for cell in cells]
         names = [name for name, _ in found if name]
-        known = [name for name in UNITS if any(cell.startswith(name) for cell in cells)]
+        known = [name for name in UNITS if any(cell.lower().startswith(name) for cell in cells)]
         if "time" not in known:
             self.refuse(where, ",".join(cells), f"there is no time: write a head like {EXAMPLE}")
         elif len(known) == 1:
@@ -101,11 +105,10 @@ class _Reader:
 
     def column(self, where: str, text: str) -> tuple[str, float]:
         match = _HEADING.fullmatch(text)
-        name = match[1] if match else text
+        name = (match[1] if match else text).lower()
         if name not in UNITS:
-            near = difflib.get_close_matches(name.lower(), UNITS, 1)
-            remedy = f"did you mean {near[0]}?" if near else "remove it"
-            self.refuse(where, text, f"unknown column: {remedy} A profile has {', '.join(UNITS)}, as in {EXAMPLE}")
+            if near := difflib.get_close_matches(name, UNITS, 1):
+                self.refuse(where, text, f"did you mean {near[0]}? A profile has {', '.join(UNITS)}, as in {EXAMPLE}")
         elif match is None:
             self.refuse(where, text, f"the unit is missing: write {name}_[{UNITS[name]}] or another unit of its kind")
         else:
@@ -133,11 +136,26 @@ class _Reader:
         return found
 
     def times(self, time: np.ndarray, places: list[str]) -> None:
-        if time[0] != 0.0:
-            self.refuse(places[0], f"{time[0]:g} s", "a profile begins at the time 0")
         for k in np.flatnonzero(np.diff(time) <= 0) + 1:
             if time[k] == time[k - 1]:
                 why = "two points at one time: for a step, let the second one follow a little later, such as 1 us"
             else:
                 why = f"before the point above it, {time[k - 1]:g} s: sort the points, times must grow"
             self.refuse(places[k], f"{time[k]:g} s", why)
+
+
+def with_units(rows: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
+    """The rows with the units of a second row, which has no number, in the head."""
+    if len(rows) < 2 or not rows[1][1] or any(_is_number(cell) for cell in rows[1][1]):
+        return rows
+    units = [cell.strip("[]()") for cell in rows[1][1]] + [""] * len(rows[0][1])
+    head = [f"{name}_[{unit}]" if unit else name for name, unit in zip(rows[0][1], units, strict=False)]
+    return [(rows[0][0], head), *rows[2:]]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        number(cell)
+    except ValueError:
+        return False
+    return True

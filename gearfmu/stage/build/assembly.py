@@ -17,8 +17,9 @@ from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.stored import stored, stored_files
 from gearfmu.spec.tables.ports import PortSpec
-from gearfmu.stage.build.blob import write_blob
+from gearfmu.stage.build.blob import origin, with_guid, write_blob
 from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.build.far import far_sections
 from gearfmu.stage.build.fields import order_sections
@@ -56,11 +57,22 @@ def assemble(
 
     ModelError when a body does not belong to its gear, and for a name in `observe` that is no gear of the stage.
     """
-    sections = order_sections(general_sections(spec, bodies, rolls, observe))
     hashes = tuple(body.input_hash for body in bodies)
+    made_of = {"made_of": _made_of(spec, bodies, rolls, observe)}
+    sections = order_sections(with_guid(general_sections(spec, bodies, rolls, observe) | made_of))
     model = StageModel(spec, write_blob(sections), hashes)
     starts = friction_starts(model.stage) | film_starts(model.stage)
     return model.with_starts(starts) if starts else model
+
+
+def _made_of(spec: Form, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
+    """Hash of all that a model is made of but the kinds of its ports."""
+    stage, found = as_general(spec), spread(spec, bodies)
+    tables = stored(stage) | {"description": ""}
+    for port in tables["ports"].values():
+        port.pop("kind", None)
+    hashes = {name: body.input_hash for name, body in found.items()}
+    return origin(MODEL_VERSION, tables, stored_files(stage), hashes, rolls, list(observe))
 
 
 def general_sections(

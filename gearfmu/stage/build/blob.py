@@ -7,6 +7,7 @@ The same rules are checked here and in gearfmu/kernel/src/base/gk_blob.c; one co
 from __future__ import annotations
 
 import hashlib
+import json
 import struct
 from collections.abc import Mapping
 
@@ -25,6 +26,8 @@ LONGEST_NAME = 23
 REPEATED_FROM = 4096  # bytes: a section at least as long that is there already is stored once
 F64, I32, TEXT, F32 = 1, 2, 3, 4
 DTYPE: dict[int, np.dtype] = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1"), F32: np.dtype("<f4")}
+
+OF_FMU = ("port_kinds", "start_reference", "start_value")  # in which two FMUs of one model may differ
 
 Sections = Mapping[str, "np.ndarray | str"]
 
@@ -68,6 +71,18 @@ def seal(blob: bytes) -> bytes:
 def blob_hash(blob: bytes) -> str:
     """The SHA-256 (64 hex digits) a blob carries: the model's identity."""
     return blob[8:HASHED_FROM].hex()
+
+
+def with_guid(sections: Sections) -> dict[str, np.ndarray | str]:
+    """The sections with the GUID that follows from "made_of", the kinds of the ports and the starts."""
+    parts = [np.asarray(sections.get(name, ())).tolist() for name in OF_FMU]
+    return {**sections, "guid": origin(sections["made_of"], *parts)} if "made_of" in sections else dict(sections)
+
+
+def origin(*what: object) -> str:
+    """SHA-256 (64 hex digits) of tables of text, integers and floats, which a model was made from: the same on every
+    machine, where the model's own numbers differ by the rounding of its linear algebra."""
+    return hashlib.sha256(json.dumps(what, allow_nan=False).encode()).hexdigest()
 
 
 def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:

@@ -15,7 +15,7 @@ from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import Form, body_names
 from gearfmu.spec.forms.turning import Shafts, shafts_of, with_ports
-from gearfmu.stage.build.blob import blob_hash, read_blob, write_blob
+from gearfmu.stage.build.blob import blob_hash, read_blob, with_guid, write_blob
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.build.shown import Card, Shown, grouped
 from gearfmu.units import quantity_text
@@ -82,6 +82,11 @@ class StageModel(Shown):
         """SHA-256 of the blob, 64 hex digits."""
         return blob_hash(self.blob)
 
+    @cached_property
+    def guid(self) -> str:
+        """GUID of its FMUs, 64 hex digits: from what the model was made of, so the same with any numpy and scipy."""
+        return self.kernel().guid
+
     def kernel(self, **parameters: float) -> Kernel:
         """A fresh instance; dots in parameter names are written as they are: kernel(**{"effect.hertz": 0})."""
         return Kernel(self.blob, parameters)
@@ -104,7 +109,9 @@ class StageModel(Shown):
         kinds = np.array(sections["port_kinds"], np.int32).reshape(-1, 3)
         kinds[[list(self.stage.ports).index(name) for name in two], 1] = SPRING
         changed: dict[str, Any] = {name: port.model_copy(update={"kind": "spring"}) for name, port in ports.items()}
-        return replace(self, spec=with_ports(self.spec, changed), blob=write_blob(sections | {"port_kinds": kinds}))
+        return replace(
+            self, spec=with_ports(self.spec, changed), blob=write_blob(with_guid(sections | {"port_kinds": kinds}))
+        )
 
     def modes_of_levels(self) -> dict[str, int]:
         """How many modes are dynamic at which level; at full all that are stored."""
@@ -130,7 +137,7 @@ class StageModel(Shown):
             "start_reference": np.array(list(chosen), np.int32),
             "start_value": np.array(list(chosen.values()), float),
         }
-        return replace(self, blob=write_blob(sections | own)) if chosen else self
+        return replace(self, blob=write_blob(with_guid(sections | own))) if chosen else self
 
     def kernel_variables(self) -> list[Variable]:
         """All variables of this model in the order of the kernel's table."""

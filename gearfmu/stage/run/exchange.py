@@ -1,4 +1,4 @@
-"""Traces as files of other programs: CSV, MATLAB, Parquet, Universal File Format 58. The suffix says which."""
+"""Traces as files of other programs: CSV, MATLAB, Parquet, Universal File Format 58, MDF 4. The suffix says which."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def convert(trace: Trace, path: str | os.PathLike[str], channels: Sequence[str] 
     no name, struct `unit`, cell `name` of the names as they are here. .parquet : one column each, unit and description
     in its metadata, meta in that of the table; needs gearfmu[data]. .uff, .unv : data sets 58, time responses in double
     precision (binary), one a channel, with a node a part of the model; needs gearfmu[data].
+    .mf4 : ASAM MDF 4.10, one group, unit and description with each channel; needs gearfmu[mdf].
     GearfmuError for another suffix, TraceError for a channel that there is not.
     """
     target, names = Path(path), trace.chosen(channels)
@@ -102,6 +103,20 @@ def _uff(trace: Trace, path: Path, names: Sequence[str]) -> None:
         ))  # fmt: skip
 
 
+def _mdf(trace: Trace, path: Path, names: Sequence[str]) -> None:
+    asammdf = required("asammdf", "mdf")
+    signals = []
+    for name in names:
+        channel = trace.channels[name]
+        values = channel.values.astype(np.uint8) if channel.values.dtype == bool else channel.values
+        signals.append(asammdf.Signal(values, trace.time, channel.unit, name, comment=channel.description))
+    with asammdf.MDF(version="4.10") as file:
+        file.append(
+            signals, acq_name=str(trace.meta.get("scene") or trace.meta.get("stage") or ""), common_timebase=True
+        )
+        file.save(path, overwrite=True)
+
+
 def _even(time: np.ndarray) -> bool:
     """Whether start and step (to the 6 digits that the file has for them) say the time (n,) of every sample; else the
     file holds each."""
@@ -124,6 +139,7 @@ def _line(text: str, columns: int = UFF_LINE) -> str:
 WRITERS: dict[str, Callable[[Trace, Path, Sequence[str]], None]] = {
     ".csv": _csv,
     ".mat": _matlab,
+    ".mf4": _mdf,
     ".parquet": _parquet,
     ".uff": _uff,
     ".unv": _uff,

@@ -116,9 +116,9 @@ static int open_model(face *f, fmi2String guid, fmi2String location)
         return SAY(f, LOG_ERROR, "resources/model.gkb: %s: %s; export the FMU again", gk_outcome_text(outcome),
                    message),
                0;
-    if (!guid || strcmp(guid, gk_model_hash(f->model)))
+    if (!guid || strcmp(guid, gk_model_guid(f->model)))
         return SAY(f, LOG_ERROR, "GUID %.80s is not that of resources/model.gkb (%s): export the FMU again",
-                   guid ? guid : "(null)", gk_model_hash(f->model)),
+                   guid ? guid : "(null)", gk_model_guid(f->model)),
                0;
     return 1;
 }

@@ -29,3 +29,17 @@ void gk_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *s
             ((gk_half *)sum[i])[half + k] += a * s[k] + b * c[k];
         }
 }
+
+/* adds a group's displacement in the frame of a tooth to that in its own axes, the first `lanes` of each half */
+void gk_turn_add(const gk_modal *m, int tooth, int lanes, const gk_real *y, gk_real *sum)
+{
+    GK_ASSERT(tooth >= 0 && y != sum && lanes % (LANES / 2) == 0 && lanes <= m->pairs);
+    const int half = m->n / LANES;
+    const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
+    const gk_half *a = (const gk_half *)y, *b = a + half;
+    gk_half *to = (gk_half *)sum;
+    for (int k = 0; k < 2 * lanes / LANES; k++) {
+        to[k] += a[k] * c[k] - b[k] * s[k];
+        to[half + k] += a[k] * s[k] + b[k] * c[k];
+    }
+}

@@ -6,4 +6,5 @@
 
 GK_HOT void gk_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
 GK_HOT void gk_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
+GK_HOT void gk_turn_add(const gk_modal *m, int tooth, int lanes, const gk_real *y, gk_real *sum);
 #endif

@@ -7,6 +7,7 @@
 #include "base/gk_dense.h"
 #include "integrate/gk_closed.h"
 #include "problem/gk_engage.h"
+#include "problem/gk_give.h"
 #include "problem/gk_shared.h"
 #include "setup/gk_kinematics.h"
 #include "setup/gk_tables.h"
@@ -250,15 +251,15 @@ static void add_coupling(const island *of, const gk_coefficients *k, double fact
 {
     const gk_coupled coupled = {.model = of->model, .setup = of->setup, .work = of->work, .k = k, .island = of->number};
     double read[MAX_STRIDE];
-    gk_shared_form(of->model, of->setup, k, of->work, of->number);
+    gk_shared_form(of->model, of->setup, of->work, of->number);
     for (int from = 0; from < of->model->engagements; from++)
         for (int i = 0; within(of, from) && i < of->work->engaged[from].system.n; i++) {
             if (!counts(&of->work->engaged[from].system, i)) continue;
-            gk_couple_unit(&coupled, from, i);
+            gk_give_unit(&coupled, from, i);
             for (int to = 0; to < from; to++) {
                 const gk_system *s = &of->work->engaged[to].system;
                 if (!within(of, to)) continue;
-                gk_couple_read(&coupled, to, read);
+                gk_take_given(&coupled, to, read);
                 for (int j = 0; j < s->n; j++)
                     if (counts(s, j)) M[(size_t)(of->at[from] + i) * of->rows + of->at[to] + j] += factor * read[j];
             }

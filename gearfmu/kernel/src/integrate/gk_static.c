@@ -247,7 +247,7 @@ static void spread(gk_equilibrium *r)
         for (int l = 0; l < mesh->spins; l++)
             for (int i = 0; i < s->n; i++)
                 if (s->kind[i] != ROW_CLUTCH) GK_OF(data, f)[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
-        gk_rows_pose(r->model, setup, e, GK_OF(data, x), work->rest_ground, GK_OF(data, meshing)[e].frozen);
+        gk_rows_pose(setup, work, e, GK_OF(data, x), work->rest_ground, GK_OF(data, meshing)[e].frozen);
     }
 }
 

@@ -4,6 +4,7 @@
 #include "integrate/gk_advance.h"
 #include "integrate/gk_energy.h"
 #include "integrate/gk_integrate.h"
+#include "problem/gk_felt.h"
 
 static const double HUGE_FORCE = 1e15;             /* N: no gear force reaches this value */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
@@ -119,8 +120,8 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
 }
 
 /* One step of length h with γ (γ = 0: em). GK_OK, or GK_DIVERGED / GK_PENETRATION with data unchanged. */
-gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
-                        double gamma)
+static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
+                            double gamma)
 {
     GK_ASSERT(h > 0.0 && gk_finite(h));
     GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
@@ -135,6 +136,8 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     express(model, setup, work, data, k);
     const double damped = gk_advance_predict(model, setup, work, data, k);
     if (!passable(model, work, data)) return GK_DIVERGED;
+    work->by_patterns = work->table_h > 0.0 && h == work->table_h && gamma == work->table_gamma;
+    if (work->by_patterns) gk_felt_see(model, setup, work);
     GK_LAP(work, PHASE_PREDICT);
     const gk_search how = {.k = k};
     for (int e = 0; e < model->engagements; e++) {
@@ -159,4 +162,12 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     data->expressed_h = h, data->expressed_gamma = gamma, data->steps++;
     GK_LAP(work, PHASE_REMEMBER);
     return GK_OK;
+}
+
+gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
+                        double gamma)
+{
+    const gk_outcome outcome = step_once(model, setup, work, data, h, gamma);
+    work->by_patterns = 0;
+    return outcome;
 }

@@ -90,6 +90,10 @@ static void read_stage(gk_reader *r, gk_model *m)
     m->name = gk_read_take(r, F_MODEL_name);
     if (r->outcome) return;
     gk_read_demand(r, m->name[0] && strlen(m->name) <= MOST_NAME, "name");
+    const char *guid = gk_read_take(r, F_MODEL_guid);
+    if (r->outcome) return;
+    gk_read_demand(r, !guid || strlen(guid) == 64, "guid");
+    m->guid = guid ? guid : m->blob.hash;
     m->cut[0] = limits[0], m->cut[1] = limits[1], m->h_max = limits[2], m->period_min = limits[3];
     WITHIN(r, m->cut[0], CUT, "cut frequency of level fast, Hz,");
     WITHIN(r, m->cut[1], CUT, "cut frequency of level standard, Hz,");

@@ -121,7 +121,8 @@ typedef struct gk_ground {
 struct gk_model {
     gk_blob blob;
     const char *name;
-    int starts; /* parameters whose start is not the table's */
+    const char *guid; /* of an FMU with this model */
+    int starts;       /* parameters whose start is not the table's */
     const int32_t *start_reference;
     const double *start_value;
     int slices, rotors, gears, engagements, ports, supports, functions, rolls, sets, chains;

@@ -12,6 +12,11 @@ const char *gk_model_hash(const gk_model *model)
     GK_ASSERT(model);
     return model->blob.hash;
 }
+const char *gk_model_guid(const gk_model *model)
+{
+    GK_ASSERT(model);
+    return model->guid;
+}
 int gk_abi(void) { return GK_ABI; }
 
 const char *gk_status_text(int bit)

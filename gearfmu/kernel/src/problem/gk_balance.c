@@ -8,9 +8,10 @@
 #endif
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 #ifdef GK_DOUBLE_MODES
-static const double STEADY_BALANCE = 1e-9, COUPLED_BALANCE = 1e-9;
+static const double STEADY_BALANCE = 1e-9, COUPLED_BALANCE = 1e-9, COUPLED_CHANGE = 1e-9;
 #else
 static const double STEADY_BALANCE = 1e-7;  /* rows in float are good to 1e-7 */
+static const double COUPLED_CHANGE = 1e-7;  /* what engagements exchange is in single precision */
 static const double COUPLED_BALANCE = 1e-6; /* engagements know each other's gaps to 1e-7; what is left waits */
 #endif
 
@@ -298,6 +299,7 @@ void gk_balance_solve(const gk_island *island)
     GK_ASSERT(island->count >= 0 && island->count <= MAX_ENGAGEMENTS);
     GK_ASSERT(island->count < 2 || island->sweep);
     const double steady = island->sweep ? COUPLED_BALANCE : STEADY_BALANCE;
+    const double changing = island->count > 1 ? COUPLED_CHANGE : BALANCE;
     int curved = 0, rubs = 0;
     for (int m = 0; m < island->count; m++) {
         curved |= GK_HAS(hertz) && island->member[m]->curved;
@@ -309,12 +311,12 @@ void gk_balance_solve(const gk_island *island)
         const int changed = any_changed(island);
         if (!changed && !curved) return;
         const balance b = defect_of_all(island);
-        if (!open_balance(&b, changed ? BALANCE : steady)) {
+        if (!open_balance(&b, changed ? changing : steady)) {
             leave(island, &b);
             return;
         }
         for (int m = 0; m < island->count; m++) choose_direction(island->member[m], attempt == 1);
-        if (find_alpha(island, b, attempt < 2 ? BALANCE : steady)) return;
+        if (find_alpha(island, b, attempt < 2 ? changing : steady)) return;
         if (rubs && !changed) break; /* contacts that stick hardly move */
     }
     gk_balance_plain(island);

@@ -34,9 +34,9 @@ int gk_engage(const gk_model *model, const gk_setup *setup, gk_work *work, const
     const double reach = how->anew ? how->reach : frozen ? FROZEN_RANGE : gk_max(meshing->search_distance, least);
     double there[POSE], moved[POSE];
     GK_MARK(work);
-    gk_rows_pose(model, setup, e, work->spin, ground, engaged->pose);
+    gk_rows_pose(setup, work, e, work->spin, ground, engaged->pose);
     const double *at = frozen ? meshing->frozen : how->spin ? there : engaged->pose;
-    if (how->spin) gk_rows_pose(model, setup, e, how->spin, ground, there);
+    if (how->spin) gk_rows_pose(setup, work, e, how->spin, ground, there);
     engaged->places = gk_flank_find(model, setup, &setup->mesh[e], at, reach, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int d = 0; d < POSE && at != engaged->pose; d++) moved[d] = engaged->pose[d] - at[d];

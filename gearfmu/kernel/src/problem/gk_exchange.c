@@ -3,6 +3,7 @@
  * pushed is read by the same numbers, else energy leaks. Forces come in pairs x, y: two sums in one pass. */
 #include "problem/gk_exchange.h"
 #include "force/gk_turn.h"
+#include "problem/gk_felt.h"
 
 gk_rows gk_rows_of_gaps(const gk_setup *setup, gk_work *work, int e)
 {
@@ -26,15 +27,24 @@ void gk_exchange_read_local(const gk_rows *rows, const double *local, double *re
     GK_ASSERT(local && read);
     const gk_engaged *engaged = rows->engaged;
     for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
-    gk_times_rows(rows->ground, rows->count, rows->setup->mesh[engaged->index].local, local, read);
+    gk_times_rows(rows->ground, rows->count, engaged->local, local, read);
 }
 
 /* reads displacements (or speeds) of the ground group */
 void gk_exchange_read_ground(const gk_rows *rows, const double *ground, double *read)
 {
     GK_ASSERT(ground && read);
-    double local[MAX_GROUND + 4 * MAX_ROTORS];
-    gk_local_gather(&rows->setup->mesh[rows->engaged->index], ground, local);
+    const gk_engaged *engaged = rows->engaged;
+    const gk_mesh *mesh = &rows->setup->mesh[engaged->index];
+    double local[MAX_GROUND + 4 * MAX_ROTORS], *to = local;
+    for (int w = 0; w < 2; to += engaged->wide[w++])
+        if (engaged->by_patterns[w]) { /* places are found with the rigid motion */
+            GK_ASSERT(ground == rows->work->ground_y);
+            memcpy(to, rows->work->seen[mesh->side[w].gear], (size_t)engaged->wide[w] * sizeof *to);
+            memset(to, 0, SPACE * sizeof *to);
+        } else {
+            memcpy(to, ground + mesh->part[w].from, (size_t)engaged->wide[w] * sizeof *to);
+        }
     gk_exchange_read_local(rows, local, read);
 }
 
@@ -58,6 +68,22 @@ void gk_exchange_read(const gk_rows *rows, const gk_real *const y[], const doubl
     gk_exchange_read_ground(rows, ground, read);
     for (int w = 0; w < 2; w++)
         gk_exchange_read_modes(rows, w, y[rows->setup->mesh[rows->engaged->index].side[w].gear], read);
+}
+
+/* adds what contacts read of displacements y of the gear group of a side, in its axes: all, or those that yield */
+void gk_exchange_feel(const gk_rows *rows, int which, const gk_real *y, const gk_flow *flow, int at_once, double *read)
+{
+    GK_ASSERT(which == 0 || which == 1);
+    const gk_engaged *engaged = rows->engaged;
+    const int g = rows->setup->mesh[engaged->index].side[which].gear, n = GK_LANES(rows->setup, g);
+    const int width = 2 * n / LANES, yields = 2 * flow->yields / LANES;
+    gk_real *turned = rows->work->turned;
+    const gk_half *here = (const gk_half *)turned, *basis = (const gk_half *)rows->basis[which];
+    if (!n || (at_once && !yields)) return;
+    gk_turn_back(&rows->setup->modal[g], engaged->position[which].tooth, y, turned);
+    if (!at_once) gk_multiply_rows(here, basis, engaged->system.contacts, width, width, read);
+    for (int from = 0; from < width && at_once; from += width / 2)
+        gk_multiply_rows(here + from, basis + from, engaged->system.contacts, width, yields, read);
 }
 
 /* ---- pushing ----------------------------------------------------------------------------------------------------- */
@@ -123,59 +149,129 @@ void gk_exchange_push_modes(const gk_rows *rows, int which, const double *x, con
     push_basis(rows, which, &p, out_x, out_y);
 }
 
+/* −mobility·Σ rows·x over `halves` of a gear group from `first` on */
+GK_INLINE void move_halves(const pushes *p, half_rows rows, const gk_flow *flow, int first, gk_half *out,
+                           const int halves)
+{
+    const gk_half *mobility = (const gk_half *)flow->mobility;
+    gk_half sum[4] = {{0}};
+    for (int r = 0; r < p->count; r++) {
+        const gk_half *row = rows.at + (size_t)p->row[r] * rows.width + first;
+        const gk_real x = (gk_real)p->x[r];
+        for (int k = 0; k < halves; k++) sum[k] -= x * row[k];
+    }
+    for (int k = 0; k < halves; k++) out[first + k] = mobility[first + k] * sum[k];
+}
+
+/* −mobility·Σ rows·x + κ·Σ rows·y over two halves */
+static void yield_halves(const pushes *p, half_rows rows, const gk_flow *flow, int first, gk_half *out)
+{
+    const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
+    gk_half sum_x[2] = {{0}}, sum_y[2] = {{0}};
+    for (int r = 0; r < p->count; r++) {
+        const gk_half *row = rows.at + (size_t)p->row[r] * rows.width + first;
+        const gk_real x = (gk_real)p->x[r], y = (gk_real)p->y[r];
+        for (int k = 0; k < 2; k++) sum_x[k] -= x * row[k], sum_y[k] -= y * row[k];
+    }
+    for (int k = 0; k < 2; k++) out[first + k] = mobility[first + k] * sum_x[k] - kappa[first + k] * sum_y[k];
+}
+
+/* Adds to `sum` how far forces of contacts, x in the step and y at once, displace the gear group of a side, in its
+ * axes. x NULL: there are none in the step, and only what yields moves. */
+void gk_exchange_displace(const gk_rows *rows, int which, const gk_flow *flow, const double *x, const double *y,
+                          gk_real *sum)
+{
+    GK_ASSERT(which == 0 || which == 1);
+    const int g = rows->setup->mesh[rows->engaged->index].side[which].gear, n = GK_LANES(rows->setup, g);
+    const gk_modal *m = &rows->setup->modal[g];
+    const int width = 2 * n / LANES, half = width / 2, yields = 2 * flow->yields / LANES;
+    const half_rows basis = {(const gk_half *)rows->basis[which], width};
+    gk_half *moved = (gk_half *)rows->work->turned;
+    pushes p;
+    if (!n || (!x && !yields)) return;
+    list_pushes(x ? x : y, y, rows->engaged->system.contacts, &p);
+    if (!x) memset(p.x, 0, (size_t)p.count * sizeof *p.x);
+    if (!p.count) return;
+    for (int from = 0; from < width; from += half) {
+        int k = from;
+        for (; k < from + yields; k += 2) yield_halves(&p, basis, flow, k, moved);
+        for (; k + 4 <= from + half && x; k += 4) move_halves(&p, basis, flow, k, moved, 4);
+        for (; k < from + half && x; k += 2) move_halves(&p, basis, flow, k, moved, 2);
+    }
+    gk_turn_add(m, rows->engaged->position[which].tooth, x ? m->pairs : flow->yields, rows->work->turned, sum);
+}
+
 typedef struct quad_rows { /* on the ground group; width: of a row */
     const gk_quad *at;
     int width;
 } quad_rows;
 
-/* adds Σ rows·x and Σ rows·y over `quads` of the ground group from `first` on */
-GK_INLINE void push_quads(const pushes *p, quad_rows rows, int first, gk_quad *out_x, gk_quad *out_y, const int quads)
+/* adds Σ rows·x, and where `both` Σ rows·y, over `quads` of the ground group from `first` on */
+GK_INLINE void push_quads(const pushes *p, quad_rows rows, int first, gk_quad *out_x, gk_quad *out_y, const int quads,
+                          const int both)
 {
     gk_quad sum_x[4], sum_y[4];
-    for (int k = 0; k < quads; k++) sum_x[k] = out_x[k], sum_y[k] = out_y[k];
+    for (int k = 0; k < quads; k++) sum_x[k] = out_x[first + k];
+    for (int k = 0; both && k < quads; k++) sum_y[k] = out_y[first + k];
     for (int r = 0; r < p->count; r++) {
         const gk_quad *row = rows.at + (size_t)p->row[r] * rows.width + first;
         const double x = p->x[r], y = p->y[r];
-        for (int k = 0; k < quads; k++) sum_x[k] += x * row[k], sum_y[k] += y * row[k];
+        for (int k = 0; k < quads; k++) sum_x[k] += x * row[k];
+        for (int k = 0; both && k < quads; k++) sum_y[k] += y * row[k];
     }
-    for (int k = 0; k < quads; k++) out_x[k] = sum_x[k], out_y[k] = sum_y[k];
+    for (int k = 0; k < quads; k++) out_x[first + k] = sum_x[k];
+    for (int k = 0; both && k < quads; k++) out_y[first + k] = sum_y[k];
 }
 
-/* adds the forces x and y of rows to those on the ground group, whose two parts for this engagement begin at `at` */
-static void ground_forces(const gk_mesh *mesh, const double *ground, const pushes *p, const int at[2], double *out_x,
-                          double *out_y)
+/* adds the forces x, and where `both` y, of rows to those on the ground group: of either side */
+GK_INLINE void ground_forces(const gk_rows *of, const pushes *p, double *const out_x[2], double *const out_y[2],
+                             const int both)
 {
-    const quad_rows rows = {(const gk_quad *)ground, mesh->local / 4};
+    const quad_rows rows = {(const gk_quad *)of->ground, of->engaged->local / 4};
     for (int w = 0, first = 0; w < 2; w++) {
-        const int quads = mesh->part[w].width / 4;
-        gk_quad *x = (gk_quad *)(out_x + at[w]) - first, *y = (gk_quad *)(out_y + at[w]) - first;
-        const int end = first + quads;
-        for (; first + 3 <= end; first += 3) push_quads(p, rows, first, x + first, y + first, 3);
-        for (; first + 2 <= end; first += 2) push_quads(p, rows, first, x + first, y + first, 2);
-        for (; first < end; first++) push_quads(p, rows, first, x + first, y + first, 1);
+        gk_quad *x = (gk_quad *)out_x[w] - first, *y = (gk_quad *)out_y[w] - first;
+        const int end = first + of->engaged->wide[w] / 4;
+        for (; first + 3 <= end; first += 3) push_quads(p, rows, first, x, y, 3, both);
+        for (; first + 2 <= end; first += 2) push_quads(p, rows, first, x, y, 2, both);
+        for (; first < end; first++) push_quads(p, rows, first, x, y, 1, both);
     }
+}
+
+/* adds the forces x of rows to those on the engagement's own part of the ground group */
+void gk_exchange_push_once(const gk_rows *rows, const double *x, double *out)
+{
+    GK_ASSERT(x && out);
+    double *const to[2] = {out, out + rows->engaged->wide[0]};
+    pushes p;
+    list_pushes(x, x, rows->count, &p);
+    if (rows->engaged->local && p.count) ground_forces(rows, &p, to, to, 0);
 }
 
 /* adds the forces x and y of rows to those on the engagement's own part of the ground group */
 void gk_exchange_push_local(const gk_rows *rows, const double *x, const double *y, double *out_x, double *out_y)
 {
     GK_ASSERT(x && y);
-    const gk_mesh *mesh = &rows->setup->mesh[rows->engaged->index];
-    const int at[2] = {0, mesh->part[0].width};
+    const int first = rows->engaged->wide[0];
+    double *const to_x[2] = {out_x, out_x + first}, *const to_y[2] = {out_y, out_y + first};
     pushes p;
     list_pushes(x, y, rows->count, &p);
-    if (mesh->local && p.count) ground_forces(mesh, rows->ground, &p, at, out_x, out_y);
+    if (rows->engaged->local && p.count) ground_forces(rows, &p, to_x, to_y, 1);
 }
 
 /* adds the forces x and y of rows to those on ground group and gear groups */
 static void scatter(const gk_rows *rows, const double *x, const double *y)
 {
     const gk_mesh *mesh = &rows->setup->mesh[rows->engaged->index];
-    const int at[2] = {mesh->part[0].from, mesh->part[1].from};
     gk_work *work = rows->work;
     pushes p;
     list_pushes(x, y, rows->count, &p);
-    if (mesh->local) ground_forces(mesh, rows->ground, &p, at, work->ground_force, work->ground_next);
+    double *to_z[2], *to_next[2];
+    for (int w = 0; w < 2; w++) {
+        const int g = mesh->side[w].gear, from = mesh->part[w].from, patterns = rows->engaged->by_patterns[w];
+        to_z[w] = patterns ? work->pushed_z[g] : work->ground_force + from;
+        to_next[w] = patterns ? work->pushed_next[g] : work->ground_next + from;
+    }
+    if (mesh->local) ground_forces(rows, &p, to_z, to_next, 1);
     while (p.count && p.row[p.count - 1] >= rows->engaged->system.contacts) p.count--;
     for (int w = 0; w < 2; w++) {
         const int g = mesh->side[w].gear;
@@ -194,6 +290,9 @@ void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *
         const size_t size = (size_t)GK_LANES(setup, g) * sizeof(gk_real);
         memset(work->force[g], 0, size);
         memset(work->next[g], 0, size);
+        if (!setup->base.patterns[g]) continue;
+        memset(work->pushed_z[g], 0, sizeof work->pushed_z[g]);
+        memset(work->pushed_next[g], 0, sizeof work->pushed_next[g]);
     }
     memset(work->ground_force, 0, width);
     memset(work->ground_next, 0, width);
@@ -205,6 +304,7 @@ void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *
         const gk_rows sliding = gk_rows_of_sliding(setup, work, e);
         scatter(&sliding, engaged->glide->step, engaged->glide->last);
     }
+    if (work->by_patterns) gk_felt_scatter(model, setup, work);
 }
 
 /* ---- bores ------------------------------------------------------------------------------------------------------- */

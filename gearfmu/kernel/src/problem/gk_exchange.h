@@ -25,7 +25,12 @@ GK_HOT void gk_exchange_read_modes(const gk_rows *rows, int which, const gk_real
 GK_HOT void gk_exchange_read(const gk_rows *rows, const gk_real *const y[], const double *ground, double *read);
 GK_HOT void gk_exchange_push_modes(const gk_rows *rows, int which, const double *x, const double *y, gk_real *out_x,
                                    gk_real *out_y);
+GK_HOT void gk_exchange_displace(const gk_rows *rows, int which, const gk_flow *flow, const double *x, const double *y,
+                                 gk_real *sum);
+GK_HOT void gk_exchange_feel(const gk_rows *rows, int which, const gk_real *y, const gk_flow *flow, int at_once,
+                             double *read);
 GK_HOT void gk_exchange_push_local(const gk_rows *rows, const double *x, const double *y, double *out_x, double *out_y);
+GK_HOT void gk_exchange_push_once(const gk_rows *rows, const double *x, double *out);
 GK_HOT void gk_exchange_scatter(const gk_model *model, const gk_setup *setup, gk_work *work,
                                 const double *(*x)(const gk_system *), const double *(*y)(const gk_system *));
 /* between flanks and bores at once: moments on ports, and what contacts turn the bores */

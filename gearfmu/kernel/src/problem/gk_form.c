@@ -104,7 +104,7 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
     for (int d = 0; d < mesh->spins; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
     const gk_rows rows = gk_rows_of_gaps(setup, work, e);
     gk_exchange_read(&rows, work->y, work->ground_y, s->g);
-    gk_rows_without_rigid(model, setup, engaged, e, work->ground_y, s->g);
+    gk_rows_without_rigid(setup, work, e, work->ground_y, s->g);
     for (int p = 0, i = 0; p < engaged->places; p++)
         for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
             const gk_point *point = gk_point_of(setup, &engaged->place[p], strip);

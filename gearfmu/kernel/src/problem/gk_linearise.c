@@ -142,7 +142,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
             memset(read, 0, sizeof read);
             of = e;
             gk_exchange_read_bores(setup, &work->engaged[e], &bores, read);
-            gk_shared_read(work, e, 1, read);
+            gk_shared_read(setup, work, e, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
@@ -243,7 +243,7 @@ gk_outcome gk_linearise(const gk_model *model, const gk_setup *setup, gk_work *w
     out->rows = list_kept(model, work, rows);
     describe_coordinates(model, setup, out);
     fill_supports(model, setup, work, rows, out);
-    gk_shared_form(model, setup, &work->explicit_rows, work, -1);
+    gk_shared_form(model, setup, work, -1);
     fill_rows(model, setup, work, rows, out);
     return GK_OK;
 }

@@ -302,7 +302,6 @@ static void take_runout(nodal_pair *p)
 static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, const gk_real *const speed[],
                              double *spin_rate)
 {
-    const gk_model *model = p->model;
     const gk_setup *setup = p->setup;
     const int e = p->mesh->index;
     gk_engaged *engaged = &work->engaged[e];
@@ -310,7 +309,7 @@ static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, 
     p->pose = frozen ? GK_OF(data, meshing)[e].frozen : engaged->pose;
     for (int d = 0; d < POSE && frozen; d++)
         p->moved[d] = p->e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p->pose[d];
-    gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p->rate);
+    gk_rows_pose(setup, work, e, work->speed, work->ground_trial + setup->base.n, p->rate);
     take_runout(p);
     for (int c = 0; c < 2; c++)
         p->apart[c] = p->e->position[1][c] + p->pose[XB + c] - (p->e->position[0][c] + p->pose[XA + c]);

@@ -3,50 +3,55 @@
  * outward displacement of both gears plus the gap's gradient times their rigid motion; it is kept over the oscillators
  * that the two gears read, those of gear A first. Rows of the sliding, with friction, are made likewise. */
 #include "problem/gk_rows.h"
+#include "problem/gk_felt.h"
 
 /* rigid motion of both gears of an engagement by displacements (or speeds) of the ground group */
-static void read_rigid(const gk_model *model, const gk_setup *setup, int e, const double *ground, double rigid[POSE])
+static void read_rigid(const gk_setup *setup, const gk_work *work, int e, const double *ground, double rigid[POSE])
 {
     const gk_base *base = &setup->base;
     memset(rigid, 0, POSE * sizeof *rigid);
     for (int w = 0; w < 2; w++) {
-        const int g = model->engagement[e].gear[w];
+        const int g = setup->mesh[e].side[w].gear;
+        const double *seen = work->by_patterns && base->patterns[g] ? work->seen[g] : NULL;
         for (int m = 0; m < base->motions[g]; m++) {
             const int c = base->motion[g][m];
-            rigid[SPACE * w + c] = gk_dot_quads(base->moved[g][c], ground + base->from[g], base->width[g] / 4);
+            if (seen)
+                rigid[SPACE * w + c] = seen[c];
+            else
+                rigid[SPACE * w + c] = gk_dot_quads(base->moved[g][c], ground + base->from[g], base->width[g] / 4);
         }
     }
 }
 
 /* positions and angles of both gears of an engagement: spin, and rigid motion by the ground oscillators */
-void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
+void gk_rows_pose(const gk_setup *setup, const gk_work *work, int e, const double *spin, const double *ground,
                   double *pose)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
     GK_ASSERT(spin && pose);
-    read_rigid(model, setup, e, ground, pose);
+    read_rigid(setup, work, e, ground, pose);
     const int frame = setup->mesh[e].frame;
     for (int w = 0; w < 2; w++) {
-        const double turned = spin[model->gear[model->engagement[e].gear[w]].rotor];
+        const double turned = spin[setup->mesh[e].spin[w]];
         pose[SPACE * w + PHIA] += frame < 0 ? turned : turned - spin[frame];
     }
 }
 
 /* Takes away what rigid motion of the gears by `ground` makes of the gaps of the contacts: places are found with it */
-void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                           const double *ground, double *read)
+void gk_rows_without_rigid(const gk_setup *setup, const gk_work *work, int e, const double *ground, double *read)
 {
-    GK_ASSERT(engaged && engaged->index == e);
-    GK_ASSERT(read);
+    GK_ASSERT(gk_is_mesh(setup, e) && read);
+    const gk_engaged *engaged = &work->engaged[e];
     const int each = setup->spatial ? 1 : GK_STRIPS(setup);
     double rigid[POSE];
-    read_rigid(model, setup, e, ground, rigid);
+    read_rigid(setup, work, e, ground, rigid);
     for (int p = 0, i = 0; p < engaged->places; p++)
         for (int first = 0; first < GK_STRIPS(setup); first += each) {
             const double *gradient = engaged->place[p].point[first].gradient;
             double sum = 0.0;
             for (int w = 0; w < 2; w++) {
                 const int g = setup->mesh[e].side[w].gear;
+                if (engaged->by_patterns[w]) continue; /* it has not been read */
                 for (int m = 0; m < setup->base.motions[g]; m++) {
                     const int c = SPACE * w + setup->base.motion[g][m];
                     sum += gradient[c] * rigid[c];
@@ -157,6 +162,19 @@ static int fills(const gk_base *base, const gk_mesh *mesh)
     return !mesh->joined && width == mesh->local;
 }
 
+/* rows of the joints at bores on the oscillators that a side reads */
+static void joint_rows(const gk_setup *setup, const gk_mesh *mesh, gk_engaged *engaged, int w)
+{
+    const gk_system *s = &engaged->system;
+    const size_t size = (size_t)engaged->wide[w] * sizeof(double);
+    double *row = engaged->ground + s->contacts * engaged->local + (w ? engaged->wide[0] : 0);
+    for (int i = s->contacts; i < s->n; i++, row += engaged->local)
+        if (gk_rows_at_bore(setup, s, i))
+            memcpy(row, setup->base.port_rows + s->port_of[i] * setup->base.n + mesh->part[w].from, size);
+        else
+            memset(row, 0, size);
+}
+
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
 void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
 {
@@ -165,26 +183,25 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     const gk_base *base = &setup->base;
     const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    const int local = mesh->local;
+    gk_felt_plan(setup, work, engaged);
+    const int local = engaged->local;
     if (!local) return;
     const int afresh = fills(base, mesh);
-    if (!afresh) memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
+    if (!afresh) memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &mesh->side[w];
-        const ground_fill f = {base, side, engaged, engaged->ground + mesh->at[w], (size_t)local / 4};
+        const int at = engaged->by_patterns[0] && w ? engaged->wide[0] : mesh->at[w];
+        const ground_fill f = {base, side, engaged, engaged->ground + at, (size_t)local / 4};
+        if (engaged->by_patterns[w]) {
+            gk_felt_rows(setup, work, e, w);
+            continue;
+        }
         if (afresh) {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, WRITE)
         } else {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, ADD)
         }
-    }
-    for (int i = s->contacts; i < s->n; i++) {
-        double *row = engaged->ground + (size_t)i * local;
-        if (gk_rows_at_bore(setup, s, i))
-            gk_local_gather(mesh, base->port_rows + s->port_of[i] * base->n, row);
-        else
-            memset(row, 0, (size_t)local * sizeof *row);
+        joint_rows(setup, mesh, engaged, w);
     }
 }
 

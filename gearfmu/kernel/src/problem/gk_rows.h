@@ -18,10 +18,10 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
 
-GK_HOT void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
+GK_HOT void gk_rows_pose(const gk_setup *setup, const gk_work *work, int e, const double *spin, const double *ground,
                          double *pose);
-GK_HOT void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                                  const double *ground, double *read);
+GK_HOT void gk_rows_without_rigid(const gk_setup *setup, const gk_work *work, int e, const double *ground,
+                                  double *read);
 GK_HOT void gk_rows_form(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);

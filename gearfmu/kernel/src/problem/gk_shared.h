@@ -6,7 +6,6 @@
 #include "problem/gk_work.h"
 #include "setup/gk_setup.h"
 
-GK_HOT void gk_shared_form(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work,
-                           int island);
-GK_HOT void gk_shared_read(const gk_work *work, int e, int at_once, double *read);
+GK_HOT void gk_shared_form(const gk_model *model, const gk_setup *setup, gk_work *work, int island);
+GK_HOT void gk_shared_read(const gk_setup *setup, const gk_work *work, int e, double *read);
 #endif

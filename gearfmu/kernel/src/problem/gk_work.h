@@ -60,18 +60,25 @@ typedef struct gk_glide {
 /* forces of an engagement by what they meet: D in the step, A at once, far teeth; the same along the profile */
 typedef struct gk_forces {
     double step[MAX_STRIDE], once[MAX_STRIDE], far[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
+    int at_once; /* step is 0 */
 } gk_forces;
 
-/* a gear that two engagements share: (contacts of the second, stride) what its forces do to the gaps of the first: in
- * the step; at once; through far teeth */
+/* a gear that two engagements share: (contacts of the second, stride) what its forces do to the gaps of the first at
+ * once through far teeth */
 typedef struct gk_shared {
     int engagement[2], side[2], gear, stride;
-    int dynamic, yields, far_on; /* which of them there are */
-    double *moves, *yielded, *far;
+    double *far;
 } gk_shared;
+
+typedef struct gk_felt { /* forces on the patterns of a gear: by z, by what acts at once */
+    gk_real moved[MOST_PATTERNS], yielded[MOST_PATTERNS];
+} gk_felt;
 
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
+    int local, wide[2]; /* numbers of a row on the ground group: together, of either side: oscillators or patterns */
+    int by_patterns[2]; /* a side's are patterns */
+    gk_felt pattern[2];
     gk_glide *glide; /* with friction */
     gk_film film;
     gk_place place[MAX_PAIRS];
@@ -84,11 +91,10 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *given_ground,
         given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
-    gk_real *given_modes[2];      /* with friction, (n): the same of the gear groups that other engagements read too */
+    gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
     double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
     double *far[2];               /* (contacts, FAR) patterns of far teeth */
     gk_forces forces;             /* as given to the others */
-    gk_real *turned[2];           /* (contacts, n) rows on the modes of a shared gear, in its axes */
     gk_bores given_bores;
     gk_step_side table[2];
     gk_system system;
@@ -136,6 +142,13 @@ struct gk_work {
     gk_compliance compliance;
     double *island;                             /* the limit of the step: (2, rows, rows) of all engagements */
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
+    gk_real *sum_modes[MAX_GEARS];
+    gk_felt sum_patterns[MAX_GEARS];
+    gk_real by_others[MAX_GEARS][MOST_PATTERNS]; /* moved by the forces on other gears, as of the last round */
+    gk_real *between[MAX_GEARS][MAX_GEARS];      /* (2, patterns of the second, of the first) in a step with tables */
+    int by_patterns;                             /* this step goes by patterns */
+    double seen[MAX_GEARS][MOST_PATTERNS];       /* predicted displacement of the patterns */
+    double pushed_z[MAX_GEARS][MOST_PATTERNS], pushed_next[MAX_GEARS][MOST_PATTERNS];
     gk_bores sum_bores;
     gk_field field[2];             /* nodal contact: teeth of A and B in hand */
     uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
@@ -188,8 +201,6 @@ typedef struct gk_coupled { /* an island in a step */
 } gk_coupled;
 GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
 GK_HOT void gk_couple_recall(gk_coupled *coupled);
-GK_HOT void gk_couple_unit(const gk_coupled *coupled, int from, int row);
-GK_HOT void gk_couple_read(const gk_coupled *coupled, int to, double *read);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
 static inline int gk_block_end(int i)
 {

@@ -1,6 +1,7 @@
 /* Level, effects, slices and step → gk_setup with all its tables. */
 #include "run/gk_wide.h"
 #include "setup/gk_choose.h"
+#include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 #include <stdio.h>
 
@@ -66,6 +67,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     setup->step = hot->step[setup->integrator], setup->count = hot->count, setup->moves = hot->moves;
     gk_setup_fill(model, setup, work, data, which);
     fill_sides(model, setup, work, hot->fill);
+    gk_patterns_find(model, setup, work->columns);
     outcome = gk_limit_choose(model, setup, work, data, message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;

@@ -100,6 +100,14 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->outward = doubles(b, model->carried ? n * (size_t)model->rotors : 0);
     base->outward_support = doubles(b, (size_t)(model->carried ? model->rotors * model->supports : 0));
     for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
+    for (int g = 0; g < model->gears; g++)
+        base->pattern[g] = doubles(b, model->engagements > 1 ? MOST_PATTERNS * n : 0);
+}
+
+/* may flanks feel the ground group by patterns? */
+static int by_patterns(const gk_setup *setup)
+{
+    return setup->mesh[1].index == 1 && !GK_ON(setup, friction) && setup->base.n >= 2 * MOST_PATTERNS;
 }
 
 static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, gk_side *side)
@@ -108,6 +116,7 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     const size_t points = nodes * C * strips;
     side->rows = reals(b, points * (size_t)setup->modal[side->gear].n);
     side->ground = doubles(b, points * (size_t)setup->base.n);
+    side->shares = doubles(b, by_patterns(setup) ? points * MOST_PATTERNS : 0);
     side->columns = (int)((C * strips + 3) / 4 * 4 + 4);
     side->residual = reals(b, 2 * nodes * C * strips * (size_t)side->columns);
     side->path = doubles(b, points * strips);
@@ -206,11 +215,10 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
         const size_t points = (size_t)(side->candidates * setup->strips), n = (size_t)setup->modal[side->gear].n;
         const int shared = setup->engagements_of[side->gear] > 1;
         engaged->basis[w] = reals(b, contacts * n);
-        engaged->given_modes[w] = reals(b, shared && GK_ON(setup, friction) ? n : 0);
+        engaged->given_modes[w] = reals(b, shared ? n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
         engaged->far[w] = doubles(b, gk_far_known(model, setup, side->gear) ? contacts * FAR : 0);
-        engaged->turned[w] = reals(b, shared ? n * contacts : 0);
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
     engaged->index = e;
@@ -250,8 +258,7 @@ static void lay_out_shared(bump *b, const gk_model *model, const gk_setup *setup
     if (work->shared) list_shared(model, work->shared);
     for (int p = 0; p < work->shareds; p++) {
         gk_shared counted, *s = work->shared ? &work->shared[p] : &counted;
-        double **array[] = {&s->moves, &s->yielded, &s->far};
-        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, block);
+        s->far = doubles(b, block);
     }
 }
 
@@ -262,7 +269,8 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
-        gk_real **array[] = {&work->qp[g], &work->vp[g], &work->force[g], &work->next[g], &work->reading[g]};
+        gk_real **array[] = {&work->qp[g],   &work->vp[g],      &work->force[g],
+                             &work->next[g], &work->reading[g], &work->sum_modes[g]};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(&b, n);
         work->turned_speed[g] = doubles(&b, n);
         for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
@@ -306,6 +314,9 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     const size_t rows = (size_t)model->engagements * (MAX_PAIRS * (size_t)setup->strips + MAX_JOINTS);
     work->island = doubles(&b, 2 * rows * rows);
     work->sum_ground = doubles(&b, ground);
+    for (int g = 0; g < model->gears; g++)
+        for (int f = 0; f < model->gears; f++)
+            work->between[g][f] = reals(&b, by_patterns(setup) ? 2 * MOST_PATTERNS * MOST_PATTERNS : 0);
     for (int w = 0; w < 2; w++) {
         gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};
         for (int i = 0; i < 3; i++) *of_field[i] = reals(&b, widest);

@@ -2,6 +2,7 @@
  * A row between two nodes is linear, so both are quadratic there: tabulated as squares of nodes and products of
  * neighbours, they are exactly the bilinear form of the interpolated rows. */
 #include "problem/gk_work.h"
+#include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 
 /* Σ a b over modes between all points: rows of one node, and mixed with those of the next (NULL: none) */
@@ -256,6 +257,7 @@ void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, c
         for (int at = 0; at <= of->nodes; at++)
             add_residual(of, at, (int)points, table->moves + (size_t)at * points * 4 * (size_t)of->columns);
     }
+    gk_patterns_between(model, setup, k, work->between);
     work->table_h = k->h;
     work->table_gamma = k->gamma;
 }

@@ -17,8 +17,10 @@ enum {
     MAX_CANDIDATES = 24,  /* tooth pairs that can be near contact at any position, both flanks */
     GAPS = 4,             /* places along a part of a line of contact at which its gap is known */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
-    FAR = 12,     /* patterns by which engagements of one gear feel each other */
-    MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
+    FIRST_PATTERN = 8,  /* of a gear's patterns on the ground group: rigid motions and ports come before */
+    MOST_PATTERNS = 40, /* those in front included */
+    FAR = 12,           /* patterns by which engagements of one gear feel each other */
+    MAX_SOFT = 64       /* modes of a gear with several engagements that statics take as unknowns */
 };
 
 #define GK_LANES(setup, g) (GK_HAS(modes) && GK_HAS(elastic) ? (setup)->modal[g].n : 0)
@@ -64,6 +66,9 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], support_damping_span[MAX_SUPPORTS],
         port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
+    int patterns[MAX_GEARS];               /* in which its flanks feel that part, 0: oscillator by oscillator */
+    double *pattern[MAX_GEARS];            /* (patterns, width) rigid motions as in a pose, ports, flanks */
+    int port_slot[MAX_GEARS][MAX_PORTS];   /* a port's place among them, −1: none */
 } gk_base;
 
 /* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
@@ -98,6 +103,7 @@ typedef struct gk_side {
     int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
     double *far;   /* (nodes + 1, points, FAR): patterns of far teeth */
+    double *shares; /* (nodes + 1, points, patterns − FIRST_PATTERN): `ground` by patterns */
     gk_along along;
     gk_span held;    /* the supports that this side loads */
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
@@ -262,6 +268,12 @@ static inline int gk_is_mesh(const gk_setup *setup, int e)
     return e >= 0 && e < MAX_ENGAGEMENTS && setup->mesh[e].index == e && setup->mesh[e].spins > 0;
 }
 static inline int gk_span_is_whole(gk_span span) { return span.from >= 0 && span.from % 4 == 0 && span.width % 4 == 0; }
+
+/* do two gears read the same oscillators, both by patterns? */
+static inline int gk_patterns_meet(const gk_base *base, int a, int b)
+{
+    return base->patterns[a] && base->patterns[b] && base->from[a] == base->from[b];
+}
 
 /* states in gk_data */
 static inline double *gk_ground_of(gk_data *data) { return GK_OF(data, oscillator); }

@@ -1,0 +1,87 @@
+"""A body of a stage and its reduction."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any, TypedDict
+
+from typing_extensions import Unpack
+
+from gearfmu.api.models import PathLike, load
+from gearfmu.api.quantities import Quantity, checked
+from gearfmu.body.imported import imported_full_order
+from gearfmu.errors import Problem, SpecError
+from gearfmu.reduction.basis import BAND, Size
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.judged import Judgement, judged
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.toothed import gear_full_order, ring_full_order
+from gearfmu.reduction.transfer import LINES
+from gearfmu.reduction.transfer import Judging as Lines
+from gearfmu.spec.forms.members import Form, body_names, members
+
+PAPER = ("modal", "craig_bampton", "rubin", "krylov")  # the methods of the paper
+SIZE, DAMPING = 120, 0.01
+
+
+class Judging(TypedDict, total=False):
+    """size : vectors n of a method, rigid modes aside; 120. band : from, to, Hz; lines : over it, spaced
+    logarithmically; 50 Hz to 10 kHz, 400. damping : ratio of both models; 0.01. free : the free body is reduced, as the
+    kernel takes it, else with its ground held. scale : factor on the element counts of the stage."""
+
+    size: int
+    band: tuple[Quantity, Quantity]
+    damping: float
+    lines: int
+    free: bool
+    scale: float | None
+
+
+def frf(stage: PathLike | Form, body: str, methods: Sequence[str] = PAPER, **how: Unpack[Judging]) -> Judgement:
+    """Relative error of the transfer matrix of a body (Frobenius norm, the paper's eq. 3), reduced by several methods
+    and judged with its ground held.
+
+    stage : path, name or numbers, as of `load`. body : name of a gear, ring or carrier of it.
+    methods : those of a carrier's stage file; "krylov:240" has a size of its own.
+    how : size, band, damping, lines, free and scale (`Judging`).
+
+    gf.frf("planetary54", "carrier", ["rubin", "krylov:240"]).trials[0].error is (F,) over `.frequency`, Hz.
+
+    Raises SpecError for a body, a method or a scale that cannot be; BodyError for a size that is none.
+    """
+    low, high = (checked("band", edge, "frequency") for edge in how.get("band", BAND))
+    entries = [_entry(text, how.get("size", SIZE), (low, high)) for text in methods]
+    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    full = _full_order(spec, body, how.get("scale"))
+    lines = Lines.over((low, high), how.get("lines", LINES), how.get("damping", DAMPING))
+    return judged(full if how.get("free") else full.grounded(), entries, lines)
+
+
+def _entry(text: str, size: int, band: tuple[float, float]) -> tuple[str, Size]:
+    name, _, own = text.strip().partition(":")
+    if name not in METHODS or (own and not own.isdigit()):
+        remedy = f"is no method; there are {', '.join(METHODS)}, each with ':n' behind it for a size"
+        raise SpecError([Problem("", "methods", name, remedy)])
+    return name, Size(int(own or size), band)
+
+
+def _full_order(spec: Any, body: str, scale: float | None) -> FullOrder:
+    """The finite elements of a body, gear, ring or carrier."""
+    factor: dict[str, Any] = {} if scale is None else {"scale": scale}
+    toothed, names = members(spec), body_names(spec)
+    if body not in names:
+        remedy = f"no body '{body}'; the stage has {', '.join(names)}"
+        raise SpecError([Problem(str(spec.source), "body", body, remedy)])
+    imported = toothed[body].gear.imported if body in toothed else spec.carrier.imported
+    if imported is not None and scale is not None:
+        remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
+        raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
+    if body not in toothed:
+        return carrier_full_order(spec, **factor)
+    if imported is not None:
+        return imported_full_order(toothed[body])
+    if toothed[body].gear.kind == "ring":
+        return ring_full_order(spec, name=body, **factor)
+    return gear_full_order(spec, body, **factor)

@@ -1,0 +1,14 @@
+/* Patterns by which the flanks of a gear feel the ground group (gk_patterns.c). */
+#ifndef GK_PATTERNS_H
+#define GK_PATTERNS_H
+#include "base/gk_lanes.h"
+#include "gk.h"
+#include "model/gk_model.h"
+#include "setup/gk_setup.h"
+
+/* room: doubles as in gk_side_scratch */
+void gk_patterns_find(const gk_model *model, gk_setup *setup, double *room);
+/* between: (2, patterns of the second, of the first) of each pair of gears that meet, in the step k */
+void gk_patterns_between(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
+                         gk_real *(*between)[MAX_GEARS]);
+#endif
