@@ -46,13 +46,20 @@ from gearfmu.errors import SimulationError
 )
 @level_option
 @click.option(
+    "--twice-slices/--once",
+    "doubled",
+    default=None,
+    help="With helical teeth: state what orders 1 to 8 change by with twice the slices, over one pitch. Of itself for "
+    "pairs alone; a train or set takes three times as long with it.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("te.csv"),
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
 )
-def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **where: Any) -> None:
+def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool | None, out: Path, **where: Any) -> None:
     """Loaded transmission error of STAGE over one pitch or more, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of
     every mesh. Mesh stiffness is that of the mesh alone, bores held on their axes; stage stiffness that with shafts and
     bearings.
@@ -66,8 +73,10 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
 
     model = model_of(stage, bores=bore)
     where |= level_of(model, where.pop("level"))
+    if doubled is None:
+        doubled = len(model.stage.engagements) == 1
     if model.stage.carriers:
-        return _of_set(model, list(torques), out, **where)
+        return _of_set(model, list(torques), out, doubled, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
@@ -82,7 +91,8 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         if len(meshes) > 1:
             click.echo(mesh)
         _tell(result)
-        _tell_slices(model, torques, mesh=mesh, **where)
+        if doubled:
+            _tell_slices(model, torques, mesh=mesh, **where)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
@@ -135,7 +145,7 @@ def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
             click.echo(f"warning: {text}", err=True)
 
 
-def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
+def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where: Any) -> None:
     if where["rigid_bearings"]:
         raise click.BadParameter(
             "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
@@ -151,7 +161,8 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     _tell(result)
-    _tell_slices(model, torques, **where)
+    if doubled:
+        _tell_slices(model, torques, **where)
     for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")

@@ -15,6 +15,7 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.stage import assemble
 from gearfmu.stage.run.refinement import left_of_slices
 from gearfmu.stage.run.trace import Trace
@@ -203,9 +204,12 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 
 
 def _left_of_slices(run: Run) -> str:
-    """What the number of slices of a helical stage leaves open; "" for spur stages and without torque or bodies."""
+    """What the number of slices of a helical pair leaves open; "" for other stages, where that takes minutes, and
+    without torque or bodies."""
     torque = run.summary.get("torque")
     if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
+        return ""
+    if len(as_general(run.spec).engagements) != 1:
         return ""
     left = left_of_slices(assemble(run.spec, run.bodies), [torque], slices=int(run.summary.get("slices") or 0))
     return left.text if left else ""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from golden_models import golden_model
-from golden_stages import FAST, Record, stages
+from golden_stages import RIGID, Record, stages
 from golden_stages import _run as run
 from inner import Inner
 from scipy.integrate import quad
@@ -87,18 +87,25 @@ def test_forces_are_shared_out_over_the_width_without_loss(helical: Inner) -> No
         assert shared == pytest.approx(100.0 * overlap / (high - low), abs=1e-9)
 
 
-def energy_left(**parameters: float) -> float:
-    """Relative residual of energy of the golden helical run that is loaded, reversed and loaded again."""
-    stage, record = stages()["helical"], Record()
-    kernel = stage.kernel({"level": FAST} | parameters, None)
+def energy_left(name: str = "helical", **parameters: float) -> float:
+    """Energy (J) that the balance leaves of a golden stage that is loaded, reversed and loaded again, as rigid gears
+    without contact dampers; dampers elsewhere take 23 J."""
+    stage, record = stages()[name], Record()
+    kernel = stage.kernel({"level": RIGID, "contact_damping": 0.0} | parameters, None)
     kernel.initialize()
     run(kernel, stage, range(stage.steps), record)
     return record.rows[-1]["energy.residual"]
 
 
+def test_parts_that_stay_leave_nothing_of_the_energy() -> None:
+    """Places, lines and laws of the start: parts close place by place and open again, 1e-7 of what dampers take."""
+    for slices in (3.0, 7.0, 20.0):
+        assert abs(energy_left("deviating", slices=slices, **{"effect.roll_motion": 0.0})) < 2e-6
+
+
 def test_what_a_run_leaves_of_its_energy_is_work_of_the_moving_mesh() -> None:
-    """It is no error of the step, so a third of the step leaves as much (3 %), and twenty parts nearly as much as
-    ten (20 %)."""
+    """It is no error of the step, so a third of the step leaves as much (3 %). What parts leave that ride over uneven
+    flanks falls with their length: twenty leave less than half of three."""
     seven = energy_left(slices=7.0)
     assert energy_left(slices=7.0, h=2.5e-6) == pytest.approx(seven, rel=0.03)
-    assert energy_left(slices=20.0) == pytest.approx(energy_left(slices=10.0), rel=0.2)
+    assert energy_left("deviating", slices=20.0) < 0.5 * energy_left("deviating", slices=3.0)

@@ -28,6 +28,5 @@ def test_any_number_of_parts_finds_equilibrium(name: str, yields: str) -> None:
     kind = KINDS[name]
     found = [stage_te(kind.model(), [kind.torque], POSITIONS, slices=float(n), **YIELDS[yields]) for n in (5, 12, 20)]
     means = np.array([result.te.mean() for result in found])
-    print(name, yields, means)
     assert np.isfinite(means).all()
     assert means[[0, 2]] == pytest.approx(means[1], rel=1e-2)

@@ -79,6 +79,34 @@ def test_no_line_of_the_transmission_error_at_the_parts(slices: int) -> None:
             assert found[order - 1] < 1.5 * near.max(), order
 
 
+def orders_of_a_run(speed: float, slices: int, teeth: int = 23) -> Mapping[str, np.ndarray]:
+    """Amplitudes of orders 0 … 7 of the mesh frequency, by channel of forces; of the settled half of a run."""
+    kind = KINDS["helical"]
+    model = kind.model().driven_by_springs()
+    settings = {"level": float(level_number(model, "fast")), "slices": float(slices)}
+    trace = simulate(model, Steady(model, speed, kind.torque), 16e-3, 20e-6, settings)
+    half = len(trace.time) // 2
+    waves = np.exp(1j * speed * teeth * trace.time[half:, None] * np.arange(13))
+    columns = np.hstack([waves.real, waves.imag[:, 1:]])
+    return {
+        name: np.hypot(found[:8], np.r_[0.0, found[13:20]])
+        for name, channel in trace.channels.items()
+        if name.endswith((".force_mean", ".fx_mean", ".fy_mean", ".fz_mean"))
+        for found in [np.linalg.lstsq(columns, channel.values[half:], rcond=None)[0]]
+    }
+
+
+@pytest.mark.parametrize("speed", [209.0, 400.0])
+def test_orders_of_a_run_hardly_depend_on_the_slices(speed: float) -> None:
+    """Of all forces with 5, 7 and 10: those that reach SHARE of the mean mesh force agree within 3 dB, margin 1.3."""
+    runs = [orders_of_a_run(speed, slices) for slices in (5, 7, 10)]
+    least = SHARE * runs[0]["mesh.force_mean"][0]
+    for name in runs[0]:
+        found = np.array([run[name][1:] for run in runs])
+        low, high = found.min(axis=0), found.max(axis=0)
+        assert (20 * np.log10(high / low)[high > least] < 3.0).all(), (name, found)
+
+
 @pytest.mark.parametrize(
     "name", ["pair", "internal", *(pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train"))]
 )

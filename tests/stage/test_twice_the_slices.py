@@ -14,7 +14,7 @@ from gearfmu.planning.choice import space
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.run.refinement import ORDERS, POSITIONS, left_of_slices, twice
+from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, left_of_slices, twice
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +24,10 @@ def helical() -> StageModel:
 
 
 def test_the_change_is_that_of_two_runs(helical: StageModel) -> None:
-    """The largest change of an order, in metres, and in level of those that change by over a nanometre."""
+    """The largest change of an order, in metres, and in level of those that change by over ten nanometres."""
     left = left_of_slices(helical, [100.0], slices=3)
     three, six = (loaded_te(helical, [100.0], POSITIONS, slices=n).harmonics(ORDERS)[0] for n in (3.0, 6.0))
-    heard = np.abs(six - three) > 1e-9
+    heard = np.abs(six - three) > HEARD
     assert left.slices == 6 and left.length == pytest.approx(np.abs(six - three).max(), rel=1e-12)
     assert left.level == pytest.approx(np.abs(20 * np.log10(six / three))[heard].max(), rel=1e-12)
     assert left.text.startswith("orders 1 to 8 change by at most ") and left.text.endswith(" dB with 6 slices")

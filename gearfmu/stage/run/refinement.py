@@ -15,8 +15,9 @@ from gearfmu.spec.forms.general import Stage, ToothedBody
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.set_te import stage_te
 
-ORDERS, POSITIONS = 8, 24
-HEARD = 1e-9  # m: an order that changes by less is not judged by its level
+ORDERS, POSITIONS = 8, 20
+HEARD = 10e-9  # m: an order that changes by less, a hundredth of the form deviations of the finest flanks (ISO 1328-1,
+# class 1: 1 µm), is not judged by its level
 
 
 def is_helical(stage: Stage) -> bool:
