@@ -6,7 +6,7 @@
 #include "problem/gk_system.h"
 
 static const double B_LOW = 5e-6;     /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
-static const double FOUNDATION = 8.0; /* 1/k over the sum of both bodies' 2 (1 − ν²)/(πE) */
+static const double FOUNDATION = 6.0; /* 1/k over the sum of both bodies' 2 (1 − ν²)/(πE) */
 
 /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
 static void straighten(const gk_engagement *e, gk_laws *law)
