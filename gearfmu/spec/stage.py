@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.spec.forms.bearing_checks import use_problems, uses_of_gears
 from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
@@ -51,6 +52,9 @@ def stage_class(tables: Mapping[str, Any]) -> type[Spec]:
     return kinds.get(tables.get("kind"), StageSpec)
 
 
+ROLLING = "by its rolling bearing"
+
+
 def require_pair(spec: Any) -> None:
     """SpecError unless `spec` is a pair: a verb about one pair, or its gears' files, means nothing else."""
     if spec.kind != "external_pair":
@@ -72,13 +76,15 @@ def _load_pair(layers: Layers) -> StageSpec:
 
 def _pair_problems(spec: StageSpec) -> list[Problem]:
     file = str(spec.source)
-    return geometry_problems(file, spec.pair, spec.gears, spec.torque_max) + _bearing_problems(file, spec)
+    rolling = use_problems(uses_of_gears(spec.gears), spec.bearings, spec.operating)
+    found = [*_bearing_problems(file, spec), *(Problem(file, *entry) for entry in rolling)]
+    return geometry_problems(file, spec.pair, spec.gears, spec.torque_max) + found
 
 
 def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
     """Gears that move along their axes and tilt are held there; both gears of a pair move alike."""
     names = [(gear, field) for gear in spec.gears for field in ("axial", "tilt")]
-    given = [(gear, field) for gear, field in names if getattr(gear.bearing, field) is not None]
+    given = [(gear, field) for gear, field in names if dict(gear.bearing).get(field, ROLLING) is not None]
     if not given and spec.pair.helix_angle == 0:
         return []
     why = "a helical gear" if spec.pair.helix_angle else "a gear whose mate or other direction is held so"

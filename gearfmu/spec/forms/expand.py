@@ -21,7 +21,7 @@ from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque
 from gearfmu.spec.forms.shapes import planet_angles
-from gearfmu.spec.tables.gear import Bearing
+from gearfmu.spec.tables.bearings import Bearing, RollingMount
 
 Body = TypeVar("Body")
 
@@ -59,17 +59,9 @@ def expand_pair(spec: StageSpec) -> Stage:
                 film=spec.contact.film,
             ),
         ),
-        supports=tuple(
-            SupportSpec(
-                name=gear.name,
-                body=gear.name,
-                radial=gear.bearing.stiffness,
-                axial=gear.bearing.axial,
-                tilt=gear.bearing.tilt,
-                damping_ratio=gear.bearing.damping_ratio,
-            )
-            for gear in spec.gears
-        ),
+        supports=tuple(_held(gear.name, gear.bearing) for gear in spec.gears),
+        bearings=spec.bearings,
+        operating=spec.operating,
         ports={g.name: PlacedPort(**dict(spec.ports[g.name]), body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
@@ -206,7 +198,12 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
     )
 
 
-def _held(body: str, bearing: Bearing, **where: Any) -> SupportSpec:
+def _held(body: str, bearing: Bearing | RollingMount, **where: Any) -> SupportSpec:
+    if isinstance(bearing, RollingMount):
+        return SupportSpec(
+            name=body, body=body, bearing=bearing.rolling, span=bearing.span, carries=bearing.carries,
+            damping_ratio=bearing.damping_ratio,
+        )  # fmt: skip
     return SupportSpec(
         name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
         damping_ratio=bearing.damping_ratio, **where,

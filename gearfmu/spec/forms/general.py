@@ -13,6 +13,7 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, RingSpec
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.tables.bearings import Bearings, CatalogueName, LaterFields, OperatingSpec, Side
 from gearfmu.spec.tables.gear import (
     Backlash,
     Bearing,
@@ -177,9 +178,11 @@ class EngagementSpec(Spec):
     )
 
 
-class SupportSpec(Spec):
+class SupportSpec(LaterFields):
     """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
-    free."""
+    free. A rolling bearing has its own stiffness."""
+
+    later = ("bearing", "span", "carries")
 
     name: Name = Field(description="name of the support")
     body: Name = Field(description="body that is held")
@@ -190,13 +193,23 @@ class SupportSpec(Spec):
     axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
     tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
     torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
+    bearing: CatalogueName | None = Field(
+        default=None, description="rolling bearing in place of the stiffnesses: name of a table [bearings.NAME]"
+    )
+    span: Length | None = Field(
+        default=None, description="distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent"
+    )
+    carries: Side | None = Field(
+        default=None,
+        description="axial force of the shaft that an angular contact bearing (of two the left) carries",
+    )
     damping_ratio: Ratio = Field(
         default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
     )
 
     @model_validator(mode="after")
     def _holds(self) -> SupportSpec:
-        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion)):
+        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion, self.bearing)):
             raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
         return self
 
@@ -209,8 +222,10 @@ class PlacedPort(PortSpec):
     node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
 
 
-class Stage(Spec):
+class Stage(LaterFields):
     """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file."""
+
+    later = ("operating", "bearings")
 
     name: Name = Field(description="name of the stage, also of its FMU")
     description: Text = Field(default="", description="one line about the stage")
@@ -224,6 +239,10 @@ class Stage(Spec):
     rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
     engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
     supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
+    bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the supports, by name")
+    operating: OperatingSpec | None = Field(
+        default=None, description="load at which rolling bearings are linearised; needed where there are some"
+    )
     ports: dict[Name, PlacedPort] = Field(description="ports by name")
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
 
@@ -259,9 +278,14 @@ class Stage(Spec):
         alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
         places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
         return alone and all(
-            s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
+            s.axial is None and s.tilt is None and s.to is None and s.bearing is None and s.at in (None, places[s.body])
             for s in self.supports
         )
+
+    @property
+    def rolling(self) -> bool:
+        """Whether rolling bearings hold it, whose stiffness depends on the load."""
+        return any(support.bearing is not None for support in self.supports)
 
     @property
     def even(self) -> bool:
