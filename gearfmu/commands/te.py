@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.models import model_of
 from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_names
 from gearfmu.errors import SimulationError
+
+if TYPE_CHECKING:
+    from gearfmu.stage import StageModel
 
 
 @click.command()
@@ -92,25 +95,24 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
             click.echo(mesh)
         _tell(result)
         if doubled:
-            _tell_slices(model, torques, mesh=mesh, **where)
+            _tell_slices(model, torques, mesh, where)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
     _end(model, torques, failed)
 
 
-def _tell_slices(model: Any, torques: Sequence[float], **where: Any) -> None:
+def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, where: Mapping[str, float]) -> None:
     """What the number of slices of a helical stage leaves open, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
-    left = left_of_slices(
-        model, torques, **{key: of for key, of in where.items() if key not in ("positions", "pitches")}
-    )
+    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches", "rigid_bearings"}}
+    left = left_of_slices(model, torques, None, bool(where["rigid_bearings"]), mesh, **parameters)
     if left is not None:
         click.echo(f"{'':14}{left.text}")
 
 
-def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
+def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
     """The transmission error without load, for the picture; None where it is among those asked for, or not found."""
     from gearfmu.stage import loaded_te
 
@@ -120,14 +122,14 @@ def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
         return None
 
 
-def _end(model: Any, torques: Sequence[float], failed: bool) -> None:
+def _end(model: StageModel, torques: Sequence[float], failed: bool) -> None:
     """Warnings; exit code 1 where a torque has no equilibrium."""
     warn_of_limits(model, torques)
     if failed:
         click.get_current_context().exit(1)
 
 
-def _draw_flanks(model: Any, out: Path) -> None:
+def _draw_flanks(model: StageModel, out: Path) -> None:
     """A picture of the flanks beside the table, where they are not nominal."""
     from gearfmu.report.flanks import write_flanks
 
@@ -136,7 +138,7 @@ def _draw_flanks(model: Any, out: Path) -> None:
         click.echo(str(picture))
 
 
-def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
+def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
     """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
     from gearfmu.stage.run.limits import beyond_limits
 
@@ -162,7 +164,7 @@ def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where:
     write_set_plot(result, picture)
     _tell(result)
     if doubled:
-        _tell_slices(model, torques, **where)
+        _tell_slices(model, torques, None, where)
     for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -47,16 +46,26 @@ class Change:
 
 
 def left_of_slices(
-    model: StageModel, torques: Sequence[float], slices: int | None = None, **where: Any
+    model: StageModel,
+    torques: Sequence[float],
+    slices: int | None = None,
+    rigid_bearings: bool = False,
+    mesh: str | None = None,
+    **parameters: float,
 ) -> Change | None:
     """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
-    where a torque has no equilibrium. where: mesh, bearings and parameters as `stage_te` takes them."""
+    where a torque has no equilibrium. Bearings, mesh and parameters as `stage_te` takes them."""
     own = slices or model.stage.slices
     finer = twice(model.stage, own)
     if finer == own:
         return None
     try:
-        found = [stage_te(model, torques, POSITIONS, slices=float(n), **where).harmonics(ORDERS) for n in (own, finer)]
+        found = [
+            stage_te(model, torques, POSITIONS, rigid_bearings, mesh, 1, slices=float(n), **parameters).harmonics(
+                ORDERS
+            )
+            for n in (own, finer)
+        ]
     except SimulationError:
         return None
     length = np.abs(found[1] - found[0])
