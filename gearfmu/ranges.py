@@ -104,7 +104,7 @@ def _of_kernel() -> Iterator[tuple[str, Range]]:
 
 # name: (row of gk_ranges.h, unit, remedy)
 _KERNEL: dict[str, tuple[str, str, str]] = {
-    "slices": ("SLICES", "", "5 are enough for most gears"),
+    "slices": ("SLICES", "", "5 are enough for most spur gears, 7 for helical ones"),
     "nodes": ("NODES", "", "leave it away: those of the gear's own mesh are taken"),
     "face_width": ("FACE_WIDTH", "m", "check the unit"),
     "strip_half_width": ("STRIP", "m", "1.5 Hertz half-widths at torque_max, some tenths of a millimetre"),

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.models import model_of
 from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_names
 from gearfmu.errors import SimulationError
+
+if TYPE_CHECKING:
+    from gearfmu.stage import StageModel
 
 
 @click.command()
@@ -46,13 +49,20 @@ from gearfmu.errors import SimulationError
 )
 @level_option
 @click.option(
+    "--twice-slices/--once",
+    "doubled",
+    default=None,
+    help="With helical teeth: state what orders 1 to 8 change by with twice the slices, over one pitch. Of itself for "
+    "pairs alone; a train or set takes three times as long with it.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("te.csv"),
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
 )
-def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **where: Any) -> None:
+def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool | None, out: Path, **where: Any) -> None:
     """Loaded transmission error of STAGE over one pitch or more, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of
     every mesh. Mesh stiffness is that of the mesh alone, bores held on their axes; stage stiffness that with shafts and
     bearings.
@@ -66,8 +76,10 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
 
     model = model_of(stage, bores=bore)
     where |= level_of(model, where.pop("level"))
+    if doubled is None:
+        doubled = len(model.stage.engagements) == 1
     if model.stage.carriers:
-        return _of_set(model, list(torques), out, **where)
+        return _of_set(model, list(torques), out, doubled, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
@@ -82,13 +94,25 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         if len(meshes) > 1:
             click.echo(mesh)
         _tell(result)
+        if doubled:
+            _tell_slices(model, torques, mesh, where)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
     _end(model, torques, failed)
 
 
-def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
+def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, where: Mapping[str, float]) -> None:
+    """What the number of slices of a helical stage leaves open, over one pitch."""
+    from gearfmu.stage.run.refinement import left_of_slices
+
+    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches", "rigid_bearings"}}
+    left = left_of_slices(model, torques, None, bool(where["rigid_bearings"]), mesh, **parameters)
+    if left is not None:
+        click.echo(f"{'':14}{left.text}")
+
+
+def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
     """The transmission error without load, for the picture; None where it is among those asked for, or not found."""
     from gearfmu.stage import loaded_te
 
@@ -98,14 +122,14 @@ def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
         return None
 
 
-def _end(model: Any, torques: Sequence[float], failed: bool) -> None:
+def _end(model: StageModel, torques: Sequence[float], failed: bool) -> None:
     """Warnings; exit code 1 where a torque has no equilibrium."""
     warn_of_limits(model, torques)
     if failed:
         click.get_current_context().exit(1)
 
 
-def _draw_flanks(model: Any, out: Path) -> None:
+def _draw_flanks(model: StageModel, out: Path) -> None:
     """A picture of the flanks beside the table, where they are not nominal."""
     from gearfmu.report.flanks import write_flanks
 
@@ -114,7 +138,7 @@ def _draw_flanks(model: Any, out: Path) -> None:
         click.echo(str(picture))
 
 
-def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
+def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
     """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
     from gearfmu.stage.run.limits import beyond_limits
 
@@ -123,7 +147,7 @@ def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
             click.echo(f"warning: {text}", err=True)
 
 
-def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
+def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where: Any) -> None:
     if where["rigid_bearings"]:
         raise click.BadParameter(
             "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
@@ -139,6 +163,8 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     _tell(result)
+    if doubled:
+        _tell_slices(model, torques, None, where)
     for text in above_sharing(result, model.spec.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")

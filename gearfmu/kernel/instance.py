@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gearfmu.kernel.linear import LinearModel
 
 PLACES = 8
-SLICES = 10
+SLICES = 20
 INSTANCES = 256  # value references: 256 × number of the variable + number of its instance
 
 

@@ -10,6 +10,7 @@ from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.effects import EFFECTS, Effect, costs
+from gearfmu.stage.run.refinement import twice
 from gearfmu.study.ladder import SLICES, STEPS, fitting
 
 LEAST_SHARE = 0.03  # of the cost of a step: what saves less stays on
@@ -121,8 +122,9 @@ def space(scene: SceneSpec, model: StageModel, least_share: float = LEAST_SHARE,
     finest = FULL_STEP_OF_SETS if model.stage.carriers else FULL_STEP
     steps = sorted({fitting(step, h) for h in (*STEPS, finest) if h >= finest})
     own = scene.stage.slices
-    slices = tuple(sorted({n for n in SLICES if n < own} | {own}))
-    full = Choice(FULL, fitting(step, finest), own, tuple(sorted(scene.stage.effects.off)))
+    most = twice(model.stage, own)  # a discretisation of helical stages: what all is measured against is finer
+    slices = tuple(sorted({n for n in SLICES if n < own} | {own, most}))
+    full = Choice(FULL, fitting(step, finest), most, tuple(sorted(scene.stage.effects.off)))
     return Space(full, tuple(_knobs(scene, model, least_share, tuple(force))), tuple(steps), slices)
 
 

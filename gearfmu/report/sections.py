@@ -15,6 +15,9 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.stage import assemble
+from gearfmu.stage.run.refinement import left_of_slices
 from gearfmu.stage.run.trace import Trace
 
 WORDS = {  # key of a result: words, channel of the mesh, unit
@@ -200,6 +203,18 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
     return f"{value * scale:.4g} {unit}".strip()
 
 
+def _left_of_slices(run: Run) -> str:
+    """What the number of slices of a helical pair leaves open; "" for other stages, where that takes minutes, and
+    without torque or bodies."""
+    torque = run.summary.get("torque")
+    if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
+        return ""
+    if len(as_general(run.spec).engagements) != 1:
+        return ""
+    left = left_of_slices(assemble(run.spec, run.bodies), [torque], slices=int(run.summary.get("slices") or 0))
+    return left.text if left else ""
+
+
 def accuracy(run: Run) -> list[str]:
     """Errors and cost of the run, and of the fidelity levels of its stage where they were measured."""
     summary, spec, bodies = run.summary, run.spec, run.bodies
@@ -214,6 +229,8 @@ def accuracy(run: Run) -> list[str]:
     if summary.get("exchanged_work_J"):
         lost = _text(summary, "energy_residual")
         rows["Work lost between the stage and its shafts, of the work exchanged"] = lost
+    if change := _left_of_slices(run):
+        rows["Static transmission error, twice the slices"] = change
     parts = [
         page.pairs_table(
             {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
+from gearfmu.stage.run.refinement import twice
 from gearfmu.stage.run.trace import TraceError
 from gearfmu.study.bench import Point, measure
 from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
@@ -38,8 +39,10 @@ class Reference:
 def make_reference(
     scene: SceneSpec, model: StageModel, slices: int, quick: bool = False, progress: Callable[[str], None] | None = None
 ) -> Reference:
-    """Run the scene with ever smaller steps until `reached`, or at most to FINEST."""
+    """Run the scene with ever smaller steps until `reached`, or at most to FINEST; a helical stage with twice the
+    slices."""
     step, tell = scene.coupling.step, progress or (lambda text: None)
+    slices = twice(model.stage, slices)
 
     def run(h: float) -> Signals:
         tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")

@@ -83,7 +83,7 @@ duration = "0.1"
 [stage]
 name = "fzg_c"
 level = "superb"
-slices = 11
+slices = 21
 [coupling]
 step = "100 N"
 mastr = "jacobi"

@@ -47,7 +47,7 @@ class Inner:
         return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
 
     def rows(self, engagement: int, pose: np.ndarray, reach: float = 1e-3) -> np.ndarray:
-        """(k, 27) per place and slice: flank, slice, share of it on both flanks; gap and sliding per motion of the pose
+        """(k, 27) per place and slice: flank, slice, z of its middle (m); gap and sliding per motion of the pose
         (12,): of either gear x, y, φ, z, and tilt about x and y."""
         full, out = (ctypes.c_double * 12)(*pose), (ctypes.c_double * (8 * 64 * 27))()
         count = self._lib.probe_rows(*self._handles(), engagement, full, ctypes.c_double(reach), out)
@@ -58,6 +58,30 @@ class Inner:
         out = (ctypes.c_double * 3)()
         self._lib.probe_law(*self._handles(), ctypes.c_double(curvature), ctypes.c_double(force), out)
         return tuple(out)
+
+    def part(self, opens: np.ndarray, force: float) -> tuple[float, float, float, float]:
+        """Approach (m), slope (m²/N) and energy (J/m) of a part of a line of contact under a line load (N/m), three of
+        whose gaps open by so much more (m) than the least; what it yields per line load beside its law, m²/N."""
+        out = (ctypes.c_double * 4)()
+        self._lib.probe_part(*self._handles(), (ctypes.c_double * 3)(*opens), ctypes.c_double(force), out)
+        return tuple(out)
+
+    def line(self, side: float, rolls: tuple[float, float], functions: int) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (n, 2) of the parts of a line of contact, z in m, by the rolls at mid-width (m) and the side of the
+        flanks, ±1; means (n, functions) of the width functions of gear A."""
+        slices = int(self.kernel.get("slices"))
+        out = (ctypes.c_double * (2 + slices * (2 + functions)))()
+        rolls_of_both = (ctypes.c_double * 2)(*rolls)
+        self._lib.probe_line(*self._handles(), ctypes.c_double(side), rolls_of_both, out)
+        rows = np.array(out[2:]).reshape(slices, -1)
+        assert tuple(out[:2]) == (rows[0, 0], rows[-1, 1]) or np.allclose(out[:2], (rows[0, 0], rows[-1, 1]))
+        return rows[:, :2], rows[:, 2:]
+
+    def spread(self, ends: tuple[float, float], force: float) -> np.ndarray:
+        """(slices,) N: a force that is even between two places z (m) of the width."""
+        out = (ctypes.c_double * int(self.kernel.get("slices")))()
+        self._lib.probe_spread(*self._handles(), (ctypes.c_double * 2)(*ends), ctypes.c_double(force), out)
+        return np.array(out)
 
     def force_gamma(self, gamma: float) -> None:
         """Keep this γ whatever the limit of the step says; after `kernel.initialize`."""

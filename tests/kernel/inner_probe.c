@@ -25,7 +25,7 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
     return found;
 }
 
-/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, share, gradient[12], slide[12]} */
+/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, z of its middle, gradient[12], slide[12]} */
 GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const double *pose, double reach,
                       double *out)
 {
@@ -36,7 +36,9 @@ GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const
     for (int i = 0; i < found; i++)
         for (int strip = 0; strip < setup->strips; strip++, rows++, out += 3 + 2 * POSE) {
             const gk_point *point = gk_point_of(setup, &place[i], strip);
-            out[0] = place[i].flank, out[1] = strip, out[2] = point->share;
+            const gk_mesh *mesh = &setup->mesh[e];
+            out[0] = place[i].flank, out[1] = strip;
+            out[2] = mesh->rides ? 0.5 * (point->end[0] + point->end[1]) : mesh->strip_middle[strip];
             memcpy(out + 3, point->gradient, sizeof point->gradient);
             memcpy(out + 3 + POSE, point->slide, sizeof point->slide);
         }
@@ -57,6 +59,40 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
     out[0] = s.delta[0];
     out[1] = s.yield[0];
     out[2] = s.potential[0];
+}
+
+/* the same of a part of a line of contact; opens: what its further gaps are more than the least */
+GK_API void probe_part(const gk_model *model, const gk_setup *setup, const double *opens, double force, double *out)
+{
+    gk_system s;
+    memset(&s, 0, sizeof s);
+    s.contacts = s.n = 1, s.stride = 4;
+    s.curvature[0] = 100.0, s.force[0] = force;
+    s.width[0] = s.per_width[0] = 1.0;
+    for (int k = 0; k < GAPS - 1; k++) s.opens[k][0] = opens[k];
+    gk_law_set(model, setup, &setup->mesh[0], &s);
+    gk_law_apply(&s);
+    out[0] = s.delta[0], out[1] = s.yield[0], out[2] = s.potential[0], out[3] = setup->mesh[0].yields;
+}
+
+/* ends of the line of contact (z) where both rolls at mid-width are these, then of every part, and the means of the
+ * width functions over it on gear A */
+GK_API void probe_line(const gk_model *model, const gk_setup *setup, double sg, const double *roll, double *out)
+{
+    const gk_line line = gk_strips_line(model, &setup->mesh[0], sg, roll);
+    out[0] = line.end[0], out[1] = line.end[1];
+    out += 2;
+    for (int i = 0; i < setup->strips; i++, out += 2 + model->functions) {
+        const gk_part part = gk_strips_part(setup, &line, i);
+        out[0] = part.end[0], out[1] = part.end[1];
+        gk_strips_row(model, model->engagement[0].gear[0], part.end[0], part.end[1], out + 2);
+    }
+}
+
+/* adds a force that is even between two places of the width to its slices */
+GK_API void probe_spread(const gk_model *model, const gk_setup *setup, const double *end, double force, double *out)
+{
+    gk_strips_spread(setup, &model->engagement[0], end, force, out);
 }
 
 /* μ′: least for which the limit holds */

@@ -139,7 +139,7 @@ def test_schema_of_a_general_stage_accepts_the_train_and_refuses_slips() -> None
     gear = raw["bodies"]["pinion1"]
     wrong = ({"kind": "shaft"}, {"helix_angle": 20}, {"bearing": {"stiffness": "3e8 N/m"}}, {"name": "pinion1"})
     slips = [{"bodies": raw["bodies"] | {"pinion1": gear | slip}} for slip in (*wrong, {"lenght": "1 m"})]
-    slips += [{"bodies": raw["bodies"] | {"Pinion": gear}}, {"engagements": []}, {"slices": 11}]
+    slips += [{"bodies": raw["bodies"] | {"Pinion": gear}}, {"engagements": []}, {"slices": 21}]
     slips += [{"supports": [raw["supports"][0] | {"radial": "stiff"}]}, {"rotors": {"input": {"axis": ["0 mm"]}}}]
     for slip in slips:
         assert not fits(schema, schema, raw | slip), slip

@@ -138,7 +138,7 @@ FIELD_PROBLEMS = [
     ({"name": "FZG C"}, "name", "small letters"),
     ({"kind": "planetary"}, "kind", "external_pair"),
     ({"contact.law": "nodal"}, "contact.law", "line"),
-    ({"contact.slices": 11}, "contact.slices", "must be from 1 to 10"),
+    ({"contact.slices": 21}, "contact.slices", "must be from 1 to 20"),
     ({"ports.wheel.k": None}, "ports.wheel", "needs k and c"),
     ({"ports.wheel.k": "40e3 N*m"}, "ports.wheel.k", "another kind"),
     ({"ports.wheel": None}, "", "[ports.pinion], [ports.wheel]"),

@@ -65,6 +65,14 @@ def test_a_helix_of_the_same_transverse_section_has_the_same_path_of_contact() -
 
 
 @pytest.mark.full
+def test_twice_the_parts_of_its_lines_of_contact() -> None:
+    """Seven and fourteen: every order up to the eighth by 1 dB or 7 nm, margin 1.3."""
+    seven, fourteen = (loaded_te(model_at(WHOLE), [TORQUE], 48, slices=n).harmonics(8)[0] for n in (7.0, 14.0))
+    change = np.abs(20 * np.log10(seven / fourteen))
+    assert np.abs(seven - fourteen)[change > 1.0].max(initial=0.0) < 7e-9
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
 def test_all_forces_and_moments_of_pinion_and_ring_balance(torque: float) -> None:
     """The ring's axis is the stage's origin, the pinion stands on +x. Axial force F_t tan β; a right-handed pinion that

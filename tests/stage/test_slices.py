@@ -1,5 +1,5 @@
-"""Slices of a helical pair: what they yield beside their neighbours (docs/theory.md, eq. 8g′), and lines of contact
-that end at a tip edge inside the face width."""
+"""Parts of lines of contact of a helical pair: what they yield beside their neighbours (docs/theory.md, eq. 8g′), and
+lines that end at a tip edge inside the face width."""
 
 from __future__ import annotations
 
@@ -92,13 +92,14 @@ def test_slices_yield_more_by_themselves_and_as_much_together() -> None:
     assert 1e9 * local * smeared[5, 5] == pytest.approx(2.74, abs=0.02)
 
 
-@pytest.mark.parametrize(("torque", "swing"), [(150.0, 0.1), (450.0, 0.2)])
-def test_te_hardly_depends_on_the_number_of_slices(torque: float, swing: float) -> None:
-    """5, 7 and 10 slices: mean within 0.3 %, peak to peak 10 and 20 %; by width functions alone 20 and 35 %."""
+@pytest.mark.parametrize(("torque", "mean", "swing"), [(150.0, 3e-3, 0.1), (450.0, 4e-3, 0.2)])
+def test_te_hardly_depends_on_the_number_of_slices(torque: float, mean: float, swing: float) -> None:
+    """5, 7 and 10 slices: mean within 0.3 % (0.4 % at over twice the pair's largest torque), peak to peak 10 and 20 %;
+    by width functions alone 20 and 35 %."""
     found = [loaded_te(involute(), (torque,), 16, rigid_bearings=True, slices=float(n)).te[0] for n in (5, 7, 10)]
     means, swings = [te.mean() for te in found], [np.ptp(te) for te in found]
     print(means, swings)
-    assert max(means) < 1.003 * min(means) and max(swings) < (1 + swing) * min(swings)
+    assert max(means) < (1 + mean) * min(means) and max(swings) < (1 + swing) * min(swings)
 
 
 def slice_loads(model: StageModel, torque: float, positions: int) -> np.ndarray:

@@ -246,7 +246,7 @@ def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometr
 
 
 def put_slices(draft: Draft, rack: Rack, width: float) -> None:
-    """Slices across the face: five to a whole overlap ratio of helical gears."""
+    """Slices of helical gears, parts of a line of contact: seven, of long overlaps five to a whole overlap ratio."""
     if rack.beta:
         overlap = width * math.sin(abs(rack.beta)) / (math.pi * rack.m)
-        draft.assume("contact.slices", min(max(5, round(5 * overlap)), 10), "five to a whole overlap ratio")
+        draft.assume("contact.slices", min(max(7, round(5 * overlap)), 20), "seven, or five to a whole overlap ratio")

@@ -93,12 +93,13 @@ GK_INLINE void gk_clear(double *x, int quads)
     if (quads > 1) f(__VA_ARGS__, quads, 1);                                                                           \
     f(__VA_ARGS__, quads, 0);
 
-/* the same for the strips of a place: those of 1, 5 and 10 slices */
+/* the same for the strips of a place: those of 1, 5, 7 and 10 slices */
 #define GK_STRIPPED(strips, f, ...)                                                                                    \
     switch (strips) {                                                                                                  \
     case 1: f(__VA_ARGS__, 1); break;                                                                                  \
     case 3: f(__VA_ARGS__, 3); break;                                                                                  \
     case 5: f(__VA_ARGS__, 5); break;                                                                                  \
+    case 7: f(__VA_ARGS__, 7); break;                                                                                  \
     default: f(__VA_ARGS__, strips);                                                                                   \
     }
 

@@ -2,6 +2,7 @@
  * and their entries in the tables of both sides. In space every strip has its own section. A tooth with an index
  * deviation ε is the same tooth at β + ε (docs/theory.md, eq. 4a). */
 #include "force/gk_flank.h"
+#include "force/gk_parts.h"
 #include "force/gk_section.h"
 
 static const double LEAN = 0.2e-3; /* m: what tilts may close of a gap */
@@ -11,41 +12,6 @@ static gk_posed pair_of(const gk_model *model, const gk_setup *setup, const gk_m
     const gk_engagement *e = &model->engagement[mesh->index];
     return (gk_posed){model, setup,          e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]},
                       pose,  mesh->allowance};
-}
-
-/* What gear A slides past B along the profile of A, per motion of the poses: e = e_p of A, square to n in the section
- */
-static void glide(const gk_posed *q, double sg, const gk_touch *t, double z, gk_point *p)
-{
-    const double ex = sg * t->n[1], ey = -sg * t->n[0];
-    for (int w = 0; w < 2; w++) {
-        const double sense = w ? -1.0 : 1.0, up = z - q->pose[SPACE * w + ZA], *at = t->at[w];
-        double *slide = p->slide + SPACE * w;
-        slide[XA] = sense * ex, slide[YA] = sense * ey, slide[PHIA] = sense * (at[0] * ey - at[1] * ex);
-        slide[ZA] = 0.0, slide[RXA] = -sense * up * ey, slide[RYA] = sense * up * ex;
-    }
-}
-
-/* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves
- * along its axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway
- * between their teeth, so that contact forces are in balance with their moments. */
-static void lean(const gk_posed *q, double sg, const gk_touch *t, double z, gk_point *p)
-{
-    const gk_mesh *mesh = q->mesh;
-    const double nx = mesh->cosine * t->n[0], ny = mesh->cosine * t->n[1], nz = -sg * mesh->sine;
-    p->gap *= mesh->cosine;
-    p->curvature *= mesh->cosine;
-    for (int w = 0; w < 2; w++) {
-        const double sense = w ? 1.0 : -1.0, *pose = q->pose + SPACE * w;
-        const double x = t->at[w][0], y = t->at[w][1], up = z - pose[ZA];
-        double *gradient = p->gradient + SPACE * w;
-        for (int c = 0; c < PLANE; c++) gradient[c] *= mesh->cosine;
-        gradient[ZA] = sense * nz;
-        gradient[RXA] = sense * (y * nz - up * ny);
-        gradient[RYA] = sense * (up * nx - x * nz);
-        for (int c = PLANE; c < SPACE; c++)
-            p->gap += gradient[c] * (pose[c] + (w && c > ZA ? q->e->tilt[c - RXA] : 0.0));
-    }
 }
 
 /* Teeth out of their places (index deviation, ISO 1328-1): flank, roll and base angle turn with the tooth. Returns what
@@ -64,26 +30,10 @@ static double misplace(const gk_posed *q, double sg, const gk_place *p, double b
     return closer;
 }
 
-/* of a strip of both teeth */
+/* of a slice of both teeth */
 static void take_deviations(const gk_posed *q, const gk_place *p, int strip, gk_tooth_flanks *f)
 {
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
-}
-
-/* The section of a part that carries: that of its place on the flank, and in the mean what the gap grows past the tip
- * edges towards its ends */
-static void section_of(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], const gk_part *part,
-                       gk_point *p, gk_touch *t)
-{
-    gk_section_at(q, f, roll, part->flank, p, t);
-    const double gap = p->gap;
-    for (int i = 0; i < 2; i++) {
-        if (part->past[i] == 0.0) continue;
-        gk_point end;
-        gk_touch there;
-        gk_section_at(q, f, roll, part->end[i], &end, &there);
-        p->gap += part->past[i] * (end.gap - gap);
-    }
 }
 
 /* what tilts of both gears may close of a gap */
@@ -94,28 +44,31 @@ static double tilting(const gk_posed *q)
     return q->e->width * angle;
 }
 
-/* Every strip by itself, by its part that carries; 0 when none comes within `search_distance`. Strips of spur teeth
- * with the same deviations have one section. */
-static int strips_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance,
+/* Every slice by itself; 0 when none comes within `search_distance`. Slices of spur teeth with the same deviations have
+ * one section; those of helical ones, for nodal contact, touch where they are nearest to the flanks. */
+static int slices_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance,
                      gk_place *place)
 {
     const gk_flank_side *s = f->side;
     const int spur = q->mesh->helix[0] == 0.0 && q->mesh->helix[1] == 0.0;
+    const double half = 0.5 * q->e->width / q->setup->slices;
     const double *depth[2] = {NULL, NULL};
+    const gk_line line = gk_strips_line(q->model, q->mesh, s->sg, roll);
     gk_point plane;
     gk_touch t;
+    f->open = GK_OPEN;
     place->gap = GK_OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
-        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
+        const double z = q->mesh->strip_middle[i], from = z - half, to = z + half, middle = 0.5 * (from + to);
         take_deviations(q, place, i, f);
         if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
-            section_of(q, f, roll, &part, &plane, &t);
+            gk_section_at(q, f, roll, gk_clamp(gk_clamp(middle, line.edge[0], line.edge[1]), from, to), &plane, &t);
         if (!i && spur && plane.gap - q->mesh->protrusion - tilting(q) > search_distance) return 0;
         *p = plane, depth[0] = f->depth[0], depth[1] = f->depth[1];
-        lean(q, s->sg, &t, part.middle, p);
-        if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, part.middle, p);
-        p->share = part.share;
+        gk_parts_lean(q, s->sg, &t, middle, p);
+        if (GK_ON(q->setup, friction)) gk_parts_glide(q, s->sg, &t, middle, p);
+        p->share = (to - from) / (2.0 * half);
         p->gap += q->mesh->cosine * q->mesh->lead[s->flank][i];
         place->gap = gk_min(place->gap, p->gap);
     }
@@ -131,7 +84,8 @@ static int modulo(int64_t k, int z)
 /* one tooth pair; 0 when it does not come within `search_distance` */
 static int tooth_pair(const gk_posed *q, const gk_flank_side *s, int k, double search_distance, gk_place *p)
 {
-    gk_tooth_flanks f = {s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL, NULL}};
+    gk_tooth_flanks f = {
+        s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL}, {NULL}, {0.0}, GK_OPEN};
     double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
     p->key.flank = p->flank = s->flank;
     p->key.tooth = k;
@@ -139,14 +93,15 @@ static int tooth_pair(const gk_posed *q, const gk_flank_side *s, int k, double s
     p->number[0] = k, p->number[1] = s->shift + s->step * k;
     for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
     if (q->gear[0]->index || q->gear[1]->index) f.closer = misplace(q, s->sg, p, f.beta, roll);
-    if (q->setup->spatial) return strips_of(q, &f, roll, search_distance, p);
+    if (q->mesh->rides) return gk_parts_find(q, &f, roll, search_distance, p);
+    if (q->setup->spatial) return slices_of(q, &f, roll, search_distance, p);
     take_deviations(q, p, 0, &f);
     p->point[0].share = 1.0;
     p->point[0].roll[0] = roll[0], p->point[0].roll[1] = roll[1];
     gk_touch t;
     const int glides = GK_ON(q->setup, friction);
     if (!gk_section(q, &f, &p->point[0], glides ? &t : NULL)) return 0;
-    if (glides) glide(q, s->sg, &t, 0.0, &p->point[0]);
+    if (glides) gk_parts_glide(q, s->sg, &t, 0.0, &p->point[0]);
     p->gap = p->point[0].gap;
     return p->gap < search_distance;
 }

@@ -5,7 +5,8 @@
  * differentiable. */
 #include "problem/gk_system.h"
 
-static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
+static const double B_LOW = 5e-6;     /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
+static const double FOUNDATION = 6.0; /* 1/k over the sum of both bodies' 2 (1 − ν²)/(πE) */
 
 /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
 static void straighten(const gk_engagement *e, gk_laws *law)
@@ -44,16 +45,36 @@ static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh
     law->phi_high = law->high * law->high * (0.5 * secant_high - 0.125 * law->a - 0.5 * law->slope_high) + law->phi_log;
 }
 
+/* Parts of a line of contact close place after place, in the order of their gaps 0 = d₁ ≤ d₂ …: on a foundation of
+ * stiffness k per length the j-th but first closes at f = k (j/Q)(d_{j+1} − mean of d₁ … d_j), Q = GAPS places. */
+static void set_closing(const gk_system *s, int i, gk_laws *law)
+{
+    gk_quad sum = GK_ALL(0.0);
+    for (int j = 1; j < GAPS; j++) {
+        const gk_quad next = *(const gk_quad *)(s->opens[j - 1] + i);
+        law->closes[j - 1] = (j * next - sum) / (GAPS * s->yields);
+        sum += next;
+    }
+}
+
 /* the laws of all contacts of a problem, by their curvatures */
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
 {
     GK_ASSERT(s->contacts >= 0 && s->contacts <= MAX_CONTACTS);
-    for (int i = s->contacts; i % 4; i++) s->curvature[i] = s->curvature[0];
-    for (int i = 0; i < s->contacts; i += 4) set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
+    s->yields = mesh->yields;
+    for (int i = s->contacts; i % 4; i++) {
+        s->curvature[i] = s->curvature[0];
+        for (int k = 0; k < GAPS - 1; k++) s->opens[k][i] = 0.0;
+    }
+    for (int i = 0; i < s->contacts; i += 4) {
+        set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
+        s->law[i / 4].yields = GK_ALL(s->yields);
+        if (s->yields > 0.0) set_closing(s, i, &s->law[i / 4]);
+    }
 }
 
 /* half-widths at which the logarithm begins and ends */
-void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
+void gk_law_bounds(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
     GK_ASSERT(gk_is_engagement(model, mesh->index));
     const gk_engagement *e = &model->engagement[mesh->index];
@@ -62,6 +83,9 @@ void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
     mesh->square_low = B_LOW < 0.5 * widest ? B_LOW * B_LOW : 0.25 * mesh->square_high;
     mesh->log_low = gk_log(mesh->square_low);
     mesh->log_high = gk_log(mesh->square_high);
+    mesh->yields = 0.0;
+    if (mesh->rides && GK_ON(setup, hertz))
+        mesh->yields = FOUNDATION * (model->gear[e->gear[0]].local + model->gear[e->gear[1]].local);
 }
 
 /* ln x of four normal numbers, as gk_log */
@@ -74,6 +98,22 @@ GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
     gk_quad r = GK_ALL(GK_LOG[6]);
     for (int i = 5; i >= 0; i--) r = r * z + GK_LOG[i];
     *out = n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
+}
+
+/* Adds what parts yield of which j of Q places have closed, (Q/j − 1) f/k + mean of d₁ … d_j, as a sum over the
+ * intervals of f between closings; slope and ∫ f dδ likewise. */
+GK_INLINE void add_closing(const gk_laws *law, const gk_quad *f, gk_quad *d, gk_quad *slope, gk_quad *energy)
+{
+    gk_quad from = GK_ALL(0.0);
+    for (int j = 1; j < GAPS; j++) {
+        const gk_quad yield = law->yields * ((double)GAPS / j - 1.0);
+        const gk_quad to = law->closes[j - 1], least = GK_CHOOSE(*f < to, *f, to);
+        const gk_quad here = j > 1 ? GK_CHOOSE(least > from, least, from) : least;
+        *d += yield * (here - from);
+        *energy += 0.5 * yield * (here * here - from * from);
+        *slope += GK_CHOOSE((*f < to) & (here == *f), yield, GK_ALL(0.0));
+        from = to;
+    }
 }
 
 /* δ, δ′ and ∫ λ dδ of four contacts of lengths `width` (per_width: their inverse, 0 where there is none); λ ≤ 0 follows
@@ -95,6 +135,7 @@ GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double
         energy = GK_CHOOSE(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f),
                            GK_CHOOSE(high, energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
     }
+    if (law->yields[0] > 0.0) add_closing(law, &f, &d, &slope, &energy);
     *(gk_quad *)delta = d;
     *(gk_quad *)yield = slope * per;
     *(gk_quad *)potential = energy * *(const gk_quad *)width;

@@ -10,7 +10,9 @@ typedef struct gk_point { /* of a strip */
     double gap, gradient[POSE];
     double slide[POSE];        /* with friction: what gear A slides past B along the profile of A */
     double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
-    double share;              /* of the strip's length that lies on both flanks */
+    double share;              /* of a slice's length: that of a part of a line of contact */
+    double end[2];             /* of a part: its ends, z (m) */
+    double opens[GAPS - 1];    /* of a part: what its further gaps are more than the least, `gap`, m (gk_law.c) */
 } gk_point;
 
 typedef struct gk_place { /* a tooth pair on one flank that may touch, at the predicted poses */

@@ -63,13 +63,16 @@ static double relief(const gk_gear *gear, int on, double s, double *slope)
     return gear->relief * over * over;
 }
 
-/* what a flank has lost to relief and deviations at a length of roll */
-static double depth_of(const gk_posed *q, const gk_tooth_flanks *f, int which, double s, double *slope)
+double gk_section_depth(const gk_posed *q, const gk_tooth_flanks *f, int which, double s, double *slope)
 {
     const double depth = relief(q->gear[which], GK_ON(q->setup, tip_relief), s, slope);
     if (!GK_HAS(flank_deviations) || !f->depth[which]) return depth;
     double own_slope;
-    const double own = gk_deviation_at(q->gear[which], f->depth[which], s, &own_slope);
+    double own = gk_deviation_at(q->gear[which], f->depth[which], s, &own_slope);
+    if (f->next[which]) {
+        double next_slope, next = gk_deviation_at(q->gear[which], f->next[which], s, &next_slope);
+        own += f->part[which] * (next - own), own_slope += f->part[which] * (next_slope - own_slope);
+    }
     *slope += own_slope;
     return depth + own;
 }
@@ -94,7 +97,7 @@ static void flank_contact(const gk_posed *q, const gk_action *l, const gk_tooth_
     p->gradient[XA] = -l->nx, p->gradient[YA] = -l->ny, p->gradient[PHIA] = -l->sg * q->gear[0]->r_b;
     p->gradient[XB] = l->nx, p->gradient[YB] = l->ny, p->gradient[PHIB] = -sense * l->sg * q->gear[1]->r_b;
     for (int i = 0; i < 2; i++) {
-        double slope, depth = depth_of(q, f, i, p->roll[i], &slope);
+        double slope, depth = gk_section_depth(q, f, i, p->roll[i], &slope);
         p->gap += depth;
         if (slope != 0.0) add_roll(p, l, q->gear[i], i, slope);
     }
@@ -140,8 +143,8 @@ static int corner_contact(const gk_posed *q, const gk_action *l, int c, const gk
     double s = other->r_b * l->sg * (beta[o] - nominal - turn);
     double mx = -l->sg * st, my = l->sg * ct;
     const double ux = side * mx, uy = side * my; /* outward normal of the other's flank */
-    double slope_c, slope_o, relief_c = depth_of(q, f, c, tip->s_tip, &slope_c),
-                             relief_o = depth_of(q, f, o, s, &slope_o);
+    double slope_c, slope_o, relief_c = gk_section_depth(q, f, c, tip->s_tip, &slope_c),
+                             relief_o = gk_section_depth(q, f, o, s, &slope_o);
     double fade = 1.0 / (1.0 + own * over / tip->edge);
     p->gap = side * (length - s) - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
@@ -208,6 +211,6 @@ void gk_section_at(const gk_posed *q, const gk_tooth_flanks *f, const double rol
         here.beta[w] = f->beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
     }
     if (gk_section(q, &here, p, t)) return;
-    flank_contact(q, &s->l, &here, s->gap - f->closer + GK_OPEN, p);
+    flank_contact(q, &s->l, &here, s->gap - f->closer + f->open, p);
     flank_touch(q, &s->l, p, t);
 }

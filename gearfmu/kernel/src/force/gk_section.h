@@ -38,6 +38,9 @@ typedef struct gk_tooth_flanks {
     const gk_flank_side *side;
     double beta[2], closer; /* base angles; what the gap loses by the places of the teeth */
     const double *depth[2]; /* along the roll, beside involute and tip relief (eq. 5a); NULL: nothing */
+    const double *next[2];  /* the same at the next place across the width, NULL: at all places … */
+    double part[2];         /* … and the share of the way to it */
+    double open;            /* gap past ends of flanks whose tip edges do not carry, m */
 } gk_tooth_flanks;
 
 /* Where a transverse section touches: direction of the force on B, and the point halfway between the teeth from the
@@ -66,6 +69,8 @@ static inline double gk_base_distance(const gk_posed *q)
 }
 
 GK_HOT gk_flank_side gk_section_side(const gk_posed *q, int flank);
+/* what a flank has lost to relief and deviations at a length of roll, and its slope */
+GK_HOT double gk_section_depth(const gk_posed *q, const gk_tooth_flanks *f, int which, double s, double *slope);
 GK_HOT int gk_section(const gk_posed *q, const gk_tooth_flanks *f, gk_point *p, gk_touch *t);
 GK_HOT void gk_section_at(const gk_posed *q, const gk_tooth_flanks *f, const double roll[2], double z, gk_point *p,
                           gk_touch *t);

@@ -42,6 +42,21 @@ static double te_of(const gk_model *model, const gk_setup *setup, int e, const d
     return A->r_b * (angle[A->rotor] - frame) + mesh->kind * B->r_b * (angle[B->rotor] - frame);
 }
 
+/* forces of a tooth pair on the slices of the width */
+static void spread(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int p, double *slice)
+{
+    const gk_system *s = &engaged->system;
+    const gk_mesh *mesh = &setup->mesh[engaged->index];
+    const gk_engagement *e = &model->engagement[engaged->index];
+    memset(slice, 0, (size_t)setup->slices * sizeof *slice);
+    for (int i = 0; i < s->strips && mesh->rides; i++)
+        gk_strips_spread(setup, e, engaged->place[p].point[i].end, s->force[p * s->strips + i], slice);
+    for (int i = 0; i < setup->slices && !mesh->rides; i++) {
+        const int strip = i < s->strips ? i : setup->slices - 1 - i;
+        slice[i] = s->force[p * s->strips + strip] * e->width / (setup->slices * mesh->strip_width[strip]);
+    }
+}
+
 /* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
  * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of the ports,
  * angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for every
@@ -62,9 +77,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     for (int r = 0; r < model->rotors; r++) angle[r] = GK_OF(data, x)[r];
     angle[model->port[0].rotor] = driven_angle(model, work, 0);
     angle[model->port[1].rotor] = phi_out;
-    const gk_engagement *mesh = &model->engagement[e];
     const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
     *out++ = te_of(model, setup, e, angle, angle);
     *out++ = angle[model->port[0].rotor];
     *out++ = te_of(model, setup, e, angle, GK_OF(data, x));
@@ -72,11 +85,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     for (int p = 0; p < *places; p++, out += 2 + setup->slices) {
         out[0] = engaged->place[p].key.flank;
         out[1] = engaged->place[p].key.tooth;
-        for (int i = 0; i < setup->slices; i++) {
-            const int strip = i < s->strips ? i : setup->slices - 1 - i;
-            out[2 + i] = s->force[p * s->strips + strip] * mesh->width /
-                         (setup->slices * setup->mesh[e].strip_width[strip]);
-        }
+        spread(model, setup, engaged, p, out + 2);
     }
     return GK_OK;
 }

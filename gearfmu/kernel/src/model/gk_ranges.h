@@ -5,7 +5,7 @@
 
 /* counts: they decide how much memory a model can need */
 #define GK_LOW_SLICES 1
-#define GK_HIGH_SLICES 10
+#define GK_HIGH_SLICES 20
 #define GK_LOW_ROTORS 1
 #define GK_HIGH_ROTORS 24
 #define GK_LOW_GEARS 0

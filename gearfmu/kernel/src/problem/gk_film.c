@@ -14,36 +14,39 @@ static const double THIN = 0.999;   /* of the reach: beyond it there is no film 
 static const double SHARPEST = 1.0; /* 1/m: flatter contacts count as that */
 enum { NEWTON_LIMIT = 40 };
 
-static double inverse_root(const gk_film *film, double d) { return 1.0 / sqrt(d + film->cut); }
+static double inverse_root(const gk_film *film, int i, double d) { return 1.0 / sqrt(d + film->cut[i]); }
 
 /* c(d) and I(d) of a row, factors included; u: (d + r)^-½ */
 static double resistance(const gk_film *film, int i, double u)
 {
-    const double far = film->inverse_root;
+    const double far = film->inverse_root[i];
     return film->factor[i] * (u * u * u - far * far * far);
 }
 
 static double impulse(const gk_film *film, int i, double d, double u)
 {
-    const double far = film->inverse_root;
+    const double far = film->inverse_root[i];
     return -film->factor[i] * (2.0 * u + d * far * far * far);
 }
 
 /* ---- the start of the step --------------------------------------------------------------------------------------- */
-static void clear(const gk_mesh *mesh, gk_system *s)
+static void clear(gk_system *s)
 {
     gk_film *film = s->film;
     memset(film, 0, sizeof *film);
-    film->cut = mesh->film_cut;
-    film->inverse_root = inverse_root(film, GK_FILM_REACH);
     s->films = 0;
 }
 
-/* 3√2 π η b R^3/2 */
-static double factor(const gk_mesh *mesh, const gk_system *s, int i)
+/* A film that begins: r, and 3√2 π η b R^3/2 */
+static void begin_film(const gk_mesh *mesh, const gk_system *s, int i)
 {
+    gk_film *film = s->film;
+    double mean = 0.0;
+    for (int k = 0; k < GAPS - 1 && s->yields > 0.0; k++) mean += s->opens[k][i] / GAPS;
+    film->cut[i] = mesh->film_cut + mean;
+    film->inverse_root[i] = inverse_root(film, i, GK_FILM_REACH);
     const double curvature = gk_max(s->curvature[i], SHARPEST);
-    return 13.328648814475098 * mesh->friction.viscosity * s->width[i] / (curvature * sqrt(curvature));
+    film->factor[i] = 13.328648814475098 * mesh->friction.viscosity * s->width[i] / (curvature * sqrt(curvature));
 }
 
 static void stand(gk_system *s)
@@ -62,19 +65,19 @@ void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
     GK_ASSERT(h > 0.0);
     gk_system *s = &work->engaged[e].system;
     gk_film *film = s->film;
-    clear(&setup->mesh[e], s);
+    clear(s);
     film->step = h;
     for (int i = 0; i < s->contacts; i++) {
         const double open = s->g0[i] + gk_solve_quasi_static(s, i);
         if (!s->recalled[i] || !(open > TOUCHES) || !(open < THIN * GK_FILM_REACH)) continue;
-        film->factor[i] = factor(&setup->mesh[e], s, i);
+        begin_film(&setup->mesh[e], s, i);
         film->open[i] = film->left[i] = open;
         film->sinks[i] = 1.0;
         s->damping[i] = 0.0, s->clip[i] = 2; /* the contact damper acts on flanks that touch */
         film->delta0[i] = s->delta[i], film->potential0[i] = s->potential[i];
-        const double u = inverse_root(film, open), at_open = impulse(film, i, open, u);
+        const double u = inverse_root(film, i, open), at_open = impulse(film, i, open, u);
         film->at_open[i] = at_open;
-        film->closes[i] = (at_open - impulse(film, i, 0.0, inverse_root(film, 0.0))) / h;
+        film->closes[i] = (at_open - impulse(film, i, 0.0, inverse_root(film, i, 0.0))) / h;
         s->films++;
     }
     stand(s);
@@ -87,13 +90,13 @@ void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const doub
     GK_ASSERT(rate);
     gk_system *s = &work->engaged[e].system;
     gk_film *film = s->film;
-    clear(&setup->mesh[e], s);
+    clear(s);
     for (int i = 0; i < s->contacts; i++) {
         if (!(rate[i] < 0.0)) continue;
-        film->factor[i] = factor(&setup->mesh[e], s, i);
+        begin_film(&setup->mesh[e], s, i);
         film->open[i] = film->left[i] = GK_FILM_REACH;
         film->speed[i] = -rate[i];
-        film->closes[i] = resistance(film, i, inverse_root(film, 0.0)) * film->speed[i];
+        film->closes[i] = resistance(film, i, inverse_root(film, i, 0.0)) * film->speed[i];
         s->films++;
     }
     stand(s);
@@ -103,15 +106,15 @@ void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const doub
 /* I(d1) = I(d0) − h x by Newton from below: I is concave, so that every iterate stays below the root */
 static void sink(gk_film *film, int i, double x)
 {
-    const double first = resistance(film, i, inverse_root(film, film->open[i]));
+    const double first = resistance(film, i, inverse_root(film, i, film->open[i]));
     double d = film->open[i] - film->step * x / first, u, c = first;
     if (x > 0.0) {
         const double aim = film->at_open[i] - film->step * x;
         d = gk_max(d, 0.0);
         for (int round = 0; round < NEWTON_LIMIT; round++) {
-            u = inverse_root(film, d), c = resistance(film, i, u);
+            u = inverse_root(film, i, d), c = resistance(film, i, u);
             const double move = (aim - impulse(film, i, d, u)) / c;
-            if (!(move > 1e-13 * (d + film->cut))) break;
+            if (!(move > 1e-13 * (d + film->cut[i]))) break;
             d = gk_min(d + move, film->open[i]);
         }
     }
@@ -122,10 +125,10 @@ static void sink(gk_film *film, int i, double x)
 /* c(d)·speed = x */
 static void follow_speed(gk_film *film, int i, double x)
 {
-    const double far = film->inverse_root, pushed = film->factor[i] * film->speed[i];
+    const double far = film->inverse_root[i], pushed = film->factor[i] * film->speed[i];
     const double cube = gk_max(x, 0.0) / pushed + far * far * far, fifth = gk_exp(-5.0 / 3.0 * gk_log(cube));
     film->yields[i] = 2.0 / 3.0 * fifth / pushed;
-    film->left[i] = fifth * cube - film->cut - film->yields[i] * gk_min(x, 0.0);
+    film->left[i] = fifth * cube - film->cut[i] - film->yields[i] * gk_min(x, 0.0);
 }
 
 /* thickness of all films by the present forces; after the forces have been settled */

@@ -39,6 +39,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->width[n] = width * per_cosine;
             s->per_width[n] = 1.0 / s->width[n];
             s->curvature[n] = point->curvature;
+            for (int k = 0; k < GAPS - 1 && mesh->rides; k++) s->opens[k][n] = point->opens[k];
         }
     }
     s->contacts = s->n = n;

@@ -32,6 +32,7 @@ typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 /* local laws of four contacts side by side */
 typedef struct gk_laws {
     gk_quad c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
+    gk_quad yields, closes[GAPS - 1]; /* of parts: gk_mesh.yields; forces at which further places close */
 } gk_laws;
 
 typedef struct gk_system {
@@ -45,6 +46,8 @@ typedef struct gk_system {
     double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
     double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
     double curvature[MAX_STRIDE];                    /* of the contacts, 1/m */
+    double opens[GAPS - 1][MAX_STRIDE];              /* of parts of lines of contact: gk_point.opens, m */
+    double yields;                                   /* gk_mesh.yields; 0: contacts close as a whole */
     gk_laws law[MAX_STRIDE / 4];                     /* laws of the contacts, per metre */
     double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
     double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
@@ -103,11 +106,12 @@ struct gk_island {
 
 /* Squeeze film of an engagement in a step (gk_film.c); zeros in rows without */
 typedef struct gk_film {
-    double step;                /* h; 0: no time passes, the speed of approach is given */
-    double cut, inverse_root;   /* roughness r; (H + r)^-½ */
-    double factor[MAX_STRIDE];  /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
-    double open[MAX_STRIDE];    /* thickness d0 at the start */
-    double speed[MAX_STRIDE];   /* of approach, where that is given */
+    double step;                                      /* h; 0: no time passes, the speed of approach is given */
+    double cut[MAX_STRIDE], inverse_root[MAX_STRIDE]; /* r: roughness, of a part of a line of contact more by the mean
+                                                         of its gaps over the least; (H + r)^-½ */
+    double factor[MAX_STRIDE];                        /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
+    double open[MAX_STRIDE];                          /* thickness d0 at the start */
+    double speed[MAX_STRIDE];                         /* of approach, where that is given */
     double sinks[MAX_STRIDE];   /* 1: time passes, z = λ1 + min(λ1, closes) − λ0 + η: what a film carries is a mean */
     double lift[MAX_STRIDE];    /* 1: z grows by twice the force */
     double at_open[MAX_STRIDE]; /* I(d0) */
@@ -211,7 +215,7 @@ GK_HOT void gk_balance_plain(const gk_island *island);
 GK_HOT void gk_balance_solve(const gk_island *island);
 /* gk_law.c */
 GK_HOT void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s);
-GK_HOT void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
+GK_HOT void gk_law_bounds(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 GK_HOT double gk_law_slope(const gk_system *s, int i, double force);
 GK_HOT void gk_law_apply(gk_system *s);
 #endif

@@ -178,7 +178,7 @@ void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work)
 /* gk_push.c */
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     int gear, flank, tooth, strips;
-    double force[MAX_SLICES], roll[MAX_SLICES];
+    double force[MAX_SLICES], roll[MAX_SLICES], z[MAX_SLICES];
     gk_strip_weights width;
 } gk_strip_load;
 void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *row,

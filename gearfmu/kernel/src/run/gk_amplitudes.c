@@ -6,15 +6,20 @@
 #include "problem/gk_rows.h"
 
 /* forces on the strips of a tooth of one gear of an engagement: contacts press, so outward they pull */
-static double strip_load(const gk_setup *setup, const gk_engaged *engaged, int p, int which, gk_strip_load *load)
+static double strip_load(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int p, int which,
+                         gk_strip_load *load)
 {
     const gk_system *s = &engaged->system;
+    const gk_mesh *mesh = &setup->mesh[engaged->index];
     const gk_place *place = &engaged->place[p];
     double most = 0.0;
     load->flank = place->flank, load->tooth = place->tooth[which];
     for (int strip = 0; strip < s->strips; strip++) {
         load->force[strip] = -gk_reported(s, p * s->strips + strip);
-        load->roll[strip] = gk_point_of(setup, place, strip)->roll[which];
+        const gk_point *point = gk_point_of(setup, place, strip);
+        load->roll[strip] = point->roll[which];
+        load->z[strip] = mesh->rides ? 0.5 * (point->end[0] + point->end[1]) : mesh->strip_middle[strip];
+        if (mesh->rides) gk_strips_row(model, load->gear, point->end[0], point->end[1], load->width[strip]);
         most = gk_max(most, fabs(load->force[strip]));
     }
     return most;
@@ -32,7 +37,7 @@ void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, con
     gk_strip_load load = {.gear = g, .strips = engaged->system.strips};
     gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
     for (int p = 0; p < engaged->places; p++)
-        if (strip_load(setup, engaged, p, which, &load) > 0.0) {
+        if (strip_load(model, setup, engaged, p, which, &load) > 0.0) {
             gk_node_push(model, setup, &load, setup->modal[g].count, work->mode_row, modes);
             gk_node_push_ground(model, setup, e, which, &load, ground);
         }

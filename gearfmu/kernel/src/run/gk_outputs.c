@@ -7,7 +7,20 @@ static const double BROKEN = 0.5; /* of all energy there is: what the balance ma
 static const double LEAK = 0.01;  /* … beside this of what passed the ports: what is left grows with that in any run */
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
-static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
+enum { EVERY_SLICE_IS_A_VARIABLE = 1 / (V_SLICE_20 - V_SLICE_1 + 1 == MAX_SLICES) }; /* gk_variables.inc */
+
+/* adds the force of a contact to those of the slices of the width */
+static void add_slice(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int i, double force,
+                      double *slice)
+{
+    const int strips = engaged->system.strips, e = engaged->index;
+    if (setup->mesh[e].rides)
+        gk_strips_spread(setup, &model->engagement[e], engaged->place[i / strips].point[i % strips].end, force, slice);
+    else
+        slice[i % strips] += force;
+}
+
+static void mesh_outputs(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
     double side[2] = {0, 0}, *v = GK_OF(data, mesh)[e];
@@ -18,7 +31,7 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
         int touches = 0;
         for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
             side[engaged->place[p].flank] += gk_reported(s, i);
-            v[V_SLICE_1 + i % s->strips] += sense * gk_reported(s, i);
+            add_slice(model, setup, engaged, i, sense * gk_reported(s, i), v + V_SLICE_1);
             touches |= gk_solve_touches(s, i);
         }
         pairs += touches;
@@ -145,7 +158,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     for (int r = 0; r < model->rotors; r++)
         GK_OF(data, rotor)[r][V_GEAR_W] = GK_OF(data, v)[r], GK_OF(data, rotor)[r][V_GEAR_PHI] = GK_OF(data, x)[r];
     for (int e = 0; e < model->engagements; e++) {
-        mesh_outputs(&work->engaged[e], data, e);
+        mesh_outputs(model, setup, &work->engaged[e], data, e);
         if (GK_ON(setup, friction)) friction_outputs(&work->engaged[e], data, e);
         joint_outputs(model, setup, work, data, &work->engaged[e].system);
     }

@@ -25,6 +25,7 @@
 #include "force/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_section.c"
+#include "force/gk_parts.c"
 #include "force/gk_flank.c"
 #include "force/gk_turn.c"
 #include "force/gk_field.c"

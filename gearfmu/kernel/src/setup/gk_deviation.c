@@ -27,6 +27,7 @@ void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, co
     const gk_field_of_flanks *field = &gear->flanks;
     const int on = GK_ON(setup, flank_deviations) && field->depth, samples = from == to ? 1 : SAMPLES;
     d->gear = on ? gear : NULL;
+    d->shared = NULL;
     d->lines = field->places > 1 ? lines : 1;
     for (int tooth = 0; on && tooth < 2 * field->teeth; tooth++)
         for (int j = 0; j < d->lines; j++) {
@@ -39,6 +40,14 @@ void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, co
         }
 }
 
+void gk_deviation_share(const gk_setup *setup, const gk_gear *gear, gk_deviation *d)
+{
+    GK_ASSERT(gear && d);
+    d->gear = GK_ON(setup, flank_deviations) && gear->flanks.depth ? gear : NULL;
+    d->lines = gear->flanks.places;
+    d->shared = gear->flanks.depth;
+}
+
 const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int line)
 {
     GK_ASSERT((flank == 0 || flank == 1) && line >= 0);
@@ -46,7 +55,7 @@ const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int
     if (!GK_HAS(flank_deviations) || !d->gear) return NULL;
     const gk_field_of_flanks *field = &d->gear->flanks;
     const int row = ((field->teeth > 1 ? 2 * tooth : 0) + flank) * d->lines + (d->lines > 1 ? line : 0);
-    return d->depth + (size_t)row * (size_t)field->rolls;
+    return (d->shared ? d->shared : d->depth) + (size_t)row * (size_t)field->rolls;
 }
 
 double gk_deviation_at(const gk_gear *gear, const double *line, double roll, double *slope)

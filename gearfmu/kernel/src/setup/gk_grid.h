@@ -15,9 +15,10 @@ enum { POINTS = 20 }; /* of a flank, even in arc length, at which displacements 
 
 /* Deviations of the flanks of a gear as an engagement reads them */
 typedef struct gk_deviation {
-    const gk_gear *gear; /* NULL: involutes */
-    int lines;           /* across the width, strips or layers of nodes; 1: all alike */
-    double *depth;       /* (teeth, 2 flanks, lines, rolls) m */
+    const gk_gear *gear;  /* NULL: involutes */
+    int lines;            /* across the width, strips or layers of nodes; 1: all alike */
+    double *depth;        /* (teeth, 2 flanks, lines, rolls) m */
+    const double *shared; /* the same by the places of the gear's own field, NULL: not used */
 } gk_deviation;
 
 /* Outward displacement at the points of a gear's flanks by its dynamic oscillators */

@@ -233,25 +233,22 @@ static double corner_roll(const gk_node *n, const gk_spot *p)
     return l2 > 0.0 ? sqrt(l2) - (on_ring ? -tip->edge : tip->edge) : 0.0;
 }
 
-/* Where a strip carries at the nominal centre distance: its part on both flanks, with a length of its own */
+/* Where a strip carries: a slice of the width, or at the nominal centre distance a part of the line of contact */
 static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int strip)
 {
     p->z = mesh->strip_middle[strip];
     p->length = n->e->width / n->setup->slices;
     memcpy(p->width, n->weight[strip], sizeof p->width);
-    if (n->e->kind == MESH_FLAT || n->gear->helix == 0.0) return;
+    if (!mesh->rides) return;
     const int own = n->side->which, internal = n->e->kind == MESH_INTERNAL;
     double roll[2];
     roll[own] = p->middle;
     roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
-    const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, strip);
-    if (part.share >= 1.0) return;
-    const double slice = n->e->width / n->setup->slices, half = 0.5 * part.share * slice;
-    const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;
-    const double middle = gk_clamp(part.middle, low, high);
+    const gk_line line = gk_strips_line(n->model, mesh, p->flank ? -1.0 : 1.0, roll);
+    const gk_part part = gk_strips_part(n->setup, &line, strip);
     p->z = part.middle;
-    p->length = 2.0 * half;
-    gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
+    p->length = part.end[1] - part.end[0];
+    gk_strips_row(n->model, n->side->gear, part.end[0], part.end[1], p->width);
 }
 
 /* where the points of a candidate lie */

@@ -75,7 +75,7 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
     double motion[12 + MAX_LOW], all[12 + MAX_LOW] = {0};
     gk_sincos(n.gear->helix, &n.helix_sine, &n.helix_cosine);
     for (int strip = 0; strip < load->strips; strip++) {
-        const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
+        const double roll = load->roll[strip], z = load->z[strip], sg = load->flank ? -1.0 : 1.0;
         gk_spot p = {
             .flank = load->flank, .grid = gk_grid_at(model, n.gear, roll), .nominal = roll, .roll = roll, .z = z};
         p.middle = roll - sg * z * gk_node_tan(n.gear->helix);

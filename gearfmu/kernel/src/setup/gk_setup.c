@@ -304,7 +304,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
         mesh->allowance = (GK_OF(data, mesh)[e][V_BACKLASH] - engagement->nominal_backlash) *
                           gk_base_reach(model, engagement) / distance;
     gk_strips_fill(model, setup, mesh);
-    gk_law_bounds(model, mesh);
+    gk_law_bounds(model, setup, mesh);
     if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
     if (GK_ON(setup, friction) || GK_ON(setup, film)) gk_lubrication_fill(model, data, mesh);
     if (setup->nodal) gk_nodal_fill(model, setup, data, mesh);

@@ -15,6 +15,7 @@ enum {
     OSCILLATOR_STATE = 4, /* q, v, f, f_rate */
     GAMMAS = 25,          /* γ is known at h·2^(−i/4) */
     MAX_CANDIDATES = 24,  /* tooth pairs that can be near contact at any position, both flanks */
+    GAPS = 4,             /* places along a part of a line of contact at which its gap is known */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
     FIRST_PATTERN = 8,  /* of a gear's patterns on the ground group: rigid motions and ports come before */
     MOST_PATTERNS = 40, /* those in front included */
@@ -108,11 +109,14 @@ typedef struct gk_side {
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
 } gk_side;
 
-typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
-    double middle, share; /* share: of the strip's length, never 0 */
-    double flank;         /* its place on both flanks that is nearest to its middle, else the one next to them */
-    double end[2];        /* its ends */
-    double past[2];       /* share in its mean gap of what the gap grows from there to an end past a tip edge */
+typedef struct gk_line {    /* of contact of a tooth pair, z (m) in the engagement's width */
+    double end[2], edge[2]; /* its ends; tip edges */
+    double missing;         /* of the least length, 0 … 1: the pair has left its flanks, or is about to reach them */
+} gk_line;
+
+typedef struct gk_part { /* of a line of contact, or a slice of the width; z (m) */
+    double end[2], middle;
+    double flank; /* its place on both flanks that is nearest to its middle, else the one next to them */
 } gk_part;
 
 typedef enum gk_friction_law { FRICTION_CONSTANT, FRICTION_BENEDICT_KELLEY, FRICTION_ISO_TR_14179 } gk_friction_law;
@@ -156,6 +160,8 @@ typedef struct gk_mesh { /* an engagement */
     gk_deviation deviation[2];     /* of gear A and of gear B, by strip */
     double protrusion;             /* what places of teeth and flanks may close of a gap, m */
     int runs_out;                  /* a toothing does not run true */
+    int rides;     /* strips are parts of the line of contact and move with it, not slices of the width */
+    double yields; /* 1/k: what a part yields more, before all of it has closed (gk_law.c), m²/N */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high;                               /* bounds of b² in the local law, and their ln */
     gk_nodes nodes[2];                          /* nodal contact: of gear A and of gear B */
@@ -321,6 +327,8 @@ double gk_strips_lead(const gk_gear *gear, int flank, double x);
 size_t gk_deviation_size(const gk_gear *gear, int lines);
 void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, const double *from, const double *to,
                        gk_deviation *d);
+/* the field itself: its lines are its places across the width */
+void gk_deviation_share(const gk_setup *setup, const gk_gear *gear, gk_deviation *d);
 /* depth along the roll of a flank, NULL: an involute; its value (m) and slope at a length of roll, straight beyond the
  * ends of the flank */
 const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int line);
@@ -332,8 +340,9 @@ void gk_runout_turn(const double *turn, double *gradient);
 void gk_runout_follow(const double *turn, double *motion);
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
-gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
-                       const double roll[2], int strip);
+gk_line gk_strips_line(const gk_model *model, const gk_mesh *mesh, double sg, const double roll[2]);
+gk_part gk_strips_part(const gk_setup *setup, const gk_line *line, int strip);
+void gk_strips_spread(const gk_setup *setup, const gk_engagement *e, const double end[2], double force, double *slice);
 void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
 /* entries of whole quads that hold n */
 static inline int gk_padded(int n)

@@ -2,6 +2,8 @@
  * functions of the bodies. */
 #include "setup/gk_setup.h"
 
+static const double LEAST_SHARE = 0.02; /* of the face width: length of a line that begins or has ended */
+
 /* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row
  * of twice the length. */
 int gk_strips_mirrored(const gk_model *model)
@@ -61,59 +63,67 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
         row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
 }
 
-/* Past a tip edge the gap grows as the square of the distance from it, here from … to. Its mean over a part of `length`
- * that ends there, between what it is at the part's place on the flank, or next to it, and at the end. */
-static double mean_past(double from, double to, double length)
+/* The line of contact of a tooth pair where the rolls of both flanks at mid-width are `roll`: between the end faces and
+ * the tip edges, and past these by what their edges carry. A roll at z is s + sg z tan β_b, β_b of its own gear. Of a
+ * pair that has left its flanks the end next to them. */
+gk_line gk_strips_line(const gk_model *model, const gk_mesh *mesh, double sg, const double roll[2])
 {
-    if (!(to > 0.0)) return 0.0;
-    const double share = from < 0.0 ? to / length : 1.0;
-    from = gk_max(from, 0.0);
-    return share * (to + 2.0 * from) / (3.0 * (to + from));
-}
-
-/* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks
- * and past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s +
- * sg z tan β_b, β_b of its own gear. */
-gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
-                       const double roll[2], int strip)
-{
-    GK_ASSERT(strip >= 0 && strip < setup->strips);
     GK_ASSERT(sg == 1.0 || sg == -1.0);
-    static const double LEAST_SHARE = 0.02; /* of a strip that has left its flanks */
     const gk_engagement *e = &model->engagement[mesh->index];
-    const double half = 0.5 * e->width / setup->slices, middle = mesh->strip_middle[strip];
-    double from = middle - half, to = middle + half, low = -INFINITY, high = INFINITY; /* low, high: tip edges */
+    const double half = 0.5 * e->width, least = LEAST_SHARE * e->width;
+    gk_line line = {.end = {-half, half}, .edge = {-INFINITY, INFINITY}};
     for (int w = 0; w < 2; w++) {
         const double slope = sg * mesh->helix[w], edge = model->gear[e->gear[w]].s_tip - roll[w];
         if (slope == 0.0) continue;
         const double end = (edge + mesh->past[w]) / slope;
         if ((slope > 0.0) == (w == 0 || e->kind != MESH_INTERNAL))
-            to = gk_min(to, end), high = gk_min(high, edge / slope);
+            line.end[1] = gk_min(line.end[1], end), line.edge[1] = gk_min(line.edge[1], edge / slope);
         else
-            from = gk_max(from, end), low = gk_max(low, edge / slope);
+            line.end[0] = gk_max(line.end[0], end), line.edge[0] = gk_max(line.edge[0], edge / slope);
     }
-    gk_part part = {.middle = gk_clamp(0.5 * (from + to), middle - half, middle + half),
-                    .share = gk_max((to - from) / (2.0 * half), LEAST_SHARE)};
-    const double length = 2.0 * half * part.share;
-    part.end[0] = part.middle - 0.5 * length, part.end[1] = part.middle + 0.5 * length;
-    part.flank = part.middle;
-    if (!(low < high)) return part; /* nothing of it is on both flanks anywhere */
-    part.flank = gk_clamp(gk_clamp(part.middle, low, high), part.end[0], part.end[1]);
-    part.past[0] = mean_past(low - part.end[1], low - part.end[0], length);
-    part.past[1] = mean_past(part.end[0] - high, part.end[1] - high, length);
+    const double length = line.end[1] - line.end[0];
+    line.missing = gk_max(0.0, 1.0 - length / least);
+    if (line.missing == 0.0) return line;
+    const double middle = gk_clamp(0.5 * (line.end[0] + line.end[1]), 0.5 * least - half, half - 0.5 * least);
+    line.end[0] = middle - 0.5 * least, line.end[1] = middle + 0.5 * least;
+    return line;
+}
+
+/* One of the equal parts of a line, which move and grow with it */
+gk_part gk_strips_part(const gk_setup *setup, const gk_line *line, int strip)
+{
+    GK_ASSERT(strip >= 0 && strip < setup->strips);
+    const double length = (line->end[1] - line->end[0]) / setup->strips;
+    gk_part part;
+    for (int i = 0; i < 2; i++) part.end[i] = line->end[0] + (strip + i) * length;
+    part.middle = part.flank = 0.5 * (part.end[0] + part.end[1]);
+    if (line->edge[0] < line->edge[1]) part.flank = gk_clamp(part.middle, line->edge[0], line->edge[1]);
+    part.flank = gk_clamp(part.flank, part.end[0], part.end[1]);
     return part;
 }
 
-/* The tip edge carries a line of contact on past the end of its flank: by the half-width of the load strip, over
- * which the contact patch leaves the flank; farther where a slice spans less roll than that, without end for spur
- * teeth, whose strips leave the flank as a whole. Longer parts of coarse slices would carry at the gap of their
- * middle alone. */
+/* adds a force that is even between two places of the width to those of its fixed slices */
+void gk_strips_spread(const gk_setup *setup, const gk_engagement *e, const double end[2], double force, double *slice)
+{
+    GK_ASSERT(end[0] < end[1] && slice);
+    const double per = setup->slices / e->width, from = per * end[0] + 0.5 * setup->slices,
+                 to = per * end[1] + 0.5 * setup->slices; /* in slices from the face z < 0 on */
+    const int first = (int)gk_clamp(from, 0.0, setup->slices - 1), last = (int)gk_clamp(to, 0.0, setup->slices - 1);
+    for (int i = first; i <= last; i++) {
+        const double low = i == first ? from : i, high = i == last ? to : i + 1;
+        slice[i] += force * (high - low) / (to - from);
+    }
+}
+
+/* The tip edge carries a line of contact on past the end of its flank, by one and a half half-widths of the load patch,
+ * to where the gap of the edge is about what deflections are; without end for spur teeth, which leave the flank as a
+ * whole. Without contact of tip edges the line ends with its flank. */
 static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
 {
     if (!GK_ON(setup, tip_contact) || e->kind == MESH_FLAT) return 0.0;
-    const double span = fabs(helix) * e->width / setup->slices, least = 1e-6;
+    const double span = fabs(helix) * e->width, least = 1e-6, reach = 1.5 * gear->strip;
     const double outwards = gear->s_tip > gear->s_form ? 1.0 : -1.0;
-    return outwards * gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
+    return outwards * reach * gk_max(1.0, reach / gk_max(span, least));
 }
 
 /* a gear's lead at x, −1 … 1 of its half-width */
@@ -137,7 +147,7 @@ static double lead_over(const gk_gear *gear, int flank, double from, double to)
     return sum / SAMPLES;
 }
 
-/* what both gears' flanks are beside involutes, and how far they may reach out */
+/* what both gears' flanks are beside involutes, and how far they may reach out; parts of a line find theirs by z */
 static void fill_deviations(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
@@ -151,7 +161,10 @@ static void fill_deviations(const gk_model *model, const gk_setup *setup, gk_mes
             for (int flank = 0; flank < 2 && GK_ON(setup, flank_deviations); flank++)
                 mesh->lead[flank][s] += lead_over(gear, flank, from[s], to[s]);
         }
-        gk_deviation_fill(setup, gear, setup->strips, from, to, &mesh->deviation[w]);
+        if (mesh->rides)
+            gk_deviation_share(setup, gear, &mesh->deviation[w]);
+        else
+            gk_deviation_fill(setup, gear, setup->strips, from, to, &mesh->deviation[w]);
         mesh->protrusion += (GK_HAS(pitch_errors) ? gear->index_most : 0.0) +
                             (GK_ON(setup, flank_deviations) ? gear->flanks.most : 0.0);
         mesh->runs_out |= GK_ON(setup, runout) && gear->runout;
@@ -164,6 +177,7 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
     GK_ASSERT(setup->strips >= 1 && setup->strips <= MAX_SLICES);
     const gk_engagement *e = &model->engagement[mesh->index];
     mesh->strip_term = 0.0;
+    mesh->rides = setup->spatial && !setup->nodal && e->kind != MESH_FLAT && model->gear[e->gear[0]].helix != 0.0;
     gk_sincos(model->gear[e->gear[0]].helix, &mesh->sine, &mesh->cosine);
     for (int s = 0; s < setup->strips; s++)
         mesh->strip_width[s] = e->width / setup->slices *

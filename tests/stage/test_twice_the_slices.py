@@ -1,0 +1,61 @@
+"""Slices of helical stages as a discretisation: what te, reports and plans say of their number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import cli
+from gearfmu.body import load_bodies
+from gearfmu.cosim.scene_run import stage_model
+from gearfmu.planning.choice import space
+from gearfmu.spec.scene import load_scene
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, left_of_slices, twice
+
+
+@pytest.fixture(scope="module")
+def helical() -> StageModel:
+    demo = load_stage("helical_demo")
+    return assemble(demo, load_bodies(demo))
+
+
+def test_the_change_is_that_of_two_runs(helical: StageModel) -> None:
+    """The largest change of an order, in metres, and in level of those that change by over ten nanometres."""
+    left = left_of_slices(helical, [100.0], slices=3)
+    three, six = (loaded_te(helical, [100.0], POSITIONS, slices=n).harmonics(ORDERS)[0] for n in (3.0, 6.0))
+    heard = np.abs(six - three) > HEARD
+    assert left.slices == 6 and left.length == pytest.approx(np.abs(six - three).max(), rel=1e-12)
+    assert left.level == pytest.approx(np.abs(20 * np.log10(six / three))[heard].max(), rel=1e-12)
+    assert left.text.startswith("orders 1 to 8 change by at most ") and left.text.endswith(" dB with 6 slices")
+
+
+def test_spur_stages_have_nothing_to_say(plain: StageModel) -> None:
+    assert left_of_slices(plain, [302.0]) is None and twice(plain.stage, 5) == 5
+
+
+def test_no_more_slices_than_a_model_takes(helical: StageModel) -> None:
+    assert [twice(helical.stage, n) for n in (1, 7, 10, 14, 20)] == [2, 14, 20, 20, 20]
+    assert left_of_slices(helical, [100.0], slices=20) is None
+
+
+def test_te_says_what_the_slices_leave_open(
+    helical: StageModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of the stage as it was asked for: with held axes here."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["te", "helical_demo", "--torque", "100 N*m", "--positions", "4", "--rigid-bearings"])
+    said = left_of_slices(helical, [100.0], rigid_bearings=True).text
+    assert not ended.value.code and said in capsys.readouterr().out and "14 slices" in said
+
+
+@pytest.mark.parametrize(("name", "times"), [("train_runup", 2), ("pair_loaded", 1)])
+def test_plans_measure_against_twice_the_slices_of_helical_stages(name: str, times: int) -> None:
+    scene = load_scene(name)
+    found = space(scene, stage_model(scene))
+    own = scene.stage.slices
+    assert found.full.slices == times * own == max(found.slices) and own in found.slices
