@@ -23,6 +23,7 @@ from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.build.rolling import SETTLED, Settled
 from gearfmu.stage.run.bearings import stage_bearings
+from gearfmu.stage.run.limits import beyond_limits
 
 TRAIN, PAIR = "two_stage/stage_bearings", "helical_demo/stage_bearings"
 
@@ -220,6 +221,12 @@ def test_bearings_belong_to_the_model() -> None:
     ]
     models = [model(PAIR), *(assemble(other, bodies) for other in others)]
     assert len({own.hash for own in models}) == len({own.guid for own in models}) == 3
+
+
+def test_a_run_far_from_the_operating_torque_is_told_so() -> None:
+    for torque, said in ((100.0, False), (60.0, False), (199.0, False), (45.0, True), (-100.0, True)):
+        assert any("linearised at 100 N·m" in text for text in beyond_limits(model(PAIR), torque)) == said
+    assert not beyond_limits(assemble(*loaded("helical_demo")), 30.0)
 
 
 # ---- the table ------------------------------------------------------------------------------------------------------
