@@ -178,7 +178,7 @@ class Rolling:
     @property
     def directions(self) -> tuple[int, ...]:
         """Those of x, y, z, θx, θy in which it can carry."""
-        along = any(isinstance(row.law, Balls) for row in self.rows)
+        along = any(isinstance(row.law, Balls) or row.law.contact_angle > 0.0 for row in self.rows)
         return (0, 1, 2, 3, 4) if along else (0, 1, 3, 4)
 
     def energy(self, d: np.ndarray) -> float:

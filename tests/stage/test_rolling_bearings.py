@@ -16,7 +16,7 @@ from gearfmu.modes.linear import Linearised
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.bearings import OperatingSpec
+from gearfmu.spec.tables.bearings import OperatingSpec, RollerBearing
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.assembly import settled, tangents_of
 from gearfmu.stage.build.blob import read_blob
@@ -111,6 +111,22 @@ def test_without_load_only_preload_holds() -> None:
         assert own.rests[name].load == pytest.approx(np.zeros(5), abs=1e-6)
         assert own.tangents[name] == pytest.approx(bearing.stiffness(np.zeros(5)), rel=1e-9, abs=1e-3)
         assert own.rests[name].loads.min() > 0.0  # all balls are pressed
+
+
+def test_tapered_rollers_are_stiffer_than_balls() -> None:
+    """Line contact in place of point contact, equal arrangement and preload; loads of the mesh are the same."""
+    spec, bodies = loaded(PAIR)
+    tapers = {
+        name: RollerBearing(
+            kind="roller", bore=own.bore, outside=own.outside, width=0.018, contact_angle=0.26, preload=300.0
+        )
+        for name, own in spec.bearings.items()
+    }
+    own, balls = settled(spec.model_copy(update={"bearings": tapers}), bodies), found(PAIR)
+    for name in ("pinion", "wheel"):
+        assert own.rests[name].load[:3] == pytest.approx(balls.rests[name].load[:3], rel=2e-3)
+        assert own.tangents[name].shape == (5, 5)
+        assert (np.diag(own.tangents[name])[:2] > np.diag(balls.tangents[name])[:2]).all()
 
 
 def test_an_axial_load_on_the_open_side_is_refused() -> None:
