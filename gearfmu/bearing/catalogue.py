@@ -46,8 +46,9 @@ def filled_ball(bore: float, outside: float, known: Mapping[str, float | int | N
 def filled_roller(
     bore: float, outside: float, known: Mapping[str, float | int | None], **fixed: float
 ) -> Filled[Rollers]:
-    """A cylindrical roller bearing of that bore and outside diameter, m. known: rollers, roller_diameter,
-    roller_length, pitch_diameter, None where unknown, and the width of the bearing; fixed: clearance, m."""
+    """A cylindrical or tapered roller bearing of that bore and outside diameter, m. known: rollers, roller_diameter,
+    roller_length, pitch_diameter, None where unknown, and the width of the bearing; fixed: contact_angle, rad, and
+    clearance, m."""
     diameter = _or(known, "roller_diameter", 0.27 * (outside - bore))
     pitch = _or(known, "pitch_diameter", 0.5 * (bore + outside))
     count = math.floor(_CAGED["rollers"] * math.pi / math.asin(min(diameter / pitch, 1.0)))

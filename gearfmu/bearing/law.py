@@ -3,7 +3,7 @@
 d = (x, y, z, θx, θy), m and rad, is the motion of the inner ring against the outer at the centre of the bearing, z
 along the axis. Every rolling element j at the angle φ_j is a spring between the rings,
 
-    U(d) = Σ_j u(δ_j),    F = ∂U/∂d,    K = ∂²U/∂d²
+    U(d) = Σ_j u(δ_j),    F = dU/dd,    K = d²U/dd²
 
 F is the force of the inner ring on the outer, K is symmetric and no eigenvalue is negative. Of a ball (ISO/TS
 16281:2008, 5.2) δ is the growth of the distance A of the groove centres, with c = cos φ, s = sin φ and the operating
@@ -178,7 +178,7 @@ class Rolling:
     @property
     def directions(self) -> tuple[int, ...]:
         """Those of x, y, z, θx, θy in which it can carry."""
-        along = any(isinstance(row.law, Balls) for row in self.rows)
+        along = any(isinstance(row.law, Balls) or row.law.contact_angle > 0.0 for row in self.rows)
         return (0, 1, 2, 3, 4) if along else (0, 1, 3, 4)
 
     def energy(self, d: np.ndarray) -> float:

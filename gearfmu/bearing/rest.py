@@ -77,12 +77,12 @@ def preloaded(row: Row, preload: float) -> Row:
     centred = replace(row, push=0.0)
     if preload == 0.0:
         return centred
-    if not isinstance(row.law, Balls):
+    if not isinstance(row.law, Balls) and row.law.contact_angle == 0.0:
         raise NoRestError("cylindrical rollers carry nothing along the axis")
     alone = Rolling((replace(centred, offset=0.0, side=1),))
     low, high = 0.0, row.law.diameter * _FARTHEST
     if alone.force(np.array([0.0, 0.0, high, 0.0, 0.0]))[2] < preload:
-        raise NoRestError("the preload presses the balls out of their grooves")
+        raise NoRestError("the preload is beyond what the bearing can carry")
     for _ in range(200):
         middle = 0.5 * (low + high)
         enough = alone.force(np.array([0.0, 0.0, middle, 0.0, 0.0]))[2] > preload

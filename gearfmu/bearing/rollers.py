@@ -1,13 +1,17 @@
-"""Law of cylindrical roller bearings: every roller in slices (ISO/TS 16281:2008, 5.3).
+"""Law of cylindrical and tapered roller bearings: every roller in slices (ISO/TS 16281:2008, 5.3).
 
 Slice k of roller j, at x_k along the roller, with the profile P of the standard,
 
     δ_jk = (x c + y s + x_k (θy c − θx s) − ½ s_r − 2 P(x_k))₊,    u = 9/19 c_L δ^19/9 / n_s
     c_L = 35948 L^8/9    (N, mm)
+
+of cylindrical rollers. A taper has the contact angle α; its slices lie at x_k cos α along the axis and at the radius
+r_k = ½ D_pw − x_k sin α, and press along (cos α, sin α) in the axial section. Flanges are left out.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,8 +28,9 @@ _SHORT = 2.5  # length over diameter up to which the whole roller is profiled
 
 @dataclass(frozen=True)
 class Rollers:
-    """diameter, length: of the rollers, m, without their chamfers; pitch_diameter: m; clearance: radial, in operation,
-    m, negative: interference. They carry across the axis only."""
+    """diameter, length: of the rollers, m, at their middle and without their chamfers; pitch_diameter: m; clearance:
+    radial, in operation, m, negative: interference; contact_angle: rad, 0: cylindrical, carries across the axis
+    only."""
 
     count: int
     diameter: float
@@ -56,10 +61,12 @@ class Rollers:
         """See `law.Law`. n_s springs an element, the slices of one side by side."""
         c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
         of_slices = np.zeros((angles.size, SLICES, 5))
-        of_slices[..., 0], of_slices[..., 1] = c, s
-        of_slices[..., 3], of_slices[..., 4] = -self.places * s, self.places * c
+        cosine, sine = math.cos(self.contact_angle), math.sin(self.contact_angle)
+        arm = self.places - self.pitch_diameter / 2 * sine
+        of_slices[..., 0], of_slices[..., 1], of_slices[..., 2] = cosine * c, cosine * s, sine
+        of_slices[..., 3], of_slices[..., 4] = -arm * s, arm * c
         slope = of_slices.reshape(-1, 5)
-        lost = np.tile(self.clearance / 2 + 2 * self.profile, angles.size)
+        lost = np.tile(self.clearance / 2 * cosine + 2 * self.profile - push * sine, angles.size)
         delta = np.maximum(slope @ d - lost, 0.0)
         c_slice = self.stiffness / SLICES
         return Elements(
@@ -76,6 +83,6 @@ class Rollers:
 
     def pressure(self, springs: Elements) -> float:
         """See `law.Law`. On the inner ring, where the relative radius is smaller."""
-        gamma = self.diameter / self.pitch_diameter
+        gamma = self.diameter * math.cos(self.contact_angle) / self.pitch_diameter
         most = float(springs.load.max(initial=0.0)) * SLICES / self.length
         return line_pressure(most, self.diameter / 2 * (1 - gamma))

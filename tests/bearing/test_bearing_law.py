@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bearings import ANGULAR, AT, DEEP, KINDS, ROLLERS, load
+from bearings import ANGULAR, AT, DEEP, KINDS, ROLLERS, TAPER, load
 
 from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, Row, filled_ball, pass_orders, pass_swing, rest
 from gearfmu.bearing.hertz import line_pressure, point
@@ -24,17 +24,17 @@ PRINTED = [
     (load(0, 0, 0, 1), 0, (0, 0, 3.6957)),
     (load(1000, 0, 1000, 1), 10, (19.7144, 146.3084, 2.7239)),
 ]
-# Harris, Rolling Bearing Analysis, 4th ed., table 7.1: ε, J_r and J_a of point contact, J_r of line contact
+# Harris, Rolling Bearing Analysis, 4th ed., table 7.1: ε, J_r and J_a of point contact, J_r and J_a of line contact
 INTEGRALS = [
-    (0.2, 0.1590, 0.1707, 0.1737),
-    (0.3, 0.1892, 0.2110, 0.2055),
-    (0.4, 0.2117, 0.2462, 0.2286),
-    (0.5, 0.2288, 0.2782, 0.2453),
-    (0.6, 0.2416, 0.3084, 0.2568),
-    (0.7, 0.2505, 0.3374, 0.2636),
-    (0.8, 0.2559, 0.3658, 0.2658),
-    (0.9, 0.2576, 0.3945, 0.2628),
-    (1.0, 0.2546, 0.4244, 0.2523),
+    (0.2, 0.1590, 0.1707, 0.1737, 0.1885),
+    (0.3, 0.1892, 0.2110, 0.2055, 0.2334),
+    (0.4, 0.2117, 0.2462, 0.2286, 0.2728),
+    (0.5, 0.2288, 0.2782, 0.2453, 0.3090),
+    (0.6, 0.2416, 0.3084, 0.2568, 0.3433),
+    (0.7, 0.2505, 0.3374, 0.2636, 0.3766),
+    (0.8, 0.2559, 0.3658, 0.2658, 0.4098),
+    (0.9, 0.2576, 0.3945, 0.2628, 0.4439),
+    (1.0, 0.2546, 0.4244, 0.2523, 0.4817),
 ]
 
 
@@ -69,8 +69,8 @@ def test_printed_deflections(force: np.ndarray, clearance: float, printed: tuple
 def test_integrals_of_load_distribution(which: tuple[float, ...]) -> None:
     """F_r = Z Q_max J_r cos α, F_a = Z Q_max J_a sin α (Sjövall). Angles hardly change under small loads; ε is
     ½ (1 + δ_a tan α / δ_r), without axial displacement ½ (1 − s/(2 δ_r)). Line contact has the exponent 10/9 here, 1.1
-    in the table: up to 5e-4."""
-    epsilon, radial, axial, of_line = which
+    in the table: J_r up to 5e-4, J_a 1.9e-3."""
+    epsilon, radial, axial, of_line, along_line = which
     alpha, most, turned = ANGULAR.contact_angle, 1e-9, 2 * epsilon - 1
     across = most / math.cos(alpha) / (1 + turned)
     d = load(across, 0, turned * across / math.tan(alpha))
@@ -78,7 +78,12 @@ def test_integrals_of_load_distribution(which: tuple[float, ...]) -> None:
     force, largest = bearing.force(d), bearing.loads(d).max() * ANGULAR.count
     assert force[0] / largest / math.cos(alpha) == pytest.approx(radial, abs=1e-4)
     assert force[2] / largest / math.sin(alpha) == pytest.approx(axial, abs=1e-4)
+    taper, alpha = Straight(17, 8e-3, 46e-3, 10e-3, 0.0, math.radians(20.0)), math.radians(20.0)
     across = 1e-5 / (1 + turned)
+    bearing, d = row(taper).spread(200), load(across, 0, turned * across / math.tan(alpha))
+    force, largest = bearing.force(d), bearing.loads(d).max() * taper.count
+    assert force[0] / largest / math.cos(alpha) == pytest.approx(of_line, abs=6e-4)
+    assert force[2] / largest / math.sin(alpha) == pytest.approx(along_line, abs=2e-3)
     line = row(Straight(12, 8e-3, 46e-3, 10e-3, -2 * turned * across)).spread(200)
     d = load(across)
     assert line.force(d)[0] / line.loads(d).max() / 12 == pytest.approx(of_line, abs=6e-4)
@@ -108,7 +113,7 @@ def test_forces_and_stiffness_are_derivatives(name: str) -> None:
     assert np.abs((slopes - force) / scale).max() < 1e-6 * np.abs(force / scale).max()
     tangents = np.array([difference(bearing.force, i) for i in range(5)])
     apart = np.abs((tangents - stiffness) / np.outer(scale, scale)).max()
-    assert apart < (1e-3 if name == "roller" else 1e-6) * np.abs(stiffness / np.outer(scale, scale)).max()
+    assert apart < (1e-3 if name in ("roller", "taper") else 1e-6) * np.abs(stiffness / np.outer(scale, scale)).max()
     assert np.array_equal(stiffness, stiffness.T)
     values = np.linalg.eigvalsh(stiffness / np.outer(scale, scale))
     assert values[0] >= -1e-12 * values[-1]
@@ -131,7 +136,7 @@ def test_a_mirrored_bearing_moves_in_the_mirror() -> None:
     assert other == pytest.approx(mirror * one, rel=1e-9)
 
 
-@pytest.mark.parametrize("law", [DEEP, ANGULAR, ROLLERS], ids=["deep", "angular", "roller"])
+@pytest.mark.parametrize("law", [DEEP, ANGULAR, ROLLERS, TAPER], ids=["deep", "angular", "roller", "taper"])
 def test_load_and_displacement_turn_together(law: Balls | Rollers) -> None:
     """By the distance of two rolling elements; averaged over the cage, by parts of it too."""
     force = np.array([900.0, 200.0, 0.0 if law is ROLLERS else 700.0, 1.0, 0.5])
@@ -211,3 +216,11 @@ def test_passing_balls_move_a_ring_only_where_some_carry_nothing() -> None:
     """Under an axial load every position of the cage is alike; under a radial load with clearance it is not."""
     assert pass_swing(row(DEEP), load(0, 0, 500)).max() < 1e-12
     assert 1e-8 < pass_swing(row(DEEP), load(500))[0] < 2e-6
+
+
+def test_a_taper_pressed_along_its_axis_carries_evenly() -> None:
+    """Q = F/(Z sin α) on every roller, and preload leaves the rings at rest."""
+    found = rest(row(TAPER), load(0, 0, 2000))
+    assert found.loads == pytest.approx(np.full((1, 1, 17), 2000 / 17 / math.sin(TAPER.contact_angle)), rel=1e-8)
+    pressed = preloaded(Row(TAPER), 2000.0)
+    assert Rolling((pressed,)).force(np.zeros(5))[2] == pytest.approx(2000.0, rel=1e-9)

@@ -47,6 +47,7 @@ def problems(folder: Path, like: str, *changes: tuple[str, str]) -> dict[str, st
         (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nclearence = "1 um"'), "bearings.6306.clearence", "clearance"),
         (TRAIN, ('clearance = "10 um"', 'clearance = "10 mm"'), "bearings.6306.clearance", "out of range"),
         (TRAIN, ('kind = "ball"', 'kind = "bal"'), "bearings.6306", "ball"),
+        (TRAIN, ('width = "16 mm"', 'width = "16 mm"\npreload = "9 N"'), "bearings.NU206", "negative clearance"),
         (TRAIN, ('width = "16 mm"\n', ""), "bearings.NU206", 'width = "20 mm"'),
         (TRAIN, ('bearing = "6306"', 'axial = "1e8 N/m"\nspan = "2 mm"'), "supports.input_left.span", "name one"),
         (PAIR, ('rolling = "7305"', 'rolling = "7306"'), "gears.pinion.bearing.rolling", "write [bearings.7306]"),

@@ -16,13 +16,16 @@ from gearfmu.modes.linear import Linearised
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.bearings import OperatingSpec
-from gearfmu.stage import StageModel, assemble
+from gearfmu.spec.tables.bearings import OperatingSpec, RollerBearing
+from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.build.assembly import settled, tangents_of
 from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.build.rolling import SETTLED, Settled
 from gearfmu.stage.run.bearings import stage_bearings
+from gearfmu.stage.run.limits import beyond_limits
+from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.te import loaded_te
 
 TRAIN, PAIR = "two_stage/stage_bearings", "helical_demo/stage_bearings"
 
@@ -110,6 +113,22 @@ def test_without_load_only_preload_holds() -> None:
         assert own.rests[name].load == pytest.approx(np.zeros(5), abs=1e-6)
         assert own.tangents[name] == pytest.approx(bearing.stiffness(np.zeros(5)), rel=1e-9, abs=1e-3)
         assert own.rests[name].loads.min() > 0.0  # all balls are pressed
+
+
+def test_tapered_rollers_are_stiffer_than_balls() -> None:
+    """Line contact in place of point contact, equal arrangement and preload; loads of the mesh are the same."""
+    spec, bodies = loaded(PAIR)
+    tapers = {
+        name: RollerBearing(
+            kind="roller", bore=own.bore, outside=own.outside, width=0.018, contact_angle=0.26, preload=300.0
+        )
+        for name, own in spec.bearings.items()
+    }
+    own, balls = settled(spec.model_copy(update={"bearings": tapers}), bodies), found(PAIR)
+    for name in ("pinion", "wheel"):
+        assert own.rests[name].load[:3] == pytest.approx(balls.rests[name].load[:3], rel=2e-3)
+        assert own.tangents[name].shape == (5, 5)
+        assert (np.diag(own.tangents[name])[:2] > np.diag(balls.tangents[name])[:2]).all()
 
 
 def test_an_axial_load_on_the_open_side_is_refused() -> None:
@@ -220,6 +239,30 @@ def test_bearings_belong_to_the_model() -> None:
     ]
     models = [model(PAIR), *(assemble(other, bodies) for other in others)]
     assert len({own.hash for own in models}) == len({own.guid for own in models}) == 3
+
+
+def test_held_bearings_are_held_whatever_they_are() -> None:
+    """Without effect.bearings the stage is that on constant springs, bit for bit."""
+    one, two = (
+        loaded_te(own, [80.0], 4, rigid_bearings=True) for own in (model(PAIR), assemble(*loaded("helical_demo")))
+    )
+    assert np.array_equal(one.te, two.te)
+
+
+def test_energy_is_kept_on_coupled_bearings() -> None:
+    """A loaded run: what the balance leaves is no more than on constant springs, times three."""
+    left = []
+    for own in (model(PAIR), assemble(*loaded("helical_demo"))):
+        trace = simulate(own, Steady(own, 200.0, 100.0), 3e-3, 20e-6, {"level": 1.0})
+        assert not trace.meta["warnings"]
+        left.append(abs(trace["energy.residual"][-1]))
+    assert left[0] <= 3 * left[1] + 1e-7, left
+
+
+def test_a_run_far_from_the_operating_torque_is_told_so() -> None:
+    for torque, said in ((100.0, False), (60.0, False), (199.0, False), (45.0, True), (-100.0, True)):
+        assert any("linearised at 100 N·m" in text for text in beyond_limits(model(PAIR), torque)) == said
+    assert not beyond_limits(assemble(*loaded("helical_demo")), 30.0)
 
 
 # ---- the table ------------------------------------------------------------------------------------------------------

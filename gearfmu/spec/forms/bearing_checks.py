@@ -51,8 +51,8 @@ def use_problems(uses: Iterable[Use], bearings: Bearings, operating: OperatingSp
 
 def _sides(use: Use, bearing: BallBearing | RollerBearing) -> Found:
     """Bearings that carry one axial direction say which."""
-    angled = isinstance(bearing, BallBearing) and bearing.contact_angle > 0
-    sided = angled or (isinstance(bearing, BallBearing) and bearing.preload > 0)
+    angled = bearing.contact_angle > 0
+    sided = angled or bearing.preload > 0
     if sided and use.part.carries is None and use.part.span is None:
         why = "has a contact angle" if angled else "is preloaded"
         remedy = f'{use.name} {why}: say which axial force of the shaft it carries, carries = "+z" or "-z"'

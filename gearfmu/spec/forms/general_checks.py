@@ -75,7 +75,7 @@ def _counts(stage: Stage) -> Found:
 
 def _directions(bearing: BallBearing | RollerBearing | None) -> int:
     """Directions in which a rolling bearing holds; those of balls where it is not known."""
-    return 4 if isinstance(bearing, RollerBearing) else 5
+    return 4 if isinstance(bearing, RollerBearing) and bearing.contact_angle == 0 else 5
 
 
 def _rotors(stage: Stage) -> Found:

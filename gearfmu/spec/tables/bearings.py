@@ -12,6 +12,8 @@ from gearfmu.spec.tables.lead import Length
 
 CatalogueName = Annotated[str, Strict(), Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,39}$")]
 Clearance = Annotated[float, Quantity("bearing_clearance")]
+ContactAngle = Annotated[float, Quantity("contact_angle")]
+Preload = Annotated[float, Quantity("preload")]
 Groove = Annotated[float, Quantity("groove")]
 Diameter = Annotated[float, Quantity("diameter")]
 Ratio = Annotated[float, Quantity("damping_ratio")]
@@ -50,13 +52,9 @@ class BallBearing(Spec):
         default=None, description="radius of the inner groove over the ball's diameter, 0.52 when absent"
     )
     outer_groove: Groove | None = Field(default=None, description="of the outer groove, 0.53 when absent")
-    contact_angle: Annotated[float, Quantity("contact_angle")] = Field(
-        default=0.0, description="contact angle; 0 deg: deep groove"
-    )
+    contact_angle: ContactAngle = Field(default=0.0, description="contact angle; 0 deg: deep groove")
     clearance: Clearance = Field(default=0.0, description="radial clearance in operation; negative: interference")
-    preload: Annotated[float, Quantity("preload")] = Field(
-        default=0.0, description="axial force that presses the rings together without load"
-    )
+    preload: Preload = Field(default=0.0, description="axial force that presses the rings together without load")
 
     @model_validator(mode="after")
     def _fits(self) -> BallBearing:
@@ -65,7 +63,7 @@ class BallBearing(Spec):
 
 
 class RollerBearing(Spec):
-    """Cylindrical roller bearing, free along its axis."""
+    """Cylindrical roller bearing, free along its axis, or with a contact angle a tapered one."""
 
     kind: Literal["roller"] = Field(description="kind of bearing")
     bore: Diameter = Field(description="bore d")
@@ -79,10 +77,16 @@ class RollerBearing(Spec):
         default=None, description="length of the rollers without chamfers, 0.65 B when absent"
     )
     pitch_diameter: Diameter | None = Field(default=None, description="diameter of their circle, (d + D)/2 when absent")
+    contact_angle: ContactAngle = Field(default=0.0, description="contact angle of the taper; 0 deg: cylindrical")
     clearance: Clearance = Field(default=0.0, description="radial clearance in operation; negative: interference")
+    preload: Preload = Field(
+        default=0.0, description="axial force that presses the rings of a tapered bearing together without load"
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> RollerBearing:
+        if self.preload and not self.contact_angle:
+            raise refuse("cylindrical rollers carry no preload along the axis: write a negative clearance")
         if self.width is None and self.roller_length is None:
             raise refuse('the rollers have no length: write the width of the bearing, e.g. width = "20 mm"')
         _check_fit(self, self.roller_diameter, 0.27, self.rollers)

@@ -75,11 +75,12 @@ class Settled:
 
 def filled(spec: BallBearing | RollerBearing) -> Filled[Balls] | Filled[Rollers]:
     """The law of a bearing of a stage file, and which of its numbers are proposed."""
+    fixed = {"contact_angle": spec.contact_angle, "clearance": spec.clearance}
     if isinstance(spec, BallBearing):
         known = {name: value for name, value in spec if name in BALL_NUMBERS}
-        return filled_ball(spec.bore, spec.outside, known, contact_angle=spec.contact_angle, clearance=spec.clearance)
+        return filled_ball(spec.bore, spec.outside, known, **fixed)
     known = {name: value for name, value in spec if name in (*ROLLER_NUMBERS, "width")}
-    return filled_roller(spec.bore, spec.outside, known, clearance=spec.clearance)
+    return filled_roller(spec.bore, spec.outside, known, **fixed)
 
 
 def rolling_bearings(stage: Stage) -> dict[str, Rolling]:
@@ -92,9 +93,8 @@ def _bearing(stage: Stage, support: SupportSpec) -> Rolling:
     spec = stage.bearings[str(support.bearing)]
     law, side = filled(spec).law, -1 if support.carries == "-z" else 1
     places = [(0.0, side)] if support.span is None else [(-support.span / 2, side), (support.span / 2, -side)]
-    preload = spec.preload if isinstance(spec, BallBearing) else 0.0
     try:
-        rows = tuple(preloaded(Row(law, offset, way), preload) for offset, way in places)
+        rows = tuple(preloaded(Row(law, offset, way), spec.preload) for offset, way in places)
     except NoRestError as error:
         raise ModelError(f"bearing {support.bearing} of {support.name}: {error}") from error
     return Rolling(rows).spread(_CAGE)

@@ -14,6 +14,7 @@ from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.place import MeshPlace, place_of
 
 RPM = 30 / np.pi
+OPERATING_RANGE = 2.0  # of torques over that at which bearings are linearised; a factor on stiffness of about 1.3
 
 
 def places_of(model: StageModel) -> list[MeshPlace]:
@@ -56,7 +57,21 @@ def beyond_limits(model: StageModel, torque: float, speed: float = 0.0) -> list[
             f"{abs(speed) * RPM:.6g} rpm of the {name} is beyond speed_max, {fastest * RPM:.6g} rpm: the internal step "
             "is made for a slower mesh"
         )
-    return found
+    return found + _beyond_operating(model, torque)
+
+
+def _beyond_operating(model: StageModel, torque: float) -> list[str]:
+    """In words, where the stiffness of rolling bearings is that of quite another torque."""
+    operating = model.stage.operating
+    if not model.stage.rolling or operating is None or not torque:
+        return []
+    ratio = operating.torque / torque
+    if 1 / OPERATING_RANGE <= ratio <= OPERATING_RANGE:
+        return []
+    return [
+        f"{torque:g} N·m on the {model.shafts.input}: the rolling bearings are linearised at {operating.torque:g} N·m, "
+        "and their stiffness depends on the load: write [operating] torque into the stage file"
+    ]
 
 
 @contextmanager
