@@ -277,9 +277,13 @@ class Stage(LaterFields):
         alone = all(isinstance(body, ToothedBody) and body.helix_angle == 0 for body in self.bodies.values())
         alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
         places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
-        return alone and all(
-            s.axial is None and s.tilt is None and s.to is None and s.bearing is None and s.at in (None, places[s.body])
-            for s in self.supports
+        return (
+            alone
+            and not self.rolling
+            and all(
+                s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
+                for s in self.supports
+            )
         )
 
     @property
