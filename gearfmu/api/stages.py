@@ -17,7 +17,7 @@ from gearfmu.modes.gear import gear_modes
 from gearfmu.modes.linear import StageModes, stage_modes
 from gearfmu.modes.planetary import set_body_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.forms.members import Form, body_names, carriers
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
 from gearfmu.stage.effects import EFFECTS, Effect
@@ -91,7 +91,7 @@ def efficiency(
 
 
 def modes(
-    stage: PathLike | Form, body: str | None = None, torque: Quantity | None = None, count: int = 20
+    stage: PathLike | Stage, body: str | None = None, torque: Quantity | None = None, count: int = 20
 ) -> StageModes | BodyModes:
     """Natural frequencies: of the stage linearised in loaded contact, or of one of its bodies.
 
@@ -106,10 +106,9 @@ def modes(
         bodies, model = reduce(spec), assemble(spec)
         asked = largest_torque(model) if torque is None else checked("torque", torque, "torque")
         return stage_modes(model, bodies, asked, count)
-    names = body_names(spec)
+    names = spec.files
     if body not in names:
         raise SpecError([Problem(str(spec.source), "body", body, f"the stage has {', '.join(names)}")])
-    if carriers(spec):
+    if spec.carriers:
         return set_body_modes(spec, body, count)
-    gears = [gear.name for gear in spec.gears]
-    return gear_modes(spec, reduce(spec)[gears.index(body)], count)
+    return gear_modes(spec, reduce(spec)[names.index(body)], count)

@@ -11,19 +11,19 @@ from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.forms.general import RingBody
-from gearfmu.spec.forms.members import Form, member_of
+from gearfmu.spec.forms.general import RingBody, Stage
+from gearfmu.spec.forms.members import member_of
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 
 
-def gear_modes(spec: Form, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
-    """The `count` lowest elastic modes of a gear of `spec` (one more where that would split a pair).
+def gear_modes(stage: Stage, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
+    """The `count` lowest elastic modes of a gear of `stage` (one more where that would split a pair).
 
     stored : the gear's reduced body, whose frequencies they must have: BodyError where they differ (a file made by
     another program version).
     """
-    gear, mesh = member_of(spec, stored.name).gear, body_sector(spec, stored.name)
+    gear, mesh = member_of(stage, stored.name).gear, body_sector(stage, stored.name)
     rigid = mesh.sets["rim" if isinstance(gear, RingBody) else "bore"] if gear.rigid_bore else None
     found = cyclic_modes(gear.name, mesh, gear.material, min(count, stored.modes), progress, rigid)
     return as_stored(found, stored.frequency, stored.damping_ratio)

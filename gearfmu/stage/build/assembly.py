@@ -13,9 +13,7 @@ import numpy as np
 
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stored import stored, stored_files
 from gearfmu.spec.tables.ports import PortSpec
@@ -46,43 +44,43 @@ FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is h
 
 
 def assemble(
-    spec: Form,
+    stage: Stage,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
 ) -> StageModel:
-    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; of a set its sun, planet,
-    ring and carrier; rolls: of the even grid along a flank; observe: names of gears whose rigid motion and modal
-    amplitudes are outputs.
+    """The general model of a stage. bodies: reduced, in the order of `stage.files`; rolls: of the even grid along a
+    flank; observe: names of gears whose rigid motion and modal amplitudes are outputs.
 
-    ModelError when a body does not belong to its gear, and for a name in `observe` that is no gear of the stage.
+    SpecError where the stage does not say all that it needs to move; ModelError when a body does not belong to its
+    gear, and for a name in `observe` that is no gear of the stage.
     """
+    stage.require_motion()
     hashes = tuple(body.input_hash for body in bodies)
-    made_of = {"made_of": _made_of(spec, bodies, rolls, observe)}
-    sections = order_sections(with_guid(general_sections(spec, bodies, rolls, observe) | made_of))
-    model = StageModel(spec, write_blob(sections), hashes)
-    starts = friction_starts(model.stage) | film_starts(model.stage)
+    made_of = {"made_of": _made_of(stage, bodies, rolls, observe)}
+    sections = order_sections(with_guid(general_sections(stage, bodies, rolls, observe) | made_of))
+    model = StageModel(stage, write_blob(sections), hashes)
+    starts = friction_starts(stage) | film_starts(stage)
     return model.with_starts(starts) if starts else model
 
 
-def _made_of(spec: Form, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
+def _made_of(stage: Stage, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
     """Hash of all that a model is made of but the kinds of its ports."""
-    stage, found = as_general(spec), spread(spec, bodies)
     tables = stored(stage) | {"description": ""}
     for port in tables["ports"].values():
         port.pop("kind", None)
-    hashes = {name: body.input_hash for name, body in found.items()}
+    hashes = {name: body.input_hash for name, body in stage.by_name(bodies).items()}
     return origin(MODEL_VERSION, tables, stored_files(stage), hashes, rolls, list(observe))
 
 
 def general_sections(
-    spec: Form,
+    stage: Stage,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage, bodies, carriers = _parted(spec, bodies)
+    bodies, carriers = _parted(stage, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
@@ -125,16 +123,16 @@ def general_sections(
     return sections
 
 
-def stage_group(spec: Form, bodies: Sequence[Any]) -> Group:
+def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
-    stage, bodies, carriers = _parted(spec, bodies)
+    bodies, carriers = _parted(stage, bodies)
     return mount(stage_layout(stage, bodies, carriers=carriers))
 
 
-def _parted(spec: Form, bodies: Sequence[Any]) -> tuple[Stage, Sequence[Any], dict[str, InterfaceBody]]:
-    """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
-    stage, found = as_general(spec), spread(spec, bodies)
-    return stage, [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
+def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
+    """The bodies of the stage's gears in their order, and its carriers' by name."""
+    found = stage.by_name(bodies)
+    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
