@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, load
-from gearfmu.api.quantities import Quantity, checked
+from gearfmu.api.settings import Quantity, checked
 from gearfmu.body.imported import imported_full_order
 from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size

@@ -16,8 +16,7 @@ from typing_extensions import Unpack
 
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, load, model_of
-from gearfmu.api.quantities import Quantity, checked
-from gearfmu.api.settings import Starts
+from gearfmu.api.settings import Quantity, Starts, checked
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu

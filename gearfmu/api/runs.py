@@ -10,8 +10,7 @@ from typing_extensions import Unpack
 
 from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, model_of, reduce
-from gearfmu.api.quantities import Quantity, checked, in_si
-from gearfmu.api.settings import RunSettings, Settings
+from gearfmu.api.settings import Quantity, RunSettings, Settings, checked, in_si
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec

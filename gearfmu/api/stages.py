@@ -10,12 +10,10 @@ from typing import TypedDict, cast
 from typing_extensions import Unpack
 
 from gearfmu.api.models import AnyStage, PathLike, assemble, load, model_of, reduce
-from gearfmu.api.quantities import Quantity, checked, in_si
-from gearfmu.api.settings import Settings
+from gearfmu.api.settings import Quantity, Settings, checked, in_si
 from gearfmu.errors import Problem, SpecError
-from gearfmu.modes.gear import gear_modes
+from gearfmu.modes.bodies import body_modes, gear_modes
 from gearfmu.modes.linear import StageModes, stage_modes
-from gearfmu.modes.planetary import set_body_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.proposals.new import new_stage
@@ -110,5 +108,5 @@ def modes(
     if body not in names:
         raise SpecError([Problem(str(spec.source), "body", body, f"the stage has {', '.join(names)}")])
     if spec.carriers:
-        return set_body_modes(spec, body, count)
+        return body_modes(spec, body, count)
     return gear_modes(spec, reduce(spec)[names.index(body)], count)

@@ -13,7 +13,6 @@ from gearfmu.body.carrier import reduced_carrier
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.reduced import ReducedBody
-from gearfmu.body.stale import refuse_stale
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.errors import BodyError, MeshError
@@ -141,5 +140,17 @@ def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
     """The stored body. Raises BodyError when it is missing, damaged or stale."""
     path = body_path(stage, name, folder)
     body: Body = load_body(path) if name in members(stage) else load_interface_body(path)
-    refuse_stale(path, body, expected_hash(stage, name), stage.source)
+    _refuse_stale(path, body, expected_hash(stage, name), stage.source)
     return body
+
+
+def _refuse_stale(path: Path, body: Body, wanted_hash: str, source: Path) -> None:
+    """BodyError when the body of this file has another fingerprint than the stage file asks for: it says whether the
+    program or the numbers are others."""
+    if body.input_hash == wanted_hash:
+        return
+    if body.algorithm_version != ALGORITHM_VERSION:
+        why = f"made by version {body.algorithm_version} of the reduction, this program has version {ALGORITHM_VERSION}"
+    else:
+        why = f"made from other numbers than {source} asks for now"
+    raise BodyError(f"{path}: stale: {why}; make it again with 'gearfmu reduce STAGE'")

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.body.provenance import provenance
+from gearfmu.body.parts import provenance
 from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.basis import Size

@@ -152,14 +152,14 @@ def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyMo
         return _of_set(spec, name, count, how)
     _check(name, spec.files)
     _, bodies = bodies_of(stage)
-    from gearfmu.modes.gear import gear_modes
+    from gearfmu.modes.bodies import gear_modes
 
     with progress_bar("shapes") as progress:
         return gear_modes(spec, bodies[spec.files.index(name)], count, by_text(progress))
 
 
 def _of_set(spec: Stage, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
-    from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
+    from gearfmu.modes.bodies import body_modes, mounted_ring_modes, uncoupled_carrier_modes
 
     _check(name, spec.files)
     with progress_bar("shapes") as progress:
@@ -168,7 +168,7 @@ def _of_set(spec: Stage, name: str, count: int, how: tuple[bool, bool]) -> BodyM
             return mounted_ring_modes(spec, count, by_text(progress))
         if uncoupled:
             return uncoupled_carrier_modes(spec, count, by_text(progress))
-        return set_body_modes(spec, name, count, by_text(progress))
+        return body_modes(spec, name, count, by_text(progress))
 
 
 def _check(name: str, names: Sequence[str]) -> None:

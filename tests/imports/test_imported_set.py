@@ -23,7 +23,7 @@ from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.modes.planetary import mounted_ring_modes
+from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order

@@ -12,10 +12,9 @@ from small import COUNT, frequencies, pinion, pinion_modes, set_body
 from gearfmu.errors import BodyError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.modes.gear import as_stored
 from gearfmu.modes.harmonics import MOST, harmonic_shares
-from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes
 from gearfmu.modes.shapes import energy_shares
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import ring_full_order
@@ -149,7 +148,7 @@ def test_the_ring_without_mounts_has_no_mounted_modes() -> None:
 def test_rigid_couplings_of_the_carrier() -> None:
     """Its bolts and its bore move as rigid bodies, which makes it stiffer than the bare carrier, not softer."""
     spec = load_stage("planetary54")
-    found = set_body_modes(spec, "carrier", 6, scale=0.4)
+    found = body_modes(spec, "carrier", 6, scale=0.4)
     mesh, material = set_body("carrier", 0.4)
     assert np.all(frequencies(found)[:6] > frequencies(cyclic_modes("carrier", mesh, material, 6))[:6])
     assert all(mode.damping_ratio == spec.written.carrier.modal_damping for mode in found.modes)

@@ -14,7 +14,7 @@ from gearfmu.body.sector import body_sector
 from gearfmu.commands import shared
 from gearfmu.fem import solids
 from gearfmu.femesh.carrier import whole_carrier
-from gearfmu.modes.planetary import set_body_modes, uncoupled_carrier_modes
+from gearfmu.modes.bodies import body_modes, uncoupled_carrier_modes
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -95,4 +95,4 @@ def test_a_carrier_without_couplings_is_that_of_its_finite_elements() -> None:
     values = eigsh(k.tocsc(), 6 + len(own), m.tocsc(), sigma=-((2 * np.pi * 300) ** 2), return_eigenvectors=False)
     whole = np.sort(np.sqrt(np.abs(values)))[6:] / (2 * np.pi)
     assert own == pytest.approx(whole, rel=1e-6)
-    assert set_body_modes(spec, "carrier", 1, scale=scale).modes[0].frequency > 1.2 * own[0]
+    assert body_modes(spec, "carrier", 1, scale=scale).modes[0].frequency > 1.2 * own[0]

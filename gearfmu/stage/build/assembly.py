@@ -21,10 +21,8 @@ from gearfmu.stage.build.blob import origin, with_guid, write_blob
 from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.build.far import far_sections
 from gearfmu.stage.build.fields import order_sections
-from gearfmu.stage.build.film import film_starts
 from gearfmu.stage.build.flanks import deviation_sections
 from gearfmu.stage.build.free import Flank
-from gearfmu.stage.build.friction import friction_starts
 from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
@@ -32,6 +30,7 @@ from gearfmu.stage.build.meshes import stage_sections, tooth_phases
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.nodal import nodal_sections
 from gearfmu.stage.build.observed import observed_number, observed_sections
+from gearfmu.stage.build.oil import film_starts, friction_starts
 from gearfmu.stage.build.slices import smeared, smeared_tip
 from gearfmu.stage.build.spinning import turn_rates
 from gearfmu.stage.build.tables import ROLLS, stored_points

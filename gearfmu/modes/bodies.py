@@ -1,4 +1,4 @@
-"""Modes of the bodies of a planetary set."""
+"""Modes of one body of a stage, made from its finite elements."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gearfmu.body import ReducedBody
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
@@ -16,25 +17,54 @@ from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
 from gearfmu.spec.forms.expand import CARRIER
-from gearfmu.spec.forms.general import Stage, ToothedBody
+from gearfmu.spec.forms.general import RingBody, Stage, ToothedBody
 from gearfmu.spec.forms.members import carrier_of, member_of
 from gearfmu.spec.forms.planetary import CarrierSpec
 
+AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 
-def set_body_modes(
-    stage: Stage, name: str, count: int, progress: Progress | None = None, scale: float = 1.0
-) -> BodyModes:
-    """The `count` lowest elastic modes of a free body of a planetary set, with its modal damping: sun, planet and ring
-    by one sector; the carrier with its bolts and bore coupled as the file says. The ring's mounts are left out.
+
+def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = None, scale: float = 1.0) -> BodyModes:
+    """The `count` lowest elastic modes of a free body (one more where that would split a pair), with its modal damping:
+    toothed ones by one sector, without the mounts of a ring; the carrier with its bolts and bore coupled as the file
+    says.
 
     scale : factor on all element counts.
     """
     part: CarrierSpec | ToothedBody = carrier_of(stage).part if name == CARRIER else member_of(stage, name).gear
-    if name == CARRIER and part.imported is None:
+    if isinstance(part, CarrierSpec) and part.imported is None:
         found = _carrier(stage, count, progress, scale)
     else:
-        found = cyclic_modes(name, body_sector(stage, name, scale), part.material, count, progress)
+        mesh, rigid = body_sector(stage, name, scale), None
+        if isinstance(part, ToothedBody) and part.rigid_bore:
+            rigid = mesh.sets["rim" if isinstance(part, RingBody) else "bore"]
+        found = cyclic_modes(name, mesh, part.material, count, progress, rigid)
     return _damped(found, part.modal_damping)
+
+
+def gear_modes(stage: Stage, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
+    """`body_modes` of a gear, as far as its reduced body has them; stored : that body, whose frequencies they must
+    have: BodyError where they differ (a file made by another program version)."""
+    found = body_modes(stage, stored.name, min(count, stored.modes), progress)
+    return as_stored(found, stored.frequency, stored.damping_ratio)
+
+
+def as_stored(found: BodyModes, frequency: np.ndarray, damping_ratio: np.ndarray) -> BodyModes:
+    """The same modes with the damping ratios (n,) of the stored body, after its frequencies (n,) Hz were compared."""
+    first = np.array([mode.numbers[0] - 1 for mode in found.modes])
+    known = first < len(frequency)
+    difference = np.abs(np.array([mode.frequency for mode in found.modes])[known] / frequency[first[known]] - 1).max()
+    if difference > AGREEMENT:
+        raise BodyError(
+            f"{found.name}: frequencies made from the finite elements differ by {difference:.1e} from those of the "
+            "stored body; make it again with 'gearfmu reduce --force STAGE'"
+        )
+    modes = [
+        replace(mode, damping_ratio=float(damping_ratio[mode.numbers[0] - 1]))
+        for mode, is_known in zip(found.modes, known, strict=True)
+        if is_known
+    ]
+    return replace(found, modes=tuple(modes))
 
 
 def uncoupled_carrier_modes(
