@@ -180,7 +180,7 @@ class _SetStudy:
         return SetStudy(tuple(self.table.of(self.scene.name)), tuple(self.said))
 
     def _model_of(self, spec: Stage, bodies: Sequence[Any]) -> StageModel:
-        return models_for(self.scene, bodies, **{name: getattr(spec, name) for name in ("set", "carrier")})
+        return models_for(self.scene, bodies, **{name: getattr(spec.written, name) for name in ("set", "carrier")})
 
     def _with_planets(self, planets: int) -> StageModel:
         self.tell(0.0, f"carrier of {planets} planets")

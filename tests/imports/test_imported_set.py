@@ -212,7 +212,7 @@ def turned(angle: float) -> np.ndarray:
 def test_a_carrier_that_lies_elsewhere_is_refused(tmp_path: Path, nodes, message: str) -> None:
     carrier_deck(tmp_path, nodes())
     with pytest.raises(MeshError, match=message) as caught:
-        carrier_full_order(carrier_of(stage)(tmp_path, CARRIER))
+        carrier_full_order(carrier_of(stage(tmp_path, CARRIER)))
     assert str(tmp_path / "carrier.inp") in str(caught.value) and "\n" not in str(caught.value)
 
 

@@ -28,7 +28,7 @@ def pinion() -> tuple[FeMesh, Material]:
 def set_body(name: str, scale: float) -> tuple[FeMesh, Material]:
     """One sector of a body of planetary54."""
     spec = load_stage("planetary54")
-    return body_sector(spec, name, scale), getattr(spec, name).material
+    return body_sector(spec, name, scale), getattr(spec.written, name).material
 
 
 @lru_cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,7 +20,6 @@ from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
-from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.members import carrier_of, member_of
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.stage import load_stage
@@ -30,7 +30,8 @@ STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 
 
 def with_couplings(**kinds: str):
-    return rewritten(SPEC, carrier=SPEC.written.carrier.model_copy(update={"coupling": kinds}))
+    own = carrier_of(SPEC)
+    return replace(own, part=own.part.model_copy(update={"coupling": kinds}))
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ SLICES = 10
 def involute() -> StageModel:
     """`helical_demo` without modifications: lines of contact end at full load."""
     demo = load_stage("helical_demo")
-    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in demo.gears)
+    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in demo.written.gears)
     return assemble(rewritten(demo, gears=gears), load_bodies(demo))
 
 
