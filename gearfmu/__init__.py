@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
-    from gearfmu.api.stages import effects, efficiency, new
+    from gearfmu.api.stages import bearings, effects, efficiency, new
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
     from gearfmu.fmu.validate import validate
@@ -49,6 +49,7 @@ __all__ = [
     "Trace",
     "assemble",
     "assemble_in_scene",
+    "bearings",
     "compare",
     "convert",
     "drive",
@@ -78,7 +79,7 @@ _HOMES = {
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.settings": ("Settings",),
-    "api.stages": ("effects", "efficiency", "new"),
+    "api.stages": ("bearings", "effects", "efficiency", "new"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
     "fmu.validate": ("validate",),

@@ -40,6 +40,10 @@ VERBS = {
         "gearfmu.commands.efficiency:efficiency",
         "Loss of every mesh to friction of its flanks.",
     ),
+    "bearings": (
+        "gearfmu.commands.bearings:bearings",
+        "Rolling bearings under load: forces, contact pressure, stiffness, ball pass.",
+    ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "frf": ("gearfmu.commands.frf:frf", "Reduction of a body judged by its transfer matrix."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),

@@ -184,6 +184,12 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "mount_stiffness": ("N/m", 1e4, 1e12, "of one mount, about 1e8 N/m"),
     "mounts": ("", 3, 60, "equally spaced round the rim"),
     "damping_ratio": ("", 0, 1, "a ratio, not per cent: about 0.03"),
+    # rolling bearings
+    "rolling_elements": ("", 3, 300, "the number of balls or rollers of one row"),
+    "groove": ("", 0.505, 0.6, "radius of the groove over the diameter of the balls, about 0.52"),
+    "contact_angle": ("rad", 0, 60 * _DEGREE, "0 deg: deep groove; angular contact bearings have 15 deg to 40 deg"),
+    "bearing_clearance": ("m", -2e-4, 1e-3, "of bearings of 50 mm about 10 um in operation; negative: interference"),
+    "preload": ("N", 0, 1e6, "of bearings of 50 mm some hundreds of N"),
     # sets
     "position": ("", 0, 2000, "steps of 360 deg/(z_sun + z_ring), the first 0"),
     "load_sharing": ("", 1, 4, "mesh load factor of ISO 6336-1"),

@@ -25,7 +25,7 @@ from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 STAGE, STEPS, REPEATS = "fzg_c/stage_relief", 20000, 3
 
 
@@ -35,14 +35,15 @@ def measure(work: Path) -> list[dict[str, object]]:
     model = assemble(spec, [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears])
     with zipfile.ZipFile(export(model, work / "stage.fmu")) as archive:
         archive.extractall(work)
-    names = {v.name: str(v.valueReference) for v in read_model_description(str(work)).modelVariables}
+    description = read_model_description(str(work))
+    names = {v.name: str(v.valueReference) for v in description.modelVariables}
     host = compile_program(ROOT / "tests" / "fmu" / "host.c", work / "host")
     library = next((work / "binaries").rglob("*.so"))
     command = [
         host,
         library,
         (work / "resources").as_uri(),
-        model.hash,
+        description.guid,
         "bench",
         str(STEPS),
         names["pinion.phi"],

@@ -19,6 +19,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
 from gearfmu.stage.effects import EFFECTS, Effect
+from gearfmu.stage.run.bearings import Bearings, stage_bearings
 from gearfmu.stage.run.efficiency import Efficiency, mesh_efficiency
 from gearfmu.stage.run.limits import largest_torque
 from gearfmu.stage.run.steady import parameters
@@ -86,6 +87,17 @@ def efficiency(
     model = model_of(stage)
     asked = checked("torque", torque, "torque"), checked("speed", speed, "speed")
     return mesh_efficiency(model, *asked, parameters(model, settings), pitches=pitches)
+
+
+def bearings(stage: PathLike | Stage, torque: Quantity | None = None) -> Bearings:
+    """The rolling bearings of a stage under load: forces, displacements, contact pressure, stiffness, ball pass.
+
+    stage : a name or path, or a `load`ed stage. torque : of the input, that of [operating] in its file when None.
+
+    Raises ModelError for a stage without rolling bearings, and where one cannot carry its load.
+    """
+    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    return stage_bearings(spec, reduce(spec), None if torque is None else checked("torque", torque, "torque"))
 
 
 def modes(

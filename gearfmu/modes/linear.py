@@ -26,7 +26,7 @@ from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.spec.forms.general import ShaftBody, Stage
 from gearfmu.spec.forms.turning import rolling
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.assembly import mount_sets
+from gearfmu.stage.build.assembly import mount_sets, tangents_of
 from gearfmu.stage.build.groups import Group
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.limits import places_of
@@ -105,7 +105,7 @@ def linearised(
     pitch = max((place.pitch for place in places_of(model)), key=abs)
     kernel.transmission(-position * pitch, torque)
     linear = kernel.linearise()
-    return Linearised(linear, shafts, free_rotations(model.stage, linear))
+    return Linearised(linear, shafts, free_rotations(model.stage, linear), model.support_coupling)
 
 
 def free_rotations(stage: Stage, linear: LinearModel) -> np.ndarray:
@@ -142,7 +142,7 @@ def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
     beside what its ends yield beyond them; None where the stage has no shafts."""
     if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):
         return None
-    layout = stage_layout(model.stage, bodies)
+    layout = stage_layout(model.stage, bodies, tangents=tangents_of(model.stage, bodies))
     group = mount_sets(layout)[0]
     own = [_elastic(group, b) for b, body in enumerate(layout.bodies) if body.flank is None]
     return np.vstack(own)
@@ -158,11 +158,12 @@ def _elastic(group: Group, body: int) -> np.ndarray:
 @dataclass(frozen=True)
 class Linearised:
     """Equation (29). linear: of the kernel; shafts: `shaft_rows`, whose strain energy counts as that of shafts; free:
-    `free_rotations`, none when None."""
+    `free_rotations`, none when None; coupling: `StageModel.support_coupling`."""
 
     linear: LinearModel
     shafts: np.ndarray | None = None
     free: np.ndarray | None = None
+    coupling: np.ndarray | None = None
 
     @cached_property
     def compliance(self) -> np.ndarray:
@@ -216,6 +217,8 @@ class Linearised:
         mesh, shafts = work[contact].sum(axis=0), work[~contact].sum(axis=0)
         supported = linear.support_rows @ shapes - linear.support_forces @ forces
         bearings = (linear.support_compliance[:, None] * supported**2).sum(axis=0)
+        if self.coupling is not None:
+            bearings = bearings + (supported * (self.coupling @ supported)).sum(axis=0)
         if self.shafts is not None:
             ground = linear.group == GROUND
             shafts = shafts + ((self.shafts[:, linear.number[ground]] @ shapes[ground]) ** 2).sum(axis=0)

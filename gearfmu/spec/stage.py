@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.spec.forms.bearing_checks import use_problems, uses_of_gears
 from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
 from gearfmu.spec.forms.general import Form, Stage
@@ -54,6 +55,9 @@ def stage_class(tables: Mapping[str, Any]) -> type[Form | Stage]:
     return kinds.get(tables.get("kind"), StageSpec)
 
 
+ROLLING = "by its rolling bearing"
+
+
 def require_pair(stage: Stage) -> None:
     """SpecError unless the file is of a pair: a verb about one pair, or its gears' files, means nothing else."""
     if (kind := stage.written.kind) != "external_pair":
@@ -76,13 +80,15 @@ def _load_pair(layers: Layers) -> Read:
 
 def _pair_problems(spec: StageSpec) -> list[Problem]:
     file = str(spec.source)
-    return geometry_problems(file, spec.pair, spec.gears, spec.torque_max) + _bearing_problems(file, spec)
+    rolling = use_problems(uses_of_gears(spec.gears), spec.bearings, spec.operating)
+    found = [*_bearing_problems(file, spec), *(Problem(file, *entry) for entry in rolling)]
+    return geometry_problems(file, spec.pair, spec.gears, spec.torque_max) + found
 
 
 def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
     """Gears that move along their axes and tilt are held there; both gears of a pair move alike."""
     names = [(gear, field) for gear in spec.gears for field in ("axial", "tilt")]
-    given = [(gear, field) for gear, field in names if getattr(gear.bearing, field) is not None]
+    given = [(gear, field) for gear, field in names if dict(gear.bearing).get(field, ROLLING) is not None]
     if not given and spec.pair.helix_angle == 0:
         return []
     why = "a helical gear" if spec.pair.helix_angle else "a gear whose mate or other direction is held so"

@@ -27,7 +27,8 @@ from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec, RingSpec, S
 from gearfmu.spec.forms.planetary_checks import mesh_torque
 from gearfmu.spec.forms.shapes import planet_angles
 from gearfmu.spec.reading.base import Spec
-from gearfmu.spec.tables.gear import Bearing, GearSpec, PairSpec
+from gearfmu.spec.tables.bearings import Bearing, RollingMount
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import PortSpec
 
 CARRIER = "carrier"
@@ -93,17 +94,9 @@ def expand_pair(spec: StageSpec) -> Stage:
                 film=spec.contact.film,
             ),
         ),
-        supports=tuple(
-            SupportSpec(
-                name=gear.name,
-                body=gear.name,
-                radial=gear.bearing.stiffness,
-                axial=gear.bearing.axial,
-                tilt=gear.bearing.tilt,
-                damping_ratio=gear.bearing.damping_ratio,
-            )
-            for gear in spec.gears
-        ),
+        supports=tuple(_held(gear.name, gear.bearing) for gear in spec.gears),
+        bearings=spec.bearings,
+        operating=spec.operating,
         ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
@@ -233,7 +226,12 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
     )
 
 
-def _held(body: str, bearing: Bearing, **where: Any) -> SupportSpec:
+def _held(body: str, bearing: Bearing | RollingMount, **where: Any) -> SupportSpec:
+    if isinstance(bearing, RollingMount):
+        return SupportSpec(
+            name=body, body=body, bearing=bearing.rolling, span=bearing.span, carries=bearing.carries,
+            damping_ratio=bearing.damping_ratio,
+        )  # fmt: skip
     return SupportSpec(
         name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
         damping_ratio=bearing.damping_ratio, **where,

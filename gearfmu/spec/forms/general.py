@@ -16,6 +16,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.tables.bearings import Bearings, CatalogueName, LaterFields, OperatingSpec, Side
 from gearfmu.spec.tables.gear import (
     Backlash,
     Bearing,
@@ -185,9 +186,11 @@ class EngagementSpec(Spec):
     )
 
 
-class SupportSpec(Spec):
+class SupportSpec(LaterFields):
     """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
-    free."""
+    free. A rolling bearing has its own stiffness."""
+
+    later = ("bearing", "span", "carries")
 
     name: Name = Field(description="name of the support")
     body: Name = Field(description="body that is held")
@@ -198,13 +201,23 @@ class SupportSpec(Spec):
     axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
     tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
     torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
+    bearing: CatalogueName | None = Field(
+        default=None, description="rolling bearing in place of the stiffnesses: name of a table [bearings.NAME]"
+    )
+    span: Length | None = Field(
+        default=None, description="distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent"
+    )
+    carries: Side | None = Field(
+        default=None,
+        description="axial force of the shaft that an angular contact bearing (of two the left) carries",
+    )
     damping_ratio: Ratio = Field(
         default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
     )
 
     @model_validator(mode="after")
     def _holds(self) -> SupportSpec:
-        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion)):
+        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion, self.bearing)):
             raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
         return self
 
@@ -234,16 +247,18 @@ class Origin:
 
 
 _OF_FORMS = ("pair", "contact", "geometry", "torque_max", "speed_max", "set", "sun", "planet", "ring", "carrier")
-_OF_BOTH = {"name", "description", "source", "levels"}  # fields of a Stage that every form has too
+_OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
 
 
-class Stage(Spec):
+class Stage(LaterFields):
     """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file.
 
     Files of kind external_pair and planetary_set are expanded into it (`expand`); `written` is what they say.
     """
 
+    later = ("operating", "bearings")
     _origin: Origin = PrivateAttr(default_factory=Origin)
+
     name: Name = Field(description="name of the stage, also of its FMU")
     description: Text = Field(default="", description="one line about the stage")
     source: Path
@@ -256,6 +271,10 @@ class Stage(Spec):
     rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
     engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
     supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
+    bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the supports, by name")
+    operating: OperatingSpec | None = Field(
+        default=None, description="load at which rolling bearings are linearised; needed where there are some"
+    )
     ports: dict[Name, PlacedPort] = Field(description="ports by name")
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
 
@@ -275,7 +294,7 @@ class Stage(Spec):
         if unknown := set(update or {}) - set(type(self).model_fields):
             raise AttributeError(f"a Stage has no {', '.join(sorted(unknown))}: change what is written in its file")
         found, form = super().model_copy(update=update, deep=deep), self._origin.form
-        if form is not None and set(update or {}) <= _OF_BOTH:
+        if form is not None and set(update or {}) <= _OF_BOTH & set(type(form).model_fields):
             found._origin = replace(self._origin, form=form.model_copy(update=update))
         elif form is not None:
             found._origin = Origin()
@@ -339,9 +358,14 @@ class Stage(Spec):
         alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
         places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
         return alone and all(
-            s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
+            s.axial is None and s.tilt is None and s.to is None and s.bearing is None and s.at in (None, places[s.body])
             for s in self.supports
         )
+
+    @property
+    def rolling(self) -> bool:
+        """Whether rolling bearings hold it, whose stiffness depends on the load."""
+        return any(support.bearing is not None for support in self.supports)
 
     @property
     def even(self) -> bool:

@@ -10,11 +10,13 @@ from dataclasses import replace
 
 from gearfmu.errors import Problem
 from gearfmu.ranges import kernel_limits
+from gearfmu.spec.forms.bearing_checks import unused_problems, use_problems, uses_of_supports
 from gearfmu.spec.forms.flank_checks import with_rolls
 from gearfmu.spec.forms.general import EngagementSpec, RingBody, ShaftBody, Stage, ToothedBody
 from gearfmu.spec.forms.pair_checks import geometry_problems, millimetres
 from gearfmu.spec.forms.planetary_checks import RingPair, ring_pair_problems
 from gearfmu.spec.forms.shapes import centre_distance, mesh_shape, toothed
+from gearfmu.spec.tables.bearings import BallBearing, RollerBearing
 from gearfmu.spec.tables.gear import PairSpec
 
 Found = Iterator[tuple[str, str, str]]
@@ -23,7 +25,11 @@ _SAME_RACK = ("normal_module", "pressure_angle")
 
 def general_problems(file: str, stage: Stage) -> list[Problem]:
     """Everything that is wrong with a stage whose single fields can be read."""
-    problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage))]
+    rolling = (
+        *use_problems(uses_of_supports(stage.supports), stage.bearings, stage.operating),
+        *unused_problems(stage.supports),
+    )
+    problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage), *rolling)]
     known = _what_can_be_judged(stage)
     problems += [Problem(file, *entry) for entry in (*_places(known), *_held(known))]
     for engagement in known.engagements:
@@ -53,6 +59,7 @@ def _counts(stage: Stage) -> Found:
     """Numbers of things that the kernel has room for."""
     directions = {"radial": 2, "axial": 1, "tilt": 2, "torsion": 1}
     held = sum(n for s in stage.supports for field, n in directions.items() if getattr(s, field) is not None)
+    held += sum(_directions(stage.bearings.get(s.bearing)) for s in stage.supports if s.bearing is not None)
     counts = {
         "rotors": (len(stage.rotors), "ROTORS", "rotors"),
         "bodies": (len(stage.gears), "GEARS", "toothed bodies"),
@@ -64,6 +71,11 @@ def _counts(stage: Stage) -> Found:
         most = int(kernel_limits()[row][1])
         if count > most:
             yield field, str(count), f"out of range: the kernel holds at most {most} {what}; leave some away"
+
+
+def _directions(bearing: BallBearing | RollerBearing | None) -> int:
+    """Directions in which a rolling bearing holds; those of balls where it is not known."""
+    return 4 if isinstance(bearing, RollerBearing) else 5
 
 
 def _rotors(stage: Stage) -> Found:

@@ -9,7 +9,8 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.shapes import gears_in_mesh
-from gearfmu.spec.reading.base import Name, Quantity, Spec, Text, refuse
+from gearfmu.spec.reading.base import Name, Quantity, Text, refuse
+from gearfmu.spec.tables.bearings import Bearings, LaterFields, OperatingSpec
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
 
@@ -21,8 +22,10 @@ def in_order(gears: dict[str, Table]) -> dict[str, Table]:
     return dict(sorted(gears.items())) if set(gears) == {"pinion", "wheel"} else gears
 
 
-class StageSpec(Spec):
+class StageSpec(LaterFields):
     """A gear stage as its file gives it; SI floats. `source` is that file."""
+
+    later = ("operating", "bearings")
 
     name: Name = Field(description="name of the stage, also of its FMU")
     description: Text = Field(default="", description="one line about the stage")
@@ -35,6 +38,10 @@ class StageSpec(Spec):
     pair: PairSpec = Field(description="the pair")
     gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel; under other names the pinion first")
     contact: ContactSpec = Field(description="tooth contact")
+    bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the gears, by name")
+    operating: OperatingSpec | None = Field(
+        default=None, description="load at which rolling bearings are linearised; needed where there are some"
+    )
     ports: dict[str, PortSpec] = Field(description="one port a shaft")
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
 

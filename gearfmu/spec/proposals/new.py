@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.reading.base import Quantity, fields_by_key, inner_model, metadata_of
+from gearfmu.spec.reading.base import Quantity, fields_by_key, inner_model, metadata_of, model_of_table, read_toml
 from gearfmu.spec.reading.layers import read_layers
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -39,7 +39,7 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
     target = _target(name, folder)
     source = find_stage(like)
     if load_stage(source).written.kind == "general":
-        text = _renamed(source.read_text(encoding="utf-8-sig"), name, str(like))
+        text = _renamed(source, name, str(like))
     else:
         own = {"name": name, "description": _DESCRIPTION.format(like=like)}
         text = stage_text(read_layers(source).tables | own, _HEAD.format(name=name, origin=f'made like "{like}"'))
@@ -81,9 +81,14 @@ def _target(name: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / name / "stage.toml"
 
 
-def _renamed(text: str, name: str, like: str) -> str:
-    """The file of a general stage, which has its comments already, under another name and description."""
-    for key, value in (("name", name), ("description", _DESCRIPTION.format(like=like))):
+def _renamed(source: Path, name: str, like: str) -> str:
+    """The file of a general stage, which has its comments already, under another name and description; its base by its
+    whole path."""
+    text, base = source.read_text(encoding="utf-8-sig"), read_toml(source).get("base")
+    values = {"name": name, "description": _DESCRIPTION.format(like=like)}
+    if base is not None:
+        values["base"] = (source.parent / base).resolve().as_posix()
+    for key, value in values.items():
         text = re.sub(rf'^{key} = ".*"', f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
     return text
 
@@ -133,7 +138,7 @@ def _table(
                 yield from _absent(inner, own, field)
             else:
                 yield f"\n[{'.'.join(own)}]  # {field.description}"
-                yield from _table(inner, table or {}, own, marks)
+                yield from _table(model_of_table(field.annotation, table) or inner, table or {}, own, marks)
 
 
 def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:

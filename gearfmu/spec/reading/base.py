@@ -27,7 +27,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
-_KINDS_OF_BODY = ("gear", "shaft")
+_KINDS = ("gear", "shaft", "ball", "roller", "springs", "catalogue")  # pydantic's marks of classes that were chosen
 _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 
@@ -169,8 +169,8 @@ def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
     for part in loc:
-        if isinstance(raw, dict) and part not in raw and part in _KINDS_OF_BODY:
-            continue  # pydantic's mark of the class that was chosen by `kind`
+        if isinstance(raw, dict) and part not in raw and part in _KINDS:
+            continue
         inside, label = _step(raw, part)
         path += label if label.startswith("[") or not path else f".{label}"
         raw = inside
@@ -182,7 +182,7 @@ def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
     path: list[Any] = []
     for part in loc:
         if isinstance(raw, dict):
-            if part not in raw and part in _KINDS_OF_BODY:
+            if part not in raw and part in _KINDS:
                 continue
             key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
             raw = raw.get(key)
@@ -239,10 +239,18 @@ def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, An
     return fields_by_key(choices[0])
 
 
+def model_of_table(annotation: Any, table: object) -> type[BaseModel] | None:
+    """The spec class in an annotation that a table is read as; the first where the table says nothing."""
+    choices = inner_models(annotation)
+    named = [choice for choice in choices if isinstance(table, dict) and table.get("kind") in _kinds(choice)]
+    keyed = [choice for choice in choices if isinstance(table, dict) and vars(choice).get("key") in table]
+    return next(iter(named or keyed or choices), None)
+
+
 def _kinds(kind: type[BaseModel]) -> tuple[Any, ...]:
-    """The values of `kind` by which a class of several is chosen."""
+    """The values of `kind`, or the tag, by which a class of several is chosen."""
     field = kind.model_fields.get("kind")
-    return get_args(field.annotation) if field is not None else ()
+    return get_args(field.annotation) if field is not None else (getattr(kind, "tag", None),)
 
 
 def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:

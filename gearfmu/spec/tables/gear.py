@@ -7,18 +7,20 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Whole, refuse
+from gearfmu.spec.tables.bearings import Bearing as Bearing
+from gearfmu.spec.tables.bearings import Diameter as Diameter
+from gearfmu.spec.tables.bearings import GearBearing
+from gearfmu.spec.tables.bearings import Ratio as Ratio
 from gearfmu.spec.tables.flanks import Toothing
 from gearfmu.spec.tables.imported import ImportSpec
 from gearfmu.spec.tables.lead import Length as Length
 from gearfmu.spec.tables.lead import Misalignment
 
 Factor = Annotated[float, Quantity("rack_factor")]
-Ratio = Annotated[float, Quantity("damping_ratio")]
 SurfaceCoupling = Literal["averaging", "rigid"]
 
 
 Module = Annotated[float, Quantity("module")]
-Diameter = Annotated[float, Quantity("diameter")]
 TipDiameter = Annotated[float, Quantity("tip_diameter")]
 FaceWidth = Annotated[float, Quantity("face_width")]
 TipEdge = Annotated[float, Quantity("tip_edge_radius")]
@@ -63,19 +65,6 @@ class Material(Spec):
     youngs_modulus: Annotated[float, Quantity("youngs_modulus")] = Field(description="Young's modulus E")
     poisson_ratio: Annotated[float, Quantity("poisson_ratio")] = Field(description="Poisson's ratio")
     density: Annotated[float, Quantity("density")] = Field(description="density")
-
-
-class Bearing(Spec):
-    """Bearing between the bore node and the ground, the same in every direction across the axis."""
-
-    stiffness: Annotated[float, Quantity("bearing_stiffness")] = Field(description="radial stiffness")
-    axial: Annotated[float, Quantity("axial_stiffness")] | None = Field(
-        default=None, description="axial stiffness; without it the gear does not move along its axis (spur gears only)"
-    )
-    tilt: Annotated[float, Quantity("tilt_stiffness")] | None = Field(
-        default=None, description="stiffness against tilting; without it the gear does not tilt (spur gears only)"
-    )
-    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
 
 
 class MeshSpec(Spec):
@@ -151,7 +140,7 @@ class GearSpec(Toothing):
     rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
     material: Material = Field(description="material")
     modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    bearing: Bearing = Field(description="bearing")
+    bearing: GearBearing = Field(description="bearing")
     body: BodySpec = Field(description="mesh and reduction")
     imported: ImportSpec | None = Field(
         default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"

@@ -31,6 +31,7 @@ from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.nodal import nodal_sections
 from gearfmu.stage.build.observed import observed_number, observed_sections
 from gearfmu.stage.build.oil import film_starts, friction_starts
+from gearfmu.stage.build.rolling import Settled, Statics, Tangents, settle
 from gearfmu.stage.build.slices import smeared, smeared_tip
 from gearfmu.stage.build.spinning import turn_rates
 from gearfmu.stage.build.tables import ROLLS, stored_points
@@ -38,6 +39,8 @@ from gearfmu.stage.build.teeth import gear_section, mismatches
 from gearfmu.stage.build.whirls import whirl_rows
 
 MODEL_VERSION = 5
+_KEPT = 16  # stages whose bearings are remembered
+_SETTLED: dict[str, Settled] = {}
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
@@ -57,7 +60,8 @@ def assemble(
     stage.require_motion()
     hashes = tuple(body.input_hash for body in bodies)
     made_of = {"made_of": _made_of(stage, bodies, rolls, observe)}
-    sections = order_sections(with_guid(general_sections(stage, bodies, rolls, observe) | made_of))
+    found = general_sections(stage, bodies, rolls, observe, tangents_of(stage, bodies))
+    sections = order_sections(with_guid(found | made_of))
     model = StageModel(stage, write_blob(sections), hashes)
     starts = friction_starts(stage) | film_starts(stage)
     return model.with_starts(starts) if starts else model
@@ -77,15 +81,16 @@ def general_sections(
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
+    tangents: Tangents = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """Every section of the blob of `assemble`, by name."""
+    """Every section of the blob of `assemble`, by name. tangents: of the rolling bearings."""
     bodies, carriers = _parted(stage, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
     flanks = [stored_points(body, s.s_form, s.s_tip, rolls) for body, s in zip(bodies, shapes, strict=True)]
-    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks])
+    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks], tangents)
     nodes = port_nodes(stage, carriers)
     groups = mount_sets(layout)
     degrees = width_degrees(stage, bodies)
@@ -124,8 +129,37 @@ def general_sections(
 
 def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)
-    return mount(stage_layout(stage, bodies, carriers=carriers))
+    return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
+
+
+def tangents_of(stage: Stage, bodies: Sequence[object]) -> Tangents:
+    """(d, d) stiffness of every rolling bearing at the operating torque, by the name of its support; bodies as of
+    `assemble`. ModelError: `settle`."""
+    return settled(stage, bodies).tangents if stage.rolling else {}
+
+
+def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None) -> Settled:
+    """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None. ModelError where
+    it has none, and as of `settle`."""
+    if not stage.rolling:
+        raise ModelError(
+            f"{stage.name} has no rolling bearings: give some of its supports one (docs/howto-bearings.md)"
+        )
+    assert stage.operating is not None
+    at = stage.operating.torque if torque is None else torque
+    key = f"{_made_of(stage, bodies, ROLLS, ())} {at!r}"
+    if key not in _SETTLED:
+
+        def statics_with(tangents: Tangents) -> Statics:
+            found = order_sections(general_sections(stage, bodies, ROLLS, (), tangents))
+            return Statics.of(found, write_blob(found))
+
+        while len(_SETTLED) >= _KEPT:
+            _SETTLED.pop(next(iter(_SETTLED)))
+        _SETTLED[key] = settle(stage, at, statics_with)
+    return _SETTLED[key]
 
 
 def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
@@ -264,11 +298,15 @@ def flank_sections(
 def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
     carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
+    own = np.diag(group.support_compliance)
+    coupling = group.support_compliance - np.diag(own)
+    coupled = {f"support_coupling{number}": coupling} if coupling.any() else {}
     rotors, whirls = whirl_rows(group)
     whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
     return (
         carried
         | whirling
+        | coupled
         | {
             f"omega_ground{number}": group.omega,
             f"zeta_ground{number}": group.zeta,
@@ -276,7 +314,7 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
             f"damper_rows{number}": group.damper_rows,
             f"damper{number}": group.damper,
             f"support_rows{number}": group.support_rows,
-            f"support_compliance{number}": np.diag(group.support_compliance),
+            f"support_compliance{number}": own,
             f"kappa{number}": group.kappa,
             f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
                 len(nodes), group.omega.size

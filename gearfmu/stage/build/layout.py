@@ -20,6 +20,7 @@ from gearfmu.stage.build.groups import Layout, Support
 from gearfmu.stage.build.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
 
 SAME_PLACE = 1e-9  # m
+ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
 
@@ -85,10 +86,11 @@ def stage_layout(
     bodies: Sequence[Any],
     carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
     points: Sequence[np.ndarray] | None = None,
+    tangents: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> Layout:
     """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
     `carriers`. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read; the even
-    grid of ROLLS where None."""
+    grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     points = even_grids(stage, bodies, ROLLS) if points is None else points
     free: list[FreeBody] = []
@@ -112,7 +114,8 @@ def stage_layout(
             if rotor.carried_by is not None
         },
     )
-    return replace(bare, supports=[_support(stage, nodes, bare, support) for support in stage.supports])
+    springs = [_springs(bare, nodes.numbers[s.body], s, tangents.get(s.name)) for s in stage.supports]
+    return replace(bare, supports=[_support(stage, nodes, *of) for of in zip(stage.supports, springs, strict=True)])
 
 
 def even_grids(stage: Stage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
@@ -144,26 +147,53 @@ def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
     return free_shaft(shaft.name, beam, shaft.modal_damping)
 
 
-def _support(stage: Stage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
-    at, directions, compliance, damping = place_of(stage, support), [], [], []
-    first = nodes.find(stage, support.body, at, support.node if support.to is None else None)
+@dataclass(frozen=True)
+class _Springs:
+    """directions (d,); compliance (d, d), m/N …; damping (d,), N·s/m …: of a support."""
+
+    directions: tuple[int, ...]
+    compliance: np.ndarray
+    damping: np.ndarray
+
+
+def _springs(layout: Layout, body: int, support: SupportSpec, tangent: np.ndarray | None) -> _Springs:
+    """The springs that a stage file gives, or the tangent (d, d) of a rolling bearing, whose dashpots follow its
+    diagonal."""
+    if tangent is not None:
+        held = ROLLING[len(tangent)]
+        masses = np.array([layout.mass(body, direction) for direction in held])
+        return _Springs(held, _inverse(tangent), 2 * support.damping_ratio * np.sqrt(np.diag(tangent) * masses))
+    assert support.bearing is None, f"{support.name}: a rolling bearing has a stiffness at a load only"
+    directions, compliance, damping = [], [], []
     for field, own in STIFFNESS.items():
         stiffness = getattr(support, field)
         if stiffness is None:
             continue
         rigid = stiffness == "rigid"
         for direction in own:
-            mass = layout.mass(first[0], direction)
+            mass = layout.mass(body, direction)
             directions.append(direction)
             compliance.append(0.0 if rigid else 1 / stiffness)
             damping.append(0.0 if rigid else 2 * support.damping_ratio * math.sqrt(stiffness * mass))
+    return _Springs(tuple(directions), np.diag(compliance), np.array(damping))
+
+
+def _inverse(stiffness: np.ndarray) -> np.ndarray:
+    """Symmetric; scaled to a unit diagonal first."""
+    scale = 1 / np.sqrt(np.diag(stiffness))
+    inverse = np.linalg.inv(stiffness * np.outer(scale, scale)) * np.outer(scale, scale)
+    return np.asarray(0.5 * (inverse + inverse.T))
+
+
+def _support(stage: Stage, nodes: Nodes, support: SupportSpec, springs: _Springs) -> Support:
+    at = place_of(stage, support)
     return Support(
         name=f"{_kind(stage, support)}.{support.name}",
-        first=first,
+        first=nodes.find(stage, support.body, at, support.node if support.to is None else None),
         second=None if support.to is None else nodes.find(stage, support.to, at, support.node),
-        directions=tuple(directions),
-        compliance=np.diag(compliance),
-        damping=np.array(damping),
+        directions=springs.directions,
+        compliance=springs.compliance,
+        damping=springs.damping,
     )
 
 

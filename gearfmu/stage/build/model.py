@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -80,6 +81,12 @@ class StageModel(Shown):
     def guid(self) -> str:
         """GUID of its FMUs, 64 hex digits: from what the model was made of, so the same with any numpy and scipy."""
         return self.kernel().guid
+
+    @cached_property
+    def support_coupling(self) -> np.ndarray | None:
+        """(s, s) m/N …: compliance between different directions of a support; None where there are springs alone."""
+        found = read_blob(self.blob).get("support_coupling0") if self.stage.rolling else None
+        return None if found is None else np.reshape(np.asarray(found, float), (-1, math.isqrt(len(found))))
 
     def kernel(self, **parameters: float) -> Kernel:
         """A fresh instance; dots in parameter names are written as they are: kernel(**{"effect.hertz": 0})."""

@@ -190,6 +190,7 @@ static void read_ground(gk_reader *r, gk_model *m, int set)
     g->damper_rows = gk_read_bounded(r, F_SET_damper_rows, 1e6), g->damper = gk_read_take(r, F_SET_damper);
     g->support_rows = gk_read_bounded(r, F_SET_support_rows, 1e6), g->kappa = gk_read_bounded(r, F_SET_kappa, 1e17);
     g->support_compliance = gk_read_bounded(r, F_SET_support_compliance, 1e3);
+    g->support_coupling = gk_read_bounded(r, F_SET_support_coupling, 1e3);
     g->port_rows = gk_read_bounded(r, F_SET_port_rows, 1e6);
     g->carried_rows = gk_read_bounded(r, F_SET_carried_rows, 1e6);
     if (m->carried && !g->carried_rows) gk_read_refuse(r, "motion of carried bodies", "is missing");

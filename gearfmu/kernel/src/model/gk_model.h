@@ -114,8 +114,8 @@ typedef struct gk_port {
 /* ground oscillators of one set */
 typedef struct gk_ground {
     int n;
-    const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance, *kappa,
-        *port_rows, *carried_rows, *whirl_rows;
+    const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance,
+        *support_coupling, *kappa, *port_rows, *carried_rows, *whirl_rows;
 } gk_ground;
 
 struct gk_model {

@@ -82,9 +82,12 @@ static void support_outputs(const gk_model *model, const gk_setup *setup, const 
     gk_supports_forces(model, setup, work, data, force, of_spring);
     gk_supports_turn(model, data, 1.0, force);
     gk_supports_turn(model, data, 1.0, of_spring);
+    const gk_ground *ground = &model->ground[setup->base.set];
     for (int s = 0; s < model->supports; s++) {
         GK_OF(data, support)[s][V_FORCE] = force[s];
-        GK_OF(data, support)[s][V_MOVED] = of_spring[s] * model->ground[setup->base.set].support_compliance[s];
+        GK_OF(data, support)[s][V_MOVED] = of_spring[s] * ground->support_compliance[s];
+        for (int t = 0; ground->support_coupling && t < model->supports; t++)
+            GK_OF(data, support)[s][V_MOVED] += of_spring[t] * ground->support_coupling[s * model->supports + t];
     }
 }
 

@@ -152,6 +152,9 @@ static void fill_supports(const gk_model *model, gk_base *base)
                 const double kappa = ground->kappa[s * supports + t];
                 moved[k] += kappa * ground->support_rows[t * ground->n + base->which[k]];
                 damped[k] += kappa * ground->support_compliance[t] * ground->damper[t] * base->damper_rows[t * n + k];
+                for (int u = 0; ground->support_coupling && u < supports; u++)
+                    damped[k] += kappa * ground->support_coupling[t * supports + u] * ground->damper[u] *
+                                 base->damper_rows[u * n + k];
             }
         }
         base->support_span[s] = span_of(moved, n);

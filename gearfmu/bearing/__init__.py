@@ -1,0 +1,22 @@
+"""Rolling bearings after ISO/TS 16281: one potential of the displacement between the rings, forces, stiffness."""
+
+from gearfmu.bearing.catalogue import Filled, filled_ball, filled_roller
+from gearfmu.bearing.law import Balls, Rolling, Row
+from gearfmu.bearing.passing import pass_orders, pass_swing
+from gearfmu.bearing.rest import NoRestError, Rest, rest
+from gearfmu.bearing.rollers import Rollers
+
+__all__ = [
+    "Balls",
+    "Filled",
+    "NoRestError",
+    "Rest",
+    "Rollers",
+    "Rolling",
+    "Row",
+    "filled_ball",
+    "filled_roller",
+    "pass_orders",
+    "pass_swing",
+    "rest",
+]

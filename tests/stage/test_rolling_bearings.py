@@ -1,0 +1,236 @@
+"""Stages on rolling bearings: loads balance the meshes, load and stiffness agree, the linear model has them whole."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfmu.bearing import rest
+from gearfmu.body import load_bodies
+from gearfmu.errors import ModelError
+from gearfmu.modes.linear import Linearised
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.bearings import OperatingSpec
+from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.build.assembly import settled, tangents_of
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.build.rolling import SETTLED, Settled
+from gearfmu.stage.run.bearings import stage_bearings
+
+TRAIN, PAIR = "two_stage/stage_bearings", "helical_demo/stage_bearings"
+
+
+@cache
+def loaded(name: str) -> tuple[Any, list[Any]]:
+    spec = load_stage(name)
+    return spec, load_bodies(spec)
+
+
+@cache
+def found(name: str, torque: float | None = None) -> Settled:
+    return settled(*loaded(name), torque)
+
+
+@cache
+def model(name: str) -> StageModel:
+    return assemble(*loaded(name))
+
+
+def mesh_force(stage: Any, number: int, torque: float) -> tuple[float, float]:
+    """Across and along the axes, N, of an engagement whose gear A has that torque, N·m."""
+    gear = mesh_shape(stage, stage.engagements[number]).gears[0]
+    return torque / gear.r_b, torque / gear.r_b * math.tan(abs(gear.beta_b))
+
+
+# ---- loads ----------------------------------------------------------------------------------------------------------
+def test_bearings_of_a_shaft_carry_its_meshes() -> None:
+    """The first shaft has one mesh, the last one another: T/r_b across and T tan β_b/r_b along the axis, to 1e-3:
+    displaced axes turn the line of action a little."""
+    stage, states = loaded(TRAIN)[0], found(TRAIN).rests
+    for shaft, number, torque in (("input", 0, 100.0), ("output", 1, 100.0 * 61 / 25)):
+        across, along = mesh_force(stage, number, torque)
+        total = states[f"{shaft}_left"].load + states[f"{shaft}_right"].load
+        assert math.hypot(*total[:2]) == pytest.approx(across, rel=1e-3)
+        assert abs(total[2]) == pytest.approx(along, rel=1e-3)
+        assert states[f"{shaft}_right"].load[2] == 0.0  # rollers
+
+
+def test_both_gears_of_a_pair_press_alike() -> None:
+    stage, states = loaded(PAIR)[0], found(PAIR).rests
+    across, along = mesh_force(stage, 0, 100.0)
+    for name in ("pinion", "wheel"):
+        assert math.hypot(*states[name].load[:2]) == pytest.approx(across, rel=1e-3)
+    assert states["pinion"].load[:3] == pytest.approx(-states["wheel"].load[:3], rel=1e-3)
+    assert abs(states["pinion"].load[2]) == pytest.approx(along, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", [TRAIN, PAIR])
+def test_load_and_stiffness_agree(name: str) -> None:
+    own = found(name)
+    assert own.iterations <= 4
+    for support, state in own.rests.items():
+        bearing = own.bearings[support]
+        alone = rest(bearing, state.load)
+        assert alone.displacement == pytest.approx(state.displacement, rel=1e-5, abs=1e-10)
+        free = np.ix_(bearing.directions, bearing.directions)
+        scale = np.outer(*2 * [np.array([1, 1, 1, 0.03, 0.03])[list(bearing.directions)]])
+        apart = np.abs(alone.stiffness[free] - own.tangents[support]) / scale
+        assert apart.max() < 2 * SETTLED * np.abs(own.tangents[support] / scale).max()
+
+
+def test_a_turned_stage_has_turned_bearings() -> None:
+    """All axes 40° further about z: loads and stiffnesses turn with them, averaged over the cage to 1 %."""
+    spec, bodies = loaded(TRAIN)
+    c, s = math.cos(math.radians(40)), math.sin(math.radians(40))
+    turned = {
+        name: rotor.model_copy(
+            update={"axis": (c * rotor.axis[0] - s * rotor.axis[1], s * rotor.axis[0] + c * rotor.axis[1])}
+        )
+        for name, rotor in spec.rotors.items()
+    }
+    plane = np.array([[c, -s], [s, c]])
+    other, own = settled(spec.model_copy(update={"rotors": turned}), bodies), found(TRAIN)
+    for name, state in own.rests.items():
+        assert other.rests[name].load[:2] == pytest.approx(plane @ state.load[:2], rel=3e-3, abs=5.0)
+        one, two = own.tangents[name][:2, :2], other.tangents[name][:2, :2]
+        assert np.abs(two - plane @ one @ plane.T).max() < 0.01 * np.abs(one).max()
+
+
+def test_without_load_only_preload_holds() -> None:
+    """The tangent of a preloaded pair is the second derivative in its middle; rings do not move."""
+    own = found(PAIR, 0.0)
+    for name, bearing in own.bearings.items():
+        assert own.rests[name].load == pytest.approx(np.zeros(5), abs=1e-6)
+        assert own.tangents[name] == pytest.approx(bearing.stiffness(np.zeros(5)), rel=1e-9, abs=1e-3)
+        assert own.rests[name].loads.min() > 0.0  # all balls are pressed
+
+
+def test_an_axial_load_on_the_open_side_is_refused() -> None:
+    """The input shaft is pushed towards +z; an angular contact bearing that carries −z lets it go."""
+    spec, bodies = loaded(TRAIN)
+    angular = spec.bearings["6306"].model_copy(update={"contact_angle": math.radians(25.0), "clearance": 0.0})
+
+    def facing(side: str) -> Settled:
+        supports = [s.model_copy(update={"carries": side}) if s.name == "input_left" else s for s in spec.supports]
+        changed = {"bearings": spec.bearings | {"6306": angular}, "supports": tuple(supports)}
+        return settled(spec.model_copy(update=changed), bodies)
+
+    with pytest.raises(ModelError, match="cannot carry 100 N"):
+        facing("-z")
+    assert facing("+z").rests["input_left"].load[2] > 0.0
+
+
+def test_stages_without_rolling_bearings_have_none() -> None:
+    with pytest.raises(ModelError, match="has no rolling bearings"):
+        settled(*loaded("helical_demo"))
+    assert tangents_of(*loaded("helical_demo")) == {}
+
+
+# ---- the linear model -----------------------------------------------------------------------------------------------
+def test_springs_given_as_tangents_are_the_springs() -> None:
+    """A bearing whose tangent is diagonal makes the support that a file with these stiffnesses makes."""
+    spec, bodies = loaded("two_stage")
+    rolled = loaded(TRAIN)[0]
+    held = {s.name: s for s in spec.supports if s.to is None}
+    tangents = {}
+    for name, s in held.items():
+        values = [s.radial, s.radial, s.axial, s.tilt, s.tilt]
+        tangents[name] = np.diag([value for value in values if value is not None])
+    for one, two in zip(
+        stage_layout(spec, bodies).supports, stage_layout(rolled, bodies, tangents=tangents).supports, strict=True
+    ):
+        assert (one.name, one.first, one.second, one.directions) == (two.name, two.first, two.second, two.directions)
+        assert two.compliance == pytest.approx(one.compliance, rel=1e-14, abs=0)
+        assert two.damping == pytest.approx(one.damping, rel=1e-14)
+
+
+def springs(of: StageModel) -> tuple[dict[str, Any], np.ndarray]:
+    """Sections of the blob, and the compliance of all supports."""
+    sections = read_blob(of.blob)
+    own = np.asarray(sections["support_compliance0"])
+    return sections, np.diag(own) + np.asarray(sections["support_coupling0"]).reshape(own.size, own.size)
+
+
+@pytest.mark.parametrize("name", [TRAIN, PAIR])
+def test_the_blob_holds_the_whole_tangent(name: str) -> None:
+    sections, compliance = springs(model(name))
+    names = [entry.split(".")[1] for entry in str(sections["support_names"]).split("|")]
+    kinds = [entry.split(".")[0] for entry in str(sections["support_names"]).split("|")]
+    for support, tangent in found(name).tangents.items():
+        own = [i for i, entry in enumerate(names) if entry == support and kinds[i] == "bearing"]
+        assert compliance[np.ix_(own, own)] @ tangent == pytest.approx(np.eye(len(own)), abs=1e-9)
+        others = [i for i in range(len(names)) if i not in own]
+        assert not compliance[np.ix_(own, others)].any()
+    assert "support_coupling1" not in sections  # held
+
+
+def test_displacements_and_dampers_follow_the_whole_tangent() -> None:
+    """At rest a displacement output is the compliance times all forces of its bearing; dampers press through κ K_s⁻¹ on
+    the supports."""
+    kernel = model(PAIR).kernel(level=1.0)
+    kernel.set("pinion.phi", 0.01)
+    kernel.initialize()
+    sections, compliance = springs(model(PAIR))
+    forces = np.array([kernel.get(entry) for entry in str(sections["support_names"]).split("|")])
+    moved = np.array([kernel.get(entry) for entry in str(sections["displacement_names"]).split("|")])
+    assert np.abs(forces).max() > 1000.0
+    assert moved == pytest.approx(compliance @ forces, rel=1e-9, abs=1e-15)
+    assert np.abs(moved - np.diag(compliance) * forces).max() > 0.01 * np.abs(moved).max()  # coupling matters
+    linear = kernel.linearise()
+    size = len(forces)
+    kappa, rows = (np.asarray(sections[key]).reshape(size, -1) for key in ("kappa0", "damper_rows0"))
+    expected = kappa @ compliance @ (np.asarray(sections["damper0"])[:, None] * rows)
+    ground = linear.group == 0
+    wanted = expected[:, linear.number[ground]]
+    assert np.abs(linear.support_damping[:, ground] - wanted).max() < 1e-9 * np.abs(wanted).max()
+
+
+def test_energy_of_coupled_directions_is_that_of_bearings() -> None:
+    """Shares of the modes are those of the same stage with the coupling counted by hand, and none is negative."""
+    linear_model = model(PAIR)
+    kernel = linear_model.kernel(level=3.0)
+    kernel.prepare()
+    kernel.transmission(0.0, 100.0)
+    linear = kernel.linearise()
+    own, without = (Linearised(linear, coupling=c) for c in (linear_model.support_coupling, None))
+    squared, shapes, _ = own.shapes(6)
+    shares, bare = own.values(squared, shapes)[2], without.values(squared, shapes)[2]
+    forces = np.linalg.solve(own.compliance, linear.rows @ shapes)
+    pressed = linear.support_rows @ shapes - linear.support_forces @ forces
+    _, compliance = springs(linear_model)
+    by_hand = np.einsum("sk,st,tk->k", pressed, compliance, pressed) / squared
+    assert shares[:, 1] == pytest.approx(by_hand, rel=1e-9)
+    assert shares.min() > -1e-9 and np.abs(shares - bare).max() > 1e-3
+
+
+def test_bearings_belong_to_the_model() -> None:
+    """Torque and numbers of bearings change its hash and the GUID of its FMUs."""
+    spec, bodies = loaded(PAIR)
+    loose = spec.bearings | {"7305": spec.bearings["7305"].model_copy(update={"preload": 100.0})}
+    others = [
+        spec.model_copy(update={"operating": OperatingSpec(torque=50.0)}),
+        spec.model_copy(update={"bearings": loose}),
+    ]
+    models = [model(PAIR), *(assemble(other, bodies) for other in others)]
+    assert len({own.hash for own in models}) == len({own.guid for own in models}) == 3
+
+
+# ---- the table ------------------------------------------------------------------------------------------------------
+def test_the_table_says_what_was_proposed() -> None:
+    table = stage_bearings(*loaded(TRAIN))
+    ball, roller = table["input_left"], table["input_right"]
+    assert set(ball.proposed) == set(ball.numbers) and "balls" in ball.numbers
+    assert "rollers" in roller.numbers and "width" not in roller.numbers
+    assert roller.stiffness[2].tolist() == [0.0] * 5
+    assert 0 < ball.loaded <= ball.elements and ball.pressure > 5e8
+    assert ball.orders[0] + ball.orders[1] == pytest.approx(ball.elements)
+    columns = table.columns()
+    assert {len(column) for column in columns.values()} == {6}
+    assert columns["load_x"][0] == pytest.approx(ball.load[0])
+    assert "6 rolling bearings of two_stage_bearings at 100 N·m" in str(table)
