@@ -235,8 +235,7 @@ class Origin:
     """The file of a pair or of a set, which a stage was expanded from; of a general stage nothing.
 
     form: the file's own tables; places: of bodies, their tables there; files: of bodies that share one reduced body,
-    its name; limits, load_sharing: of the stage as a whole; missing: fields that it needs to move.
-    """
+    its name; limits, load_sharing: of the stage as a whole; missing: fields that it needs to move."""
 
     form: Form | None = None
     places: Mapping[str, str] = field(default_factory=dict)
@@ -294,10 +293,9 @@ class Stage(LaterFields):
         if unknown := set(update or {}) - set(type(self).model_fields):
             raise AttributeError(f"a Stage has no {', '.join(sorted(unknown))}: change what is written in its file")
         found, form = super().model_copy(update=update, deep=deep), self._origin.form
-        if form is not None and set(update or {}) <= _OF_BOTH & set(type(form).model_fields):
-            found._origin = replace(self._origin, form=form.model_copy(update=update))
-        elif form is not None:
-            found._origin = Origin()
+        if form is not None:
+            said = set(update or {}) <= _OF_BOTH & set(type(form).model_fields)
+            found._origin = replace(self._origin, form=form.model_copy(update=update)) if said else Origin()
         return found
 
     if not TYPE_CHECKING:  # as in BaseModel, so that checkers find names that are none
