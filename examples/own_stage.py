@@ -33,7 +33,7 @@ path.write_text(text, encoding="utf-8")
 for stage in ("fzg_c", path):
     spec = gf.load(stage)
     te = 1e6 * gf.te(spec, TORQUE, 32).te[0]
-    ratio = spec.geometry.tip_circle_contact_ratio
+    ratio = spec.written.geometry.tip_circle_contact_ratio
     print(
         f"{spec.name}: contact ratio {ratio:.3f}, transmission error mean {te.mean():.2f} µm, "
         f"peak to peak {te.max() - te.min():.2f} µm"

@@ -20,11 +20,14 @@ def test_a_new_pair_has_what_was_asked_for(tmp_path: Path) -> None:
     (2 tan α)."""
     asked = {"teeth": (31, 73), "diametral_pitch": 10, "width": "30 mm", "shifts": (0.3, 0.1)}
     spec = gf.load(gf.new("mine", folder=tmp_path, bores=("20 mm", "40 mm"), relief="12 um", **asked))  # type: ignore
-    assert spec.pair.normal_module == pytest.approx(2.54e-3) and [g.profile_shift for g in spec.gears] == [0.3, 0.1]
+    assert spec.written.pair.normal_module == pytest.approx(2.54e-3) and [g.profile_shift for g in spec.gears] == [
+        0.3,
+        0.1,
+    ]
     assert [gear.bore_diameter for gear in spec.gears] == pytest.approx([0.02, 0.04])
     assert [gear.tip_relief.amount for gear in spec.gears] == pytest.approx([12e-6] * 2)
     alpha = math.radians(20)
-    working = math.acos(2.54e-3 * 104 / 2 * math.cos(alpha) / spec.pair.center_distance)
+    working = math.acos(2.54e-3 * 104 / 2 * math.cos(alpha) / spec.written.pair.center_distance)
     involute = math.tan(working) - working - (math.tan(alpha) - alpha)
     assert 104 * involute / (2 * math.tan(alpha)) == pytest.approx(0.4, abs=1e-5)
 
@@ -51,8 +54,8 @@ def test_a_set_takes_them_too(tmp_path: Path) -> None:
         gf.new("set", folder=tmp_path, teeth=(18, 18, 54), planets=3, module="2.5 mm", width="30 mm",
                bores=("10 mm", "12 mm"), relief="12 um")
     )  # fmt: skip
-    assert (spec.sun.bore_diameter, spec.planet.bore_diameter) == pytest.approx((0.01, 0.012))
-    assert spec.carrier.bolt_diameter < 0.012 and spec.planet.tip_relief is not None
+    assert (spec.written.sun.bore_diameter, spec.written.planet.bore_diameter) == pytest.approx((0.01, 0.012))
+    assert spec.written.carrier.bolt_diameter < 0.012 and spec.written.planet.tip_relief is not None
 
 
 def test_modes_is_a_function_and_a_package() -> None:

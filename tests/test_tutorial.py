@@ -16,7 +16,7 @@ def test_scenes_load_the_tutorials_pair_within_its_torque_max() -> None:
     page = PAGE.read_text(encoding="utf-8")
     (like, scene) = (re.search(pattern, page) for pattern in (r"new my_pair --like (\S+)", r"gearfmu run (\S+) --fmu"))
     assert like is not None and scene is not None
-    most, rig = load_stage(like[1]).torque_max, load_scene(scene[1]).test_rig
+    most, rig = load_stage(like[1]).written.torque_max, load_scene(scene[1]).test_rig
     assert rig is not None and abs(rig.torque) <= most
     assert f"the scene puts {rig.torque:g} N·m on the pinion" in page and f"{most:g} N·m here" in page
     asked = re.search(r'--fmu my_pair.fmu --torque "(\d+) N\*m"', page)

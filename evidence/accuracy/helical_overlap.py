@@ -32,7 +32,9 @@ from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.report.style import panels, styled
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import GearSpec, MeshSpec
 from gearfmu.stage import assemble, loaded_te
 
@@ -46,21 +48,21 @@ HERE = Path(__file__).parent
 TABLE, CHART = HERE / "helical_overlap.csv", HERE.parents[1] / "docs" / "pictures" / "helical_overlap.png"
 
 
-def stage_at(overlap: float) -> StageSpec:
+def stage_at(overlap: float) -> Stage:
     """`helical_demo` with another helix angle and the same transverse section."""
     demo = load_stage("helical_demo")
-    m_t = demo.pair.normal_module / math.cos(demo.pair.helix_angle)
-    alpha_t = math.atan(math.tan(demo.pair.pressure_angle) / math.cos(demo.pair.helix_angle))
+    m_t = demo.written.pair.normal_module / math.cos(demo.written.pair.helix_angle)
+    alpha_t = math.atan(math.tan(demo.written.pair.pressure_angle) / math.cos(demo.written.pair.helix_angle))
     beta = math.atan(overlap * math.pi * m_t / WIDTH)
-    pair = demo.pair.model_copy(
+    pair = demo.written.pair.model_copy(
         update={
             "helix_angle": beta,
             "normal_module": m_t * math.cos(beta),
             "pressure_angle": math.atan(math.tan(alpha_t) * math.cos(beta)),
         }
     )
-    scale = demo.pair.normal_module / pair.normal_module
-    return demo.model_copy(update={"pair": pair, "gears": tuple(_gear(gear, scale) for gear in demo.gears)})
+    scale = demo.written.pair.normal_module / pair.normal_module
+    return rewritten(demo, pair=pair, gears=tuple(_gear(gear, scale) for gear in demo.written.gears))
 
 
 def _gear(gear: GearSpec, scale: float) -> GearSpec:
@@ -79,10 +81,10 @@ def _gear(gear: GearSpec, scale: float) -> GearSpec:
     )
 
 
-def bodies_of(spec: StageSpec) -> list[ReducedBody]:
+def bodies_of(spec: Stage) -> list[ReducedBody]:
     """Bodies of both gears with static tables and a dozen modes of their own, without pictures and gyroscopic terms."""
     stored = load_bodies(load_stage("helical_demo"))
-    return [_body(*entry) for entry in zip(stored, spec.gears, spec.geometry.gears, strict=True)]
+    return [_body(*entry) for entry in zip(stored, spec.written.gears, spec.written.geometry.gears, strict=True)]
 
 
 def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBody:
@@ -116,16 +118,16 @@ def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBo
     )
 
 
-def iso_stiffness(spec: StageSpec) -> float:
+def iso_stiffness(spec: Stage) -> float:
     """c_gamma_alpha (N/m²) of ISO 6336-1 method B for steel discs: c' = c'_th C_M C_R C_B cos β with C_M = 0.8 and
     C_R = 1, c_gamma_alpha = c' (0.75 ε_α + 0.25)."""
-    pair, beta = spec.geometry, spec.pair.helix_angle
-    z = [gear.teeth / math.cos(beta) ** 3 for gear in spec.gears]
-    x = [gear.profile_shift for gear in spec.gears]
+    pair, beta = spec.written.geometry, spec.written.pair.helix_angle
+    z = [gear.teeth / math.cos(beta) ** 3 for gear in spec.written.gears]
+    x = [gear.profile_shift for gear in spec.written.gears]
     q = 0.04723 + 0.15551 / z[0] + 0.25791 / z[1] - 0.00635 * x[0] - 0.11654 * x[0] / z[0]
     q += -0.00193 * x[1] - 0.24188 * x[1] / z[1] + 0.00529 * x[0] ** 2 + 0.00182 * x[1] ** 2
-    dedendum = sum(gear.rack.dedendum for gear in spec.gears) / 2
-    rack = (1 + 0.5 * (1.2 - dedendum)) * (1 - 0.02 * math.degrees(math.radians(20) - spec.pair.pressure_angle))
+    dedendum = sum(gear.rack.dedendum for gear in spec.written.gears) / 2
+    rack = (1 + 0.5 * (1.2 - dedendum)) * (1 - 0.02 * math.degrees(math.radians(20) - spec.written.pair.pressure_angle))
     single = 1e9 / q * 0.8 * rack * math.cos(beta)
     return single * (0.75 * pair.contact_ratio + 0.25)
 
@@ -133,12 +135,12 @@ def iso_stiffness(spec: StageSpec) -> float:
 def row(overlap: float) -> dict[str, Any]:
     """The table's row of an overlap ratio."""
     spec = stage_at(overlap)
-    pair, model = spec.geometry, assemble(spec, bodies_of(spec))
+    pair, model = spec.written.geometry, assemble(spec, bodies_of(spec))
     torques = [load * WIDTH * pair.gears[0].r_b for load in LINE_LOADS]
     result = loaded_te(model, torques, POSITIONS, rigid_bearings=True, slices=SLICES)
     found: dict[str, Any] = {
         "overlap_ratio": f"{overlap:g}",
-        "helix_angle_deg": f"{math.degrees(spec.pair.helix_angle):.3f}",
+        "helix_angle_deg": f"{math.degrees(spec.written.pair.helix_angle):.3f}",
         "contact_ratio": f"{pair.contact_ratio:.4f}",
     }
     for load, te, stiffness in zip(LINE_LOADS, result.te, result.mesh_stiffness, strict=True):

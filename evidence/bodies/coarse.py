@@ -77,7 +77,7 @@ def row(coarse: Any, own: Any) -> dict[str, Any]:
 def rows_of(stage: str | Path, folder: Path) -> list[dict[str, Any]]:
     """A row for every body of a stage."""
     spec = load(stage)
-    kept = len(current_bodies(spec)) == len(spec.gears) + (spec.kind == "planetary_set")
+    kept = len(current_bodies(spec)) == len(spec.files)
     own = reduce(spec, None if kept else folder / "own")
     coarse = reduce(coarse_stage(stage, folder / "coarse"))
     return [{"stage": spec.name} | row(*pair) for pair in zip(coarse, own, strict=True)]

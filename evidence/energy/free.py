@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.expand import rewritten, with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.gear import Bearing, GearSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
@@ -77,7 +78,7 @@ class Energies:
 class FreePair:
     """A stage with torque ports on both shafts, and its reduced bodies."""
 
-    spec: StageSpec
+    spec: Stage
     bodies: Sequence[Any]
     _mounted: dict[tuple[float | None, float], dict[str, Any]] = field(default_factory=dict, repr=False)
 
@@ -86,13 +87,13 @@ class FreePair:
         key = start.bearing, start.bearing_damping
         if key not in self._mounted:
             gears = tuple(_on_bearing(gear, body.mass, *key) for gear, body in self._pairs())
-            model = assemble(self.spec.model_copy(update={"gears": gears}), self.bodies)
+            model = assemble(rewritten(self.spec, gears=gears), self.bodies)
             self._mounted[key] = dict(read_blob(model.blob))
         return self._mounted[key]
 
     def place(self, start: Rattle) -> bytes:
         """Blob of the model turned to where `start` begins."""
-        shapes, sections = self.spec.geometry.gears, dict(self.sections(start))
+        shapes, sections = self.spec.written.geometry.gears, dict(self.sections(start))
         turn = 2 * math.pi * start.position
         free = start.load == 0.0 and start.play > 0
         back = (0.5 * start.play - start.offset) / shapes[0].r_b if free else 0.0
@@ -101,13 +102,13 @@ class FreePair:
         return write_blob(sections)
 
     def _pairs(self) -> Iterator[tuple[GearSpec, Any]]:
-        return zip(self.spec.gears, self.bodies, strict=True)
+        return zip(self.spec.written.gears, self.bodies, strict=True)
 
 
-def free_pair(spec: StageSpec, bodies: Sequence[Any]) -> FreePair:
+def free_pair(spec: Stage, bodies: Sequence[Any]) -> FreePair:
     """The stage with torque ports on both shafts."""
-    ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
-    return FreePair(spec.model_copy(update={"ports": ports}), bodies)
+    ports = {gear.name: PortSpec(kind="torque") for gear in spec.written.gears}
+    return FreePair(with_ports(spec, ports), bodies)
 
 
 def _on_bearing(gear: GearSpec, mass: float, stiffness: float | None, damping: float) -> GearSpec:
@@ -126,11 +127,11 @@ def started(
 ) -> Kernel:
     """A kernel of the pair at its start; `parameters` go over CONSERVING. Momenta along the mesh cancel: the pair
     stays where it is."""
-    geometry, inertia = pair.spec.geometry, pair.sections(start)["inertia"]
+    geometry, inertia = pair.spec.written.geometry, pair.sections(start)["inertia"]
     r_b = [gear.r_b for gear in geometry.gears]
     mass = [inertia[i] / r_b[i] ** 2 for i in (0, 1)]
     share = [mass[1 - i] / sum(mass) for i in (0, 1)]
-    names = [gear.name for gear in pair.spec.gears]
+    names = [gear.name for gear in pair.spec.written.gears]
     speeds = {f"{names[i]}.w_start": start.speed * share[i] / r_b[i] for i in (0, 1)}
     backlash = {"backlash": start.play / math.cos(geometry.alpha_wt)}
     kernel = Kernel(pair.place(start), {**CONSERVING, **speeds, **backlash, **(parameters or {})}, library)

@@ -42,7 +42,7 @@ class _Swinging(Wound):
 
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         values, s = self.steady.over(times), self.swing
-        pinion, omega = self.steady.model.spec.gears[0].name, 2 * math.pi * s.frequency
+        pinion, omega = self.steady.model.stage.gears[0].name, 2 * math.pi * s.frequency
         angle = (omega * times + s.phase).tolist()
         sine, cosine = (np.array(list(map(f, angle))) for f in (math.sin, math.cos))
         values[f"{pinion}.phi"] = values[f"{pinion}.phi"] + s.swing * sine

@@ -96,7 +96,7 @@ class Rotor:
 def make_rotor() -> Rotor:
     """From the stage's numbers."""
     spec = load_stage("fzg_c")
-    gear, shape = spec.gears[0], spec.geometry.gears[0]
+    gear, shape = spec.gears[0], spec.written.geometry.gears[0]
     flank = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, gear.face_width, gear.body.strip_half_width)
     mesh = gear_sector(shape, gear.face_width, COARSE)
     body = SectorBody(mesh, gear.material, flank, Points(flank.chebyshev_rolls(3), 1))

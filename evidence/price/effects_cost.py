@@ -28,6 +28,7 @@ from unittest.mock import patch
 from gearfmu.body import load_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel import build
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec
 from gearfmu.stage import StageModel, Steady, assemble
@@ -79,7 +80,7 @@ class Bench:
         self.plain = assemble(spec, bodies)
         self.own = {
             name: assemble(
-                spec.model_copy(update={"gears": (spec.gears[0].model_copy(update=data), spec.gears[1])}), bodies
+                rewritten(spec, gears=(spec.written.gears[0].model_copy(update=data), spec.written.gears[1])), bodies
             )
             for name, data in OWN_DATA.items()
         }

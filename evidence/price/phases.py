@@ -92,7 +92,7 @@ def profile(library: Path) -> list[dict[str, object]]:
             kernel.step(i * STEP, STEP)
         cycles, steps = quiet(blocks), kernel.get("solver.steps")
         cut = {"rigid": 0.0, "fast": spec.levels.fast_cut, "standard": spec.levels.standard_cut, "full": math.inf}[name]
-        counted = work(lanes(model, cut), PAIRS, (spec.contact.slices + 1) // 2)
+        counted = work(lanes(model, cut), PAIRS, (spec.written.contact.slices + 1) // 2)
         rows += [
             {
                 "level": name,

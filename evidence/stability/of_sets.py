@@ -16,7 +16,6 @@ from evidence.stability.motion import Constant, Step, UpAndDown
 from evidence.stability.of_pairs import turns_of
 from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, PlanetSet, shares, sun_torque
 from evidence.stability.record import Record, Watched
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import ChainSpec, PortSpec
@@ -219,7 +218,7 @@ class Shipped(PlanetSet):
 @lru_cache(maxsize=8)
 def _play(mesh: str) -> float:
     """Backlash of an engagement of the shipped set along its line of action, m."""
-    stage = as_general(load_stage("planetary54"))
+    stage = load_stage("planetary54")
     engagement = next(m for m in stage.engagements if m.name == mesh)
     return float(engagement.backlash * np.cos(mesh_shape(stage, engagement).alpha_wt))
 

@@ -15,7 +15,9 @@ from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
 from gearfmu.spec.tables.lead import LeadSpec
 from gearfmu.spec.tables.ports import PortSpec
@@ -60,12 +62,12 @@ class Pair(Bench):
     @property
     def geometry(self) -> PairGeometry:
         """Of the two gears."""
-        return self.model.spec.geometry
+        return self.model.stage.written.geometry
 
     @property
     def ratio(self) -> float:
         """Speed of the wheel over that of the pinion."""
-        gears = self.model.spec.gears
+        gears = self.model.stage.written.gears
         return -float(gears[0].teeth / gears[1].teeth)
 
     def turning(self, motion: Turn, loads: Sequence[Step]) -> Inputs:
@@ -120,18 +122,18 @@ def _model(bench: Pair) -> StageModel:
     return assemble(_spec(bench), _bodies())
 
 
-def _spec(bench: Pair) -> StageSpec:
+def _spec(bench: Pair) -> Stage:
     spec = load_stage(bench.stage)
     gears = []
-    for gear in spec.gears:
+    for gear in spec.written.gears:
         changes: dict[str, Any] = {}
         if bench.bearing is not None:
             changes["bearing"] = gear.bearing.model_copy(update={"stiffness": bench.bearing})
-        if bench.pitch_error and gear is spec.gears[0]:
+        if bench.pitch_error and gear is spec.written.gears[0]:
             changes["index_deviation"] = {0: bench.pitch_error}
         gears.append(gear.model_copy(update=changes | (DEVIATIONS if bench.deviating else {})))
     ports = spec.ports if bench.ports is None else dict(zip(SHAFTS, bench.ports, strict=True))
-    return spec.model_copy(update={"gears": tuple(gears), "ports": ports})
+    return rewritten(spec, gears=tuple(gears), ports=ports)
 
 
 @lru_cache(maxsize=64)
@@ -139,7 +141,7 @@ def _wound(bench: Pair, torque: float) -> float:
     """Angle (rad) of the pinion's outer end against the unloaded pair under a torque (N·m) on the pinion: both shafts
     and the mean quasi-static transmission error, backlash included where the torque is negative; without a torque the
     angle that centres the teeth of the pinion in the spaces of the wheel."""
-    spec, pair = bench.model.spec, bench.geometry
+    spec, pair = bench.model.stage, bench.geometry
     if not torque:
         return -0.5 * pair.normal_backlash / pair.gears[0].r_b
     if abs(torque) > LARGEST:

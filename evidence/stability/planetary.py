@@ -17,8 +17,10 @@ from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import member_of
-from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec
+from gearfmu.spec.forms.planetary import RingSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.ports import PortSpec
@@ -130,9 +132,9 @@ def thin_ring() -> tuple[RingSpec, ReducedBody]:
     body: reduced here in a few seconds, on a coarse mesh."""
     spec = load_stage(SET)
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
-    body = spec.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
-    ring = spec.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
-    return ring, reduced_gear(member_of(spec.model_copy(update={"ring": ring}), "ring"), "0" * 64)
+    body = spec.written.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
+    ring = spec.written.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
+    return ring, reduced_gear(member_of(rewritten(spec, ring=ring), "ring"), "0" * 64)
 
 
 @lru_cache(maxsize=2)
@@ -141,13 +143,13 @@ def _model(variant: PlanetSet) -> StageModel:
     return assemble(set_spec(variant), [sun, planet, thin_ring()[1] if variant.thin else ring, carrier])
 
 
-def set_spec(variant: PlanetSet) -> PlanetarySpec:
+def set_spec(variant: PlanetSet) -> Stage:
     """The shipped set with the changes of a variant."""
     spec = load_stage(SET)
     parts: dict[str, tuple[Any, float | None]] = {
-        "sun": (spec.sun, variant.sun),
-        "planet": (spec.planet, variant.pin),
-        "carrier": (spec.carrier, variant.carrier),
+        "sun": (spec.written.sun, variant.sun),
+        "planet": (spec.written.planet, variant.pin),
+        "carrier": (spec.written.carrier, variant.carrier),
     }
     changed: dict[str, Any] = {}
     for name, (part, stiffness) in parts.items():
@@ -158,8 +160,8 @@ def set_spec(variant: PlanetSet) -> PlanetarySpec:
     if variant.thin:
         changed["ring"] = thin_ring()[0]
     ports = dict(zip(SHAFTS, variant.ports, strict=True)) | ({} if variant.ring is None else {"ring": variant.ring})
-    displaced = spec.set.model_copy(update={"pin_errors": dict(variant.pins)})
-    return spec.model_copy(update={**changed, "set": displaced, "ports": ports})
+    displaced = spec.written.set.model_copy(update={"pin_errors": dict(variant.pins)})
+    return rewritten(spec, **changed, set=displaced, ports=ports)
 
 
 @lru_cache(maxsize=1)
@@ -190,10 +192,10 @@ def set_overlap(
     whichever is larger: transmission error of the engagement and, along the line of action, places of the planet and of
     the central gear in the axes of the carrier. What bolts, plate and rim of the ring give is left in it."""
     spec = set_spec(variant)
-    alpha = spec.set.pressure_angle
-    play = (spec.set.backlash if backlash is None else backlash) * math.cos(alpha)
-    radial, tangential = spec.set.pin_errors.get(number, (0.0, 0.0))
-    arm = 0.5 * (spec.carrier.thickness + spec.planet.face_width) + spec.carrier.gap
+    alpha = spec.written.set.pressure_angle
+    play = (spec.written.set.backlash if backlash is None else backlash) * math.cos(alpha)
+    radial, tangential = spec.written.set.pin_errors.get(number, (0.0, 0.0))
+    arm = 0.5 * (spec.written.carrier.thickness + spec.written.planet.face_width) + spec.written.carrier.gap
     x = record["bearing.carrier.x"] + arm * record["bearing.carrier.ry"] - record[f"{central}.gear.x"]
     y = record["bearing.carrier.y"] - arm * record["bearing.carrier.rx"] - record[f"{central}.gear.y"]
     place = 2 * math.pi * np.arange(PLANETS) / PLANETS
@@ -220,7 +222,7 @@ def _share_of_planet(distance: float) -> float:
     return float(own / (carrier.inertia[2, 2] + PLANETS * own))
 
 
-def _planets_of_carrier(spec: PlanetarySpec) -> float:
+def _planets_of_carrier(spec: Stage) -> float:
     """The axes of the carrier turn as carrier and planets do in the mean (theory, 17d): where the planets give way on
     their pins, the carrier's own body and its bolts turn on by this part of what each of them gives."""
-    return _share_of_planet(spec.set.center_distance)
+    return _share_of_planet(spec.written.set.center_distance)

@@ -60,7 +60,7 @@ def write_set(spec: SceneSpec, out: Path, quick: bool) -> None:
     with progress_bar(spec.name) as progress:
         found = set_study(spec, out, quick, progress)
     print(tidy(found.rows), *(f"- {note}" for note in found.notes), sep="\n")
-    levels = ladder(found.rows, load_stage(spec.stage.name).set.planets)
+    levels = ladder(found.rows, load_stage(spec.stage.name).written.set.planets)
     write_chart(levels, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
 
 

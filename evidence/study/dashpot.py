@@ -10,8 +10,8 @@ import numpy as np
 
 from gearfmu.body import ReducedBody
 from gearfmu.kernel.linear import LinearModel
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.build.assembly import assemble
 from gearfmu.stage.build.model import StageModel
 
@@ -42,9 +42,9 @@ def _paths(linear: LinearModel) -> list[float]:
     return found
 
 
-def same_loss(spec: StageSpec, bodies: Sequence[ReducedBody], others: Sequence[ReducedBody]) -> float:
+def same_loss(spec: Stage, bodies: Sequence[ReducedBody], others: Sequence[ReducedBody]) -> float:
     """Contact damping (N·s/m²) with which `others`, reductions of the same gears, lose what `bodies` lose with that of
     `spec`: the more modes are stored, the shorter is the path, and the loss goes with c times its square. Taken at half
     of the largest load."""
-    own, other = (own_path(assemble(spec, some), 0.5 * spec.torque_max) for some in (bodies, others))
-    return float(spec.contact.damping * (own / other) ** 2)
+    own, other = (own_path(assemble(spec, some), 0.5 * spec.written.torque_max) for some in (bodies, others))
+    return float(spec.written.contact.damping * (own / other) ** 2)

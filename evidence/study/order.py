@@ -104,8 +104,11 @@ def gear_mesh(
 def _without_dashpots(scene: SceneSpec) -> tuple[str, SceneSpec, dict[str, Any]]:
     """What to call it, the scene on shafts without damping, changes of the stage that take the other dashpots away."""
     rig, spec = scene.test_rig, load_stage(scene.stage.name)
-    gears = [g.model_copy(update={"bearing": g.bearing.model_copy(update={"damping_ratio": 0.0})}) for g in spec.gears]
-    changes = {"gears": tuple(gears), "contact": spec.contact.model_copy(update={"damping": 0.0})}
+    gears = [
+        g.model_copy(update={"bearing": g.bearing.model_copy(update={"damping_ratio": 0.0})})
+        for g in spec.written.gears
+    ]
+    changes = {"gears": tuple(gears), "contact": spec.written.contact.model_copy(update={"damping": 0.0})}
     if rig is not None:
         rig = rig.model_copy(update={"pinion_shaft_damping": 0.0, "wheel_shaft_damping": 0.0})
     return ", no dashpots", scene.model_copy(update={"test_rig": rig}), changes

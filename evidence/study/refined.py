@@ -17,8 +17,10 @@ from evidence.study.dashpot import same_loss
 from gearfmu.body import load_bodies, reduce_body
 from gearfmu.report.study import QUANTITIES
 from gearfmu.report.style import panels, saved, styled
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.tables import ROLLS
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
@@ -59,11 +61,11 @@ class Variant:
     rolls: int
 
 
-def variants(spec: StageSpec, slices: int, scale: float = SCALE, modes: int = MODES) -> list[Variant]:
+def variants(spec: Stage, slices: int, scale: float = SCALE, modes: int = MODES) -> list[Variant]:
     """One thing refined at a time, then all of them."""
-    finer = [_refined(gear, scale, 1) for gear in spec.gears]
-    more = [_refined(gear, 1.0, modes) for gear in spec.gears]
-    both = [_refined(gear, scale, modes) for gear in spec.gears]
+    finer = [_refined(gear, scale, 1) for gear in spec.written.gears]
+    more = [_refined(gear, 1.0, modes) for gear in spec.written.gears]
+    both = [_refined(gear, scale, modes) for gear in spec.written.gears]
     return [
         Variant(f"slices {FINEST_SLICES}", None, FINEST_SLICES, ROLLS),
         Variant(f"rolls {2 * ROLLS}", None, slices, 2 * ROLLS),
@@ -102,7 +104,7 @@ def body_rows(
         tell(k / len(chosen), variant.name)
         started, bodies = clock.process_time(), own_bodies
         if variant.gears:
-            changed = spec.model_copy(update={"gears": variant.gears})
+            changed = rewritten(spec, gears=variant.gears)
             bodies = [reduce_body(changed, gear.name) for gear in variant.gears]
         cpu = clock.process_time() - started if variant.gears else 0.0
         rows += [_row(scene, variant, own[scene.name], bodies, (h, cpu)) for scene in scenes]
@@ -113,7 +115,7 @@ def _run(scene: SceneSpec, bodies: Sequence[Any], variant: Variant, h: float) ->
     changes: dict[str, Any] = {}
     if variant.gears:
         spec = load_stage(scene.stage.name)
-        contact = spec.contact.model_copy(update={"damping": same_loss(spec, load_bodies(spec), bodies)})
+        contact = spec.written.contact.model_copy(update={"damping": same_loss(spec, load_bodies(spec), bodies)})
         changes = {"gears": variant.gears, "contact": contact}
     model = models_for(scene, bodies, variant.rolls, **changes)
     return measure(scene, model, Point("full", h=h, slices=variant.slices))

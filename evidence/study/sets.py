@@ -20,7 +20,8 @@ from gearfmu.body import load_bodies, reduce_body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
-from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel
@@ -110,17 +111,17 @@ def at_speed(scene: SceneSpec, speed: float) -> SceneSpec:
     return scene.model_copy(update={"start": start, "shaft_loads": loads or None})
 
 
-def with_planets(spec: PlanetarySpec, planets: int) -> PlanetarySpec:
+def with_planets(spec: Stage, planets: int) -> Stage:
     """The set with another number of planets, as evenly spaced as its teeth allow, on a coarsely meshed carrier."""
-    teeth = spec.sun.teeth + spec.ring.teeth
+    teeth = spec.written.sun.teeth + spec.written.ring.teeth
     places = None if teeth % planets == 0 else tuple(round(k * teeth / planets) for k in range(planets))
-    mesh = spec.carrier.mesh.model_copy(update={"scale": COARSE * spec.carrier.mesh.scale})
+    mesh = spec.written.carrier.mesh.model_copy(update={"scale": COARSE * spec.written.carrier.mesh.scale})
     of_pins: dict[str, Any] = {"pin_errors": {}, "planet_eccentricity": {}}
     update = {
-        "set": spec.set.model_copy(update={"planets": planets, "positions": places} | of_pins),
-        "carrier": spec.carrier.model_copy(update={"mesh": mesh, "coupling": {}, "modes": 30 * planets}),
+        "set": spec.written.set.model_copy(update={"planets": planets, "positions": places} | of_pins),
+        "carrier": spec.written.carrier.model_copy(update={"mesh": mesh, "coupling": {}, "modes": 30 * planets}),
     }
-    return spec.model_copy(update=update)
+    return rewritten(spec, **update)
 
 
 def ladder(rows: Sequence[SetRow], planets: int) -> list[SetRow]:
@@ -159,7 +160,7 @@ class _SetStudy:
     def go(self) -> SetStudy:
         """Levels and steps, slices and effects of the shipped set, then other numbers of planets."""
         self._say()
-        own, planets = (lambda: self.model), self.spec.set.planets
+        own, planets = (lambda: self.model), self.spec.written.set.planets
         plain = f"fast, {1e6 * self.base.h:.3g} µs, {self.slices} slices"
         here = _Case(self.scene, own, planets, plain, lambda: self._base_run.signals)
         slices = [n for n in (SLICES[:1] if self.quick else SLICES) if n != self.slices]
@@ -178,8 +179,8 @@ class _SetStudy:
             self._add(self._against_full(cache(partial(self._with_planets, count)), count), [self.base])
         return SetStudy(tuple(self.table.of(self.scene.name)), tuple(self.said))
 
-    def _model_of(self, spec: PlanetarySpec, bodies: Sequence[Any]) -> StageModel:
-        return models_for(self.scene, bodies, **{name: getattr(spec, name) for name in ("set", "carrier")})
+    def _model_of(self, spec: Stage, bodies: Sequence[Any]) -> StageModel:
+        return models_for(self.scene, bodies, **{name: getattr(spec.written, name) for name in ("set", "carrier")})
 
     def _with_planets(self, planets: int) -> StageModel:
         self.tell(0.0, f"carrier of {planets} planets")

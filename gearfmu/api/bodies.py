@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, load
-from gearfmu.api.quantities import Quantity, checked
+from gearfmu.api.settings import Quantity, checked
 from gearfmu.body.imported import imported_full_order
 from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
@@ -20,7 +20,8 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
 from gearfmu.reduction.transfer import LINES
 from gearfmu.reduction.transfer import Judging as Lines
-from gearfmu.spec.forms.members import Form, body_names, members
+from gearfmu.spec.forms.general import RingBody, Stage
+from gearfmu.spec.forms.members import carrier_of, members
 
 PAPER = ("modal", "craig_bampton", "rubin", "krylov")  # the methods of the paper
 SIZE, DAMPING = 120, 0.01
@@ -39,7 +40,7 @@ class Judging(TypedDict, total=False):
     scale: float | None
 
 
-def frf(stage: PathLike | Form, body: str, methods: Sequence[str] = PAPER, **how: Unpack[Judging]) -> Judgement:
+def frf(stage: PathLike | Stage, body: str, methods: Sequence[str] = PAPER, **how: Unpack[Judging]) -> Judgement:
     """Relative error of the transfer matrix of a body (Frobenius norm, the paper's eq. 3), reduced by several methods
     and judged with its ground held.
 
@@ -67,21 +68,20 @@ def _entry(text: str, size: int, band: tuple[float, float]) -> tuple[str, Size]:
     return name, Size(int(own or size), band)
 
 
-def _full_order(spec: Any, body: str, scale: float | None) -> FullOrder:
+def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     """The finite elements of a body, gear, ring or carrier."""
     factor: dict[str, Any] = {} if scale is None else {"scale": scale}
-    toothed, names = members(spec), body_names(spec)
+    toothed, names = members(spec), spec.files
     if body not in names:
         remedy = f"no body '{body}'; the stage has {', '.join(names)}"
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
-    imported = toothed[body].gear.imported if body in toothed else spec.carrier.imported
+    imported = toothed[body].gear.imported if body in toothed else carrier_of(spec).part.imported
     if imported is not None and scale is not None:
         remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
         raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
     if body not in toothed:
-        return carrier_full_order(spec, **factor)
+        return carrier_full_order(carrier_of(spec), **factor)
     if imported is not None:
         return imported_full_order(toothed[body])
-    if toothed[body].gear.kind == "ring":
-        return ring_full_order(spec, name=body, **factor)
-    return gear_full_order(spec, body, **factor)
+    full_order = ring_full_order if isinstance(toothed[body].gear, RingBody) else gear_full_order
+    return full_order(toothed[body], **factor)

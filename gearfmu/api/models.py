@@ -10,22 +10,21 @@ from typing import Any, Protocol, TypeAlias
 
 from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.bores import with_bores
-from gearfmu.spec.forms.expand import as_general
-from gearfmu.spec.forms.members import Form
-from gearfmu.spec.forms.turning import with_ports
+from gearfmu.spec.forms.expand import with_bores, with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.reading.changes import Changes
 from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scene import load_scene as load_scene_file
 from gearfmu.spec.stage import load_stage as load_stage_file
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage import assemble as assemble_model
 
 BORES = ("averaging", "rigid")
 PORT_KINDS = ("spring", "torque", "fixed")
 PathLike: TypeAlias = str | os.PathLike[str]
-AnyStage: TypeAlias = PathLike | Form | StageModel
+AnyStage: TypeAlias = PathLike | Stage | StageModel
 
 
 class Progress(Protocol):
@@ -34,8 +33,9 @@ class Progress(Protocol):
     def __call__(self, fraction: float, text: str = "") -> None: ...
 
 
-def load(stage: PathLike, changes: Changes | None = None) -> Form:
-    """The numbers of a stage, checked and in SI: a pair, a general stage or a planetary set.
+def load(stage: PathLike, changes: Changes | None = None) -> Stage:
+    """The numbers of a stage, checked and in SI: bodies, rotors, engagements, supports and ports, in the same terms for
+    a pair, a planetary set and any other; `written` is what the file says of a pair or set.
 
     stage : path of a stage.toml or its folder, or the name of a shipped one ("fzg_c", "fzg_c/stage_relief",
         "two_stage", "planetary54").
@@ -45,8 +45,7 @@ def load(stage: PathLike, changes: Changes | None = None) -> Form:
 
     Raises SpecError, which lists everything that is wrong.
     """
-    found: Form = load_stage_file(stage, changes)
-    return found
+    return load_stage_file(stage, changes)
 
 
 def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
@@ -62,7 +61,7 @@ def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
 
 
 def reduce(
-    stage: PathLike | Form, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
+    stage: PathLike | Stage, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
 ) -> list[Any]:
     """The reduced bodies of a stage, in the order of its gears; what is missing or stale is made first (about a minute
     a gear) and stored as .h5.
@@ -80,7 +79,7 @@ def reduce(
     return reduce_bodies(spec, folder, force, told) if apart is None else reduce_apart(spec, apart, force, told)
 
 
-def changed_folder(spec: Form) -> Path | None:
+def changed_folder(spec: Stage) -> Path | None:
     """Where the bodies of a stage lie that asks for others than its file: bodies_<fingerprint> beside it; None where
     its own will do."""
     hashes = body_hashes(spec)
@@ -90,7 +89,7 @@ def changed_folder(spec: Form) -> Path | None:
 
 
 def assemble(
-    stage: PathLike | Form,
+    stage: PathLike | Stage,
     ports: Mapping[str, str] | None = None,
     bore: str | None = None,
     observe: Sequence[str] = (),
@@ -112,12 +111,12 @@ def assemble(
 
 
 def reduced_to_move(
-    stage: PathLike | Form, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
-) -> tuple[Form, list[Any]]:
+    stage: PathLike | Stage, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
+) -> tuple[Stage, list[Any]]:
     """The stage with these bores, and its bodies: what `assemble` puts together. SpecError, before anything is reduced,
     for a set that does not say all that it needs to move."""
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
-    as_general(spec)
+    spec.require_motion()
     coupled = spec if bore is None else with_other_bores(spec, bore)
     return coupled, reduce(coupled, folder or bodies_folder(spec, bore), progress=progress)
 
@@ -127,24 +126,25 @@ def model_of(stage: AnyStage) -> StageModel:
     return stage if isinstance(stage, StageModel) else assemble(stage)
 
 
-def bodies_folder(spec: Any, bore: str | None) -> Path | None:
+def bodies_folder(spec: Stage, bore: str | None) -> Path | None:
     """Where `assemble` looks for bodies with these bores: None for the folder of the stage file."""
     if bore is None or with_other_bores(spec, bore) == spec:
         return None
     return model_folder(spec) / f"bores_{bore}"
 
 
-def with_other_bores(spec: Any, coupling: str) -> Any:
+def with_other_bores(spec: Stage, coupling: str) -> Stage:
     """`with_bores`, "averaging" or "rigid"; SpecError for any other word."""
     if coupling not in BORES:
         raise SpecError([Problem(str(spec.source), "bore", coupling, f"choose {' or '.join(BORES)}")])
     return with_bores(spec, coupling)
 
 
-def with_port_kinds(spec: Any, kinds: Mapping[str, str]) -> Any:
+def with_port_kinds(spec: Stage, kinds: Mapping[str, str]) -> Stage:
     """The stage with the ports' kinds replaced; SpecError for a port it does not have and for a spring without k and
     c."""
-    changed, problems = {}, []
+    changed: dict[str, PortSpec] = {}
+    problems = []
     for name, kind in kinds.items():
         port = spec.ports.get(name)
         if kind not in PORT_KINDS:

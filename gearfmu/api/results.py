@@ -16,15 +16,14 @@ from typing_extensions import Unpack
 
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, load, model_of
-from gearfmu.api.quantities import Quantity, checked
-from gearfmu.api.settings import Starts
+from gearfmu.api.settings import Quantity, Starts, checked
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import Extras
 from gearfmu.report import write
 from gearfmu.report.run import Run
-from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.exchange import convert as convert_trace
@@ -86,7 +85,7 @@ def windup_file(path: Path) -> Path:
 def write_report(
     trace: Trace | PathLike,
     out: PathLike,
-    stage: PathLike | Form | None = None,
+    stage: PathLike | Stage | None = None,
     home: PathLike | None = None,
     tell: Callable[[str], None] = warnings.warn,
 ) -> Path:
@@ -183,7 +182,7 @@ def stage_of(meta: Mapping[str, Any]) -> str | None:
     return path if path and Path(path).is_file() else meta.get("stage")
 
 
-def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Form | None = None) -> tuple[Any, Sequence[Any]]:
+def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Stage, Sequence[Any]]:
     """The stage of a run and its reduced bodies. meta : of the run's trace or deformation. stage : of the run where it
     is known; else that of the FMU that was run, with the bodies beside the stage file that `stage_of` names.
     GearfmuError where there is none such, or where the FMU is another by now."""

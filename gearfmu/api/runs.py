@@ -10,11 +10,9 @@ from typing_extensions import Unpack
 
 from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, model_of, reduce
-from gearfmu.api.quantities import Quantity, checked, in_si
-from gearfmu.api.settings import RunSettings, Settings
+from gearfmu.api.settings import Quantity, RunSettings, Settings, checked, in_si
 from gearfmu.cosim.scene_run import Staged
-from gearfmu.spec.forms.expand import as_general
-from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.tables.profile import Profile, read_profile
 from gearfmu.stage import StageModel, Steady, TeResult, Trace
@@ -122,7 +120,7 @@ def wound_up(stage: AnyStage, torque: Quantity, speed: Quantity) -> Steady:
 def run(
     scene: PathLike | SceneSpec,
     out: PathLike | None = None,
-    stage: PathLike | Form | None = None,
+    stage: PathLike | Stage | None = None,
     unit: PathLike = "fmu",
     verify: bool = False,
     progress: Progress | None = None,
@@ -151,7 +149,7 @@ def run(
 
 def assemble_in_scene(
     scene: PathLike | SceneSpec,
-    stage: PathLike | Form | None = None,
+    stage: PathLike | Stage | None = None,
     observe: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> StageModel:
@@ -165,7 +163,7 @@ def assemble_in_scene(
     return _staged(*_scene_and_stage(scene, stage), observe, progress).model
 
 
-def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Form | None) -> tuple[SceneSpec, Form | None]:
+def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None) -> tuple[SceneSpec, Stage | None]:
     """The scene with the name of the chosen stage, and that stage; None for the scene's own."""
     spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     if stage is None:
@@ -176,8 +174,8 @@ def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Form | None)
     return spec.model_copy(update={"stage": choice}), own
 
 
-def _staged(scene: SceneSpec, own: Form | None, observe: Sequence[str], progress: Progress | None) -> Staged:
+def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progress: Progress | None) -> Staged:
     """The scene with the model of the stage, of its own when None; bodies that are missing are made."""
     own = load(scene.stage.name) if own is None else own
-    as_general(own)
+    own.require_motion()
     return Staged.of(scene, own, reduce(own, progress=progress), observe)

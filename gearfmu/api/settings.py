@@ -8,10 +8,12 @@ from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
-from gearfmu.api.quantities import Quantity
+from gearfmu.ranges import in_range, range_of
 from gearfmu.spec.scene import Level
 from gearfmu.spec.tables.profile import Profile
+from gearfmu.units import to_si
 
+Quantity: TypeAlias = str | float  # "302 N*m", or the SI number
 Integrator: TypeAlias = Literal["dg4", "em", "rk45", "central"]
 Settings = TypedDict(
     "Settings",
@@ -74,3 +76,13 @@ class PlanOptions(TypedDict, total=False):
     fresh: bool
     tell: Callable[[str], None]
     name: str
+
+
+def checked(field: str, value: Quantity, name: str) -> float:
+    """`in_si` of a number in the range of that name; SpecError where it is not."""
+    return in_range(field, in_si(value, range_of(name).unit), name)
+
+
+def in_si(value: Quantity, unit: str) -> float:
+    """A quantity with its unit, or the SI number, as SI number."""
+    return to_si(value, unit) if isinstance(value, str) else float(value)

@@ -10,14 +10,12 @@ from typing import TypedDict, cast
 from typing_extensions import Unpack
 
 from gearfmu.api.models import AnyStage, PathLike, assemble, load, model_of, reduce
-from gearfmu.api.quantities import Quantity, checked, in_si
-from gearfmu.api.settings import Settings
+from gearfmu.api.settings import Quantity, Settings, checked, in_si
 from gearfmu.errors import Problem, SpecError
-from gearfmu.modes.gear import gear_modes
+from gearfmu.modes.bodies import body_modes, gear_modes
 from gearfmu.modes.linear import StageModes, stage_modes
-from gearfmu.modes.planetary import set_body_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.forms.members import Form, body_names, carriers
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
 from gearfmu.stage.effects import EFFECTS, Effect
@@ -91,7 +89,7 @@ def efficiency(
     return mesh_efficiency(model, *asked, parameters(model, settings), pitches=pitches)
 
 
-def bearings(stage: PathLike | Form, torque: Quantity | None = None) -> Bearings:
+def bearings(stage: PathLike | Stage, torque: Quantity | None = None) -> Bearings:
     """The rolling bearings of a stage under load: forces, displacements, contact pressure, stiffness, ball pass.
 
     stage : a name or path, or a `load`ed stage. torque : of the input, that of [operating] in its file when None.
@@ -103,7 +101,7 @@ def bearings(stage: PathLike | Form, torque: Quantity | None = None) -> Bearings
 
 
 def modes(
-    stage: PathLike | Form, body: str | None = None, torque: Quantity | None = None, count: int = 20
+    stage: PathLike | Stage, body: str | None = None, torque: Quantity | None = None, count: int = 20
 ) -> StageModes | BodyModes:
     """Natural frequencies: of the stage linearised in loaded contact, or of one of its bodies.
 
@@ -118,10 +116,9 @@ def modes(
         bodies, model = reduce(spec), assemble(spec)
         asked = largest_torque(model) if torque is None else checked("torque", torque, "torque")
         return stage_modes(model, bodies, asked, count)
-    names = body_names(spec)
+    names = spec.files
     if body not in names:
         raise SpecError([Problem(str(spec.source), "body", body, f"the stage has {', '.join(names)}")])
-    if carriers(spec):
-        return set_body_modes(spec, body, count)
-    gears = [gear.name for gear in spec.gears]
-    return gear_modes(spec, reduce(spec)[gears.index(body)], count)
+    if spec.carriers:
+        return body_modes(spec, body, count)
+    return gear_modes(spec, reduce(spec)[names.index(body)], count)

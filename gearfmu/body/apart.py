@@ -21,9 +21,10 @@ from typing import Any
 
 from gearfmu.errors import BodyError
 from gearfmu.reduction.memory import Need, available_memory
+from gearfmu.spec.forms.general import Stage
 
 Progress = Callable[[str, float], None]
-Job = tuple[Any, str, Path]  # a stage, the name of the gear, the file of its body
+Job = tuple[Stage, str, Path]  # a stage, the name of the gear, the file of its body
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SERVE = "from gearfmu.body.apart import serve; serve()"

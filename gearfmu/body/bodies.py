@@ -13,14 +13,14 @@ from gearfmu.body.carrier import reduced_carrier
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.reduced import ReducedBody
-from gearfmu.body.stale import refuse_stale
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
 from gearfmu.spec.forms.body import body_hash, body_inputs
-from gearfmu.spec.forms.members import Form, body_names, carriers, members
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import carrier_of, members
 from gearfmu.spec.reading.library import model_folder
 
 Body: TypeAlias = ReducedBody | InterfaceBody
@@ -28,39 +28,39 @@ Folder: TypeAlias = "str | os.PathLike[str] | None"
 Progress = Callable[[str, float], None]
 
 
-def expected_hash(spec: Form, name: str) -> str:
+def expected_hash(stage: Stage, name: str) -> str:
     """Fingerprint that the body `name` must carry: of its inputs and the version of the algorithms."""
-    return body_hash({**body_inputs(spec, name), "algorithm_version": ALGORITHM_VERSION})
+    return body_hash({**body_inputs(stage, name), "algorithm_version": ALGORITHM_VERSION})
 
 
-def body_hashes(spec: Form) -> tuple[str, ...]:
+def body_hashes(stage: Stage) -> tuple[str, ...]:
     """`expected_hash` of every body, in the order of `load_bodies`."""
-    return tuple(expected_hash(spec, name) for name in body_names(spec))
+    return tuple(expected_hash(stage, name) for name in stage.files)
 
 
-def body_path(spec: Form, name: str, folder: Folder = None) -> Path:
+def body_path(stage: Stage, name: str, folder: Folder = None) -> Path:
     """Where a body is stored: `<folder>/<name>.h5`, the folder of the stage file when None."""
-    return (Path(folder) if folder is not None else model_folder(spec)) / f"{name}.h5"
+    return (Path(folder) if folder is not None else model_folder(stage)) / f"{name}.h5"
 
 
-def load_bodies(spec: Form, folder: Folder = None) -> Any:
+def load_bodies(stage: Stage, folder: Folder = None) -> Any:
     """The stored bodies: gears in the order of the stage, then the carrier of a set. BodyError when one is missing,
     damaged or stale."""
-    return [_load_current(spec, name, folder) for name in body_names(spec)]
+    return [_load_current(stage, name, folder) for name in stage.files]
 
 
-def is_current(spec: Form, name: str, folder: Folder = None) -> bool:
+def is_current(stage: Stage, name: str, folder: Folder = None) -> bool:
     """Is the stored body sound and made from these numbers?"""
-    return _current(spec, name, folder) is not None
+    return _current(stage, name, folder) is not None
 
 
-def current_bodies(spec: Form, folder: Folder = None) -> set[str]:
+def current_bodies(stage: Stage, folder: Folder = None) -> set[str]:
     """Names of the bodies that `reduce_bodies` would read and not make."""
-    return {name for name in body_names(spec) if is_current(spec, name, folder)}
+    return {name for name in stage.files if is_current(stage, name, folder)}
 
 
 def reduce_bodies(
-    spec: Form, folder: Folder = None, force: bool = False, progress: Progress | None = None
+    stage: Stage, folder: Folder = None, force: bool = False, progress: Progress | None = None
 ) -> list[Body]:
     """Reduce what is missing or stale and store it: two large gears at the same time where processors and memory are
     there, the carrier last, which takes the most memory. Shafts need no file. Returns what `assemble` takes.
@@ -68,76 +68,89 @@ def reduce_bodies(
     folder : of the .h5 files, that of the stage file when None. force : reduce in any case. progress : called with
     (what is being done, share done of it). Raises MeshError and BodyError.
     """
-    names = body_names(spec)
-    stored = {} if force else {name: _current(spec, name, folder) for name in names}
+    names = stage.files
+    stored = {} if force else {name: _current(stage, name, folder) for name in names}
     wanted = [name for name in names if stored.get(name) is None]
-    works, paths = _works(spec, wanted), {name: body_path(spec, name, folder) for name in wanted}
-    if apart := side_by_side([(works.get(name), (spec, name, paths[name])) for name in wanted]):
+    works, paths = _works(stage, wanted), {name: body_path(stage, name, folder) for name in wanted}
+    if apart := side_by_side([(works.get(name), (stage, name, paths[name])) for name in wanted]):
         reduce_apart_together(apart, progress)
     together = {name for _, name, _ in apart}
     for name in wanted:
         if name not in together:
-            make_body(spec, name, paths[name], progress)
-    return [stored.get(name) or _load_current(spec, name, folder) for name in names]
+            make_body(stage, name, paths[name], progress)
+    return [stored.get(name) or _load_current(stage, name, folder) for name in names]
 
 
 def reduce_apart(
-    spec: Form, folder: str | os.PathLike[str], force: bool = False, progress: Progress | None = None
+    stage: Stage, folder: str | os.PathLike[str], force: bool = False, progress: Progress | None = None
 ) -> list[Body]:
     """`reduce_bodies` of a stage that is not as its file says, into a folder of its own: bodies beside the file that
     fit are taken over, and stay."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    for path in model_folder(spec).glob("*.h5"):
+    for path in model_folder(stage).glob("*.h5"):
         if not (Path(folder) / path.name).exists():
             shutil.copy(path, folder)
-    return reduce_bodies(spec, folder, force, progress)
+    return reduce_bodies(stage, folder, force, progress)
 
 
-def make_body(spec: Form, name: str, path: Path, progress: Progress | None = None) -> None:
+def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = None) -> None:
     """Reduce one body and store it at `path`. Raises MeshError and BodyError."""
-    body = reduce_body(spec, name, progress)
+    body = reduce_body(stage, name, progress)
     if isinstance(body, InterfaceBody):
         save_interface_body(body, path)
     else:
         save_body(body, path)
 
 
-def reduce_body(spec: Form, name: str, progress: Progress | None = None) -> Body:
+def reduce_body(stage: Stage, name: str, progress: Progress | None = None) -> Body:
     """One body from the numbers of its stage. Raises MeshError with the place of the body in the stage file."""
-    toothed, wanted = members(spec), expected_hash(spec, name)
+    toothed, wanted = members(stage), expected_hash(stage, name)
     try:
         if name in toothed:
             return reduced_gear(toothed[name], wanted, progress)
-        return reduced_carrier(spec, wanted, progress)
+        return reduced_carrier(carrier_of(stage), wanted, progress)
     except MeshError as error:
         place = toothed[name].place if name in toothed else name
-        raise MeshError(f"{spec.source}: {place}: {error}") from error
+        raise MeshError(f"{stage.source}: {place}: {error}") from error
 
 
-def body_needs(spec: Form) -> dict[str, Need]:
+def body_needs(stage: Stage) -> dict[str, Need]:
     """Memory that the reduction of every body takes, estimated from its mesh; bodies meshed elsewhere are not among
     them. Raises MeshError."""
-    needs = {name: work.need for name, work in _works(spec, body_names(spec)).items()}
-    return needs | {name: carrier_need(spec) for name, own in carriers(spec).items() if own.part.imported is None}
+    needs = {name: work.need for name, work in _works(stage, stage.files).items()}
+    own = [body.name for body in stage.carriers if body.imported is None]
+    return needs | {name: carrier_need(carrier_of(stage)) for name in own}
 
 
-def _works(spec: Form, names: Sequence[str]) -> dict[str, Work]:
+def _works(stage: Stage, names: Sequence[str]) -> dict[str, Work]:
     """What the reduction of those gears takes that are meshed here."""
-    chosen = {name: member for name, member in members(spec).items() if name in names}
+    chosen = {name: member for name, member in members(stage).items() if name in names}
     return {name: work for name, member in chosen.items() if (work := gear_work(member)) is not None}
 
 
-def _current(spec: Form, name: str, folder: Folder) -> Body | None:
+def _current(stage: Stage, name: str, folder: Folder) -> Body | None:
     """The stored body; None where it is missing, damaged or made from other numbers."""
     try:
-        return _load_current(spec, name, folder)
+        return _load_current(stage, name, folder)
     except BodyError:
         return None
 
 
-def _load_current(spec: Form, name: str, folder: Folder) -> Body:
+def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
     """The stored body. Raises BodyError when it is missing, damaged or stale."""
-    path = body_path(spec, name, folder)
-    body: Body = load_body(path) if name in members(spec) else load_interface_body(path)
-    refuse_stale(path, body, expected_hash(spec, name), spec.source)
+    path = body_path(stage, name, folder)
+    body: Body = load_body(path) if name in members(stage) else load_interface_body(path)
+    _refuse_stale(path, body, expected_hash(stage, name), stage.source)
     return body
+
+
+def _refuse_stale(path: Path, body: Body, wanted_hash: str, source: Path) -> None:
+    """BodyError when the body of this file has another fingerprint than the stage file asks for: it says whether the
+    program or the numbers are others."""
+    if body.input_hash == wanted_hash:
+        return
+    if body.algorithm_version != ALGORITHM_VERSION:
+        why = f"made by version {body.algorithm_version} of the reduction, this program has version {ALGORITHM_VERSION}"
+    else:
+        why = f"made from other numbers than {source} asks for now"
+    raise BodyError(f"{path}: stale: {why}; make it again with 'gearfmu reduce STAGE'")

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.body.provenance import provenance
+from gearfmu.body.parts import provenance
 from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.basis import Size
@@ -21,26 +21,26 @@ from gearfmu.reduction.mesh_error import carrier_mesh_error
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import Oscillators, oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
-from gearfmu.spec.forms.members import Form, carrier_of
+from gearfmu.spec.forms.members import CarrierMember
 
 TRUSTED_ERROR = 0.01
 Progress = Callable[[str, float], None]
 
 
-def reduced_carrier(spec: Form, input_hash: str, progress: Progress | None = None) -> InterfaceBody:
+def reduced_carrier(carrier: CarrierMember, input_hash: str, progress: Progress | None = None) -> InterfaceBody:
     """The carrier of a set, reduced as its file says. Raises MeshError."""
-    part, started = carrier_of(spec).part, time.process_time()
+    part, started = carrier.part, time.process_time()
     _tell(progress, "carrier: mesh and finite elements", 0.0)
     if part.imported is None:
-        need = carrier_need(spec)
+        need = carrier_need(carrier)
         require_memory(need, lower_counts(part.mesh, "carrier.mesh"))
         _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
-        facts = _carrier_facts(spec)
+        facts = _carrier_facts(carrier)
         _tell(progress, "carrier: finite elements", 0.3)
-        full = carrier_full_order(spec)
+        full = carrier_full_order(carrier)
         mesh = {**facts, "dof_body": full.size}
     else:
-        full, mesh = imported_carrier_order(spec)
+        full, mesh = imported_carrier_order(carrier)
     _tell(progress, f"carrier: {part.method}", 0.5)
     method, size = METHODS[part.method], Size(part.modes)
     model = oscillators(full, method(full, size), part.modal_damping)
@@ -53,11 +53,10 @@ def reduced_carrier(spec: Form, input_hash: str, progress: Progress | None = Non
     return _interface_body(full, model, evidence, made)
 
 
-def _carrier_facts(spec: Form) -> dict[str, Any]:
+def _carrier_facts(carrier: CarrierMember) -> dict[str, Any]:
     """Plain facts about our own mesh of a carrier, its error measured on a finer one."""
-    carrier = carrier_of(spec)
     facts = mesh_report(carrier_sector(carrier.geometry, carrier.part.mesh))
-    counts, error = carrier.part.mesh.model_dump(), carrier_mesh_error(spec)
+    counts, error = carrier.part.mesh.model_dump(), carrier_mesh_error(carrier)
     return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
 
 

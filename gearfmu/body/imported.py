@@ -41,7 +41,7 @@ from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_mode
 from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.imported.whole import Held, imported_gear_order
 from gearfmu.spec.forms.general import RingBody
-from gearfmu.spec.forms.members import Form, Member, carrier_of
+from gearfmu.spec.forms.members import CarrierMember, Member
 from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
 
 
@@ -93,9 +93,9 @@ def imported_sector_mesh(member: Member) -> FeMesh:
     return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, member.geometry.z, cut.cut_minus, cut.cut_plus)
 
 
-def imported_carrier_order(spec: Form) -> tuple[FullOrder, dict[str, Any]]:
+def imported_carrier_order(carrier: CarrierMember) -> tuple[FullOrder, dict[str, Any]]:
     """The imported carrier of a planetary set before reduction, known to be one solid, and plain facts. MeshError."""
-    found, source = imported_carrier(spec), carrier_of(spec).part.imported
+    found, source = imported_carrier(carrier), carrier.part.imported
     assert source is not None
     problem, space = None, elastic(found.full)
     try:

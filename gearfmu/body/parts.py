@@ -1,12 +1,17 @@
-"""What every method to a gear body gives, and its pictures: shared by bodies meshed here and bodies made elsewhere."""
+"""What every method to a gear body gives, and its pictures, for bodies meshed here and made elsewhere; how a body was
+made."""
 
 from __future__ import annotations
 
 import math
+import platform
+import sys
 from dataclasses import dataclass
+from importlib import metadata
 from typing import Any
 
 import numpy as np
+import scipy
 
 from gearfmu.body.reduced import Rim, Tangent
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
@@ -117,3 +122,25 @@ def sector_display(sector: Outline, body: SectorBody, statics: Statics) -> Displ
         np.array(loads, "f4"),
         body.points.rolls[[load // body.points.functions for load in pictured]],
     )
+
+
+def provenance(seconds: float) -> dict[str, Any]:
+    """Program versions, CPU seconds of the reduction and the peak memory of the process so far."""
+    return {
+        "gearfmu": metadata.version("gearfmu"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "cpu_s": round(seconds, 1),
+        "peak_memory_GB": _peak_memory(),
+    }
+
+
+def _peak_memory() -> float | None:
+    """Largest resident memory of this process so far; None where the system does not tell (Windows)."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e9 if sys.platform == "darwin" else 1e6), 2)

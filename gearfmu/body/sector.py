@@ -6,17 +6,18 @@ from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.spec.forms.members import Form, carrier_of, members
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import carrier_of, members
 
 
-def body_sector(spec: Form, name: str, scale: float = 1.0) -> FeMesh:
+def body_sector(stage: Stage, name: str, scale: float = 1.0) -> FeMesh:
     """One sector of the body `name` of a stage. scale : factor on all element counts, but for an imported gear's.
 
     BodyError for an imported carrier and for imported gears without a sector of hexahedra.
     """
-    toothed = members(spec)
+    toothed = members(stage)
     if name not in toothed:
-        carrier = carrier_of(spec)
+        carrier = carrier_of(stage)
         if carrier.part.imported is None:
             return scaled_sector(carrier, scale)
         raise BodyError(

@@ -15,13 +15,13 @@ from gearfmu.body.parts import (
     drawn_counts,
     kept_offsets,
     pictured_loads,
+    provenance,
     rim_of,
     sector_display,
     sector_shapes,
     tangent_of,
     tooth_flank,
 )
-from gearfmu.body.provenance import provenance
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.femesh import mesh_report, sector_mesh
 from gearfmu.geometry.internal import InternalGearGeometry

@@ -55,7 +55,7 @@ def _numbers(stage: str) -> dict[str, str]:
     meshes, gears, turning = spec.engagements, spec.gears, "no carrier: it costs nothing"
     if spec.carriers:
         meshes = meshes[:: len(meshes) // 2]
-        turning = f"up to {model.spec.limits[1][0]:g} rad/s of the carrier"
+        turning = f"up to {model.stage.limits[1][0]:g} rad/s of the carrier"
     modes = model.modes_of_levels()
     widths = [face_width(spec, mesh) for mesh in meshes]
     alone = [torque_on_flanks_alone(model, mesh.name) for mesh in meshes]
@@ -103,13 +103,13 @@ def _friction(mesh: Any) -> str:
     return f"coefficient {mesh.friction.coefficient:g}" if constant else f"law {mesh.friction.law}"
 
 
-def _film(spec: Any, mesh: Any) -> str:
+def _film(stage: Any, mesh: Any) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
-    from gearfmu.stage.build.film import REACH, film_stop
+    from gearfmu.stage.build.oil import REACH, film_stop
 
-    return f"takes {1e3 * film_stop(spec, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
+    return f"takes {1e3 * film_stop(stage, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
 
 def _whirling(model: Any) -> str:
@@ -117,7 +117,7 @@ def _whirling(model: Any) -> str:
     from gearfmu.body import load_bodies
     from gearfmu.stage.run.inertia import WHIRL_BAND, whirling
 
-    shift, coupled, silent = whirling(model.spec, load_bodies(model.spec))
+    shift, coupled, silent = whirling(model.stage, load_bodies(model.stage))
     missing = f"; not known of elastic patterns of {_listed(silent)}: `gearfmu reduce STAGE --force`" if silent else ""
     return (
         f"at speed_max frequencies of bodies on their bearings below {WHIRL_BAND / 1e3:g} kHz move by up to "
@@ -128,12 +128,11 @@ def _whirling(model: Any) -> str:
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of what is left out, a line for every gear whose file tells."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.spec.forms.expand import as_general
     from gearfmu.stage.build.observed import gear_bodies
     from gearfmu.stage.run.inertia import inertia_terms
 
     spec, bodies = bodies_of(stage)
-    for gear in inertia_terms(as_general(spec), gear_bodies(spec, bodies)):
+    for gear in inertia_terms(spec, gear_bodies(spec, bodies)):
         yield (
             f"{gear.name} at {gear.speed:.0f} rad/s: stiffening {gear.stiffening:.1e} (Coriolis forces of the same "
             f"modes {gear.whirl:.1e}), stretch {1e6 * gear.growth:.2f} µm (the tooth yields "

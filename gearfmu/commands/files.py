@@ -138,23 +138,23 @@ def _toml(path: Path) -> dict[str, Any]:
 
     if path.is_file() and "coupling" in read_toml(path):
         return {"file": str(path), "kind": "scene", **load_scene(path).model_dump(mode="json")}
-    spec = load_stage(path)
+    stage = load_stage(path)
     return {
         "file": str(path),
         "kind": "stage",
-        **spec.model_dump(mode="json", exclude={"kind"}),
-        "derived": derived(spec),
-        "reduction": _needs(spec),
+        **stage.written.model_dump(mode="json", exclude={"kind"}),
+        "derived": derived(stage),
+        "reduction": _needs(stage),
     }
 
 
-def _needs(spec: Any) -> Any:
+def _needs(stage: Any) -> Any:
     """What the reduction of every body takes, estimated from its mesh; or why it cannot be meshed."""
     from gearfmu.body import body_needs
     from gearfmu.errors import MeshError
 
     try:
-        needs = body_needs(spec)
+        needs = body_needs(stage)
     except MeshError as error:
         return str(error)
     return {
@@ -169,7 +169,7 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
     from gearfmu.spec.stage import load_stage
 
     found = _toml(path)
-    spec = load_scene(path) if found["kind"] == "scene" else load_stage(path)
+    spec = load_scene(path) if found["kind"] == "scene" else load_stage(path).written
     own = {key: value for key, value in shown(spec).items() if key != "kind"}
     after: dict[str, Any] = {key: found[key] for key in ("derived", "reduction") if key in found}
     return {"file": found["file"], "kind": found["kind"], **own, **after}

@@ -84,9 +84,9 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     wound = {name: value for name, sign, value in (text.partition("=") for text in starts) if name in OF_INPUT and sign}
     model, inputs = with_windup(model, wound.get("torque"), wound.get("speed"))
     model = model.with_starts(parameters(model, tuple(s for s in starts if s.split("=")[0] not in OF_INPUT), "--start"))
-    path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
+    path, runtime = out or Path(f"{model.name}.fmu"), how["runtime"]
     how["platforms"] = how["platforms"] or None
-    with progress_bar(f"export {model.spec.name}") as progress:
+    with progress_bar(f"export {model.name}") as progress:
         progress(None, "writing")
         fmu.export(model, path, **how)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")

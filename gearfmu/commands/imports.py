@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import Quantity, echo_pairs, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import Stage
 
 
 @click.command(name="import")
@@ -32,31 +35,31 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
-    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    names = body_names(spec)
+    names = spec.files
     if gear is None or gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
-    place = members(spec)[gear].place if gear in members(spec) else gear
+    place = next(spec.table_of(body) for body in spec.bodies if spec.file_of(body) == gear)
     click.echo("\n" + section(file, place, options))
 
 
-def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
+def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported.carrier import imported_carrier
     from gearfmu.spec.forms.general import RingBody
-    from gearfmu.spec.forms.members import member_of
+    from gearfmu.spec.forms.members import carrier_of, member_of
     from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     if name == "carrier":
-        if not options["bore"] or len(options["bolts"]) != spec.set.planets:
-            raise click.UsageError(f"a carrier needs --bore and {spec.set.planets} times --bolt, each a node set")
-        part = spec.carrier.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
-        return imported_carrier(spec.model_copy(update={"carrier": part})).facts
+        carrier = carrier_of(spec)
+        if not options["bore"] or len(options["bolts"]) != (planets := carrier.geometry.planets):
+            raise click.UsageError(f"a carrier needs --bore and {planets} times --bolt, each a node set")
+        part = carrier.part.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
+        return imported_carrier(replace(carrier, part=part)).facts
     member = member_of(spec, name)
     ring = isinstance(member.gear, RingBody)
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}

@@ -11,6 +11,7 @@ import click
 from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import Stage
     from gearfmu.stage import StageModel
 
 
@@ -34,8 +35,8 @@ def model_in_scene(scene: str, stage: str | None, observe: Sequence[str] = ()) -
         return assemble_in_scene(scene, stage, observe, progress)
 
 
-def bodies_of(stage: str) -> tuple[Any, list[Any]]:
-    """The spec of STAGE and its bodies (`api.reduce`)."""
+def bodies_of(stage: str) -> tuple[Stage, list[Any]]:
+    """The numbers of STAGE and its bodies (`api.reduce`)."""
     from gearfmu.api.models import load, reduce
 
     spec = load(stage)
@@ -43,7 +44,7 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
         return spec, reduce(spec, progress=progress)
 
 
-def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[Any]]:
+def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list[Any]]:
     """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are
     not the stage's own."""
     from gearfmu.api.models import bodies_folder, load, reduced_to_move

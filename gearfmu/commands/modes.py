@@ -15,6 +15,7 @@ from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
     from gearfmu.modes.shapes import BodyModes
+    from gearfmu.spec.forms.general import Stage
 
 
 COUPLED = (
@@ -138,38 +139,36 @@ def table(body: Any) -> list[str]:
 
 def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
     """how: the ring on its mounts, the carrier without couplings."""
-    from gearfmu.spec.forms.members import CARRIER, carriers
+    from gearfmu.spec.forms.expand import CARRIER
     from gearfmu.spec.stage import load_stage
 
     spec, (mounted, uncoupled) = load_stage(stage), how
-    of_set = bool(carriers(spec))
+    of_set = bool(spec.carriers)
     if uncoupled and not (of_set and name == CARRIER):
         raise click.BadParameter("only the carrier of a planetary set has couplings", param_hint="--uncoupled")
     if mounted and not (of_set and name == "ring"):
         raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
     if of_set:
         return _of_set(spec, name, count, how)
-    names = [gear.name for gear in spec.gears]
-    _check(name, names)
+    _check(name, spec.files)
     _, bodies = bodies_of(stage)
-    from gearfmu.modes.gear import gear_modes
+    from gearfmu.modes.bodies import gear_modes
 
     with progress_bar("shapes") as progress:
-        return gear_modes(spec, bodies[names.index(name)], count, by_text(progress))
+        return gear_modes(spec, bodies[spec.files.index(name)], count, by_text(progress))
 
 
-def _of_set(spec: Any, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
-    from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
-    from gearfmu.spec.forms.members import body_names
+def _of_set(spec: Stage, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
+    from gearfmu.modes.bodies import body_modes, mounted_ring_modes, uncoupled_carrier_modes
 
-    _check(name, body_names(spec))
+    _check(name, spec.files)
     with progress_bar("shapes") as progress:
         mounted, uncoupled = how
         if mounted:
             return mounted_ring_modes(spec, count, by_text(progress))
         if uncoupled:
             return uncoupled_carrier_modes(spec, count, by_text(progress))
-        return set_body_modes(spec, name, count, by_text(progress))
+        return body_modes(spec, name, count, by_text(progress))
 
 
 def _check(name: str, names: Sequence[str]) -> None:

@@ -90,22 +90,23 @@ def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: A
 
 def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
     """The stage file of teeth, module and width, and the shape that it proposes."""
-    from gearfmu.spec.forms.expand import as_general
+    from gearfmu.spec.forms.members import members
     from gearfmu.spec.forms.shapes import centre_distance
     from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
     from gearfmu.spec.stage import load_stage
 
     path = new_from_numbers(name, wish_of(given))
-    spec = load_stage(path)
-    stage = as_general(spec)
-    mesh = stage.engagements[0]
+    stage = load_stage(path)
+    mesh, gears = stage.engagements[0], [member.gear for member in members(stage).values()]
+    (torque, _), (speed, _) = stage.limits
+    assert torque is not None and speed is not None
     shape = {
         "centre distance": f"{1e3 * centre_distance(stage, mesh):.6g} mm",
-        "profile shifts": ", ".join(f"{gear.profile_shift:.4f}" for gear in spec.gears),
-        "tip diameters": ", ".join(f"{1e3 * gear.tip_diameter:.6g}" for gear in spec.gears) + " mm",
+        "profile shifts": ", ".join(f"{gear.profile_shift:.4f}" for gear in gears),
+        "tip diameters": ", ".join(f"{1e3 * gear.tip_diameter:.6g}" for gear in gears) + " mm",
         "backlash": f"{1e3 * mesh.backlash:.4g} mm",
-        "torque_max": f"{spec.torque_max:.4g} N*m",
-        "speed_max": f"{30 / math.pi * spec.speed_max:.4g} rpm",
+        "torque_max": f"{torque:.4g} N*m",
+        "speed_max": f"{30 / math.pi * speed:.4g} rpm",
     }
     click.echo(f"{path}\nproposed, like everything that is marked so in the file, with the rule behind it:")
     echo_pairs(shape, "  ")

@@ -11,6 +11,7 @@ import click
 from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
 
 if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import Stage
     from gearfmu.spec.scene import SceneSpec
 
 DEMO_STEP = 20e-6  # s
@@ -261,17 +262,16 @@ def finish(trace: Any, out: Path, stage: str | None, prepared: float | None = No
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
-def write_deformed(deformation: Any, folder: Path, spec: Any, reduced: Any) -> list[Path]:
+def write_deformed(deformation: Any, folder: Path, spec: Stage, reduced: Any) -> list[Path]:
     """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd. spec, reduced : the stage and its
     bodies."""
     from gearfmu.modes.deformed import deformed_gear
     from gearfmu.modes.vtu import write_series
-    from gearfmu.spec.forms.expand import as_general
     from gearfmu.stage.build.meshes import tooth_phases
     from gearfmu.stage.build.observed import gear_bodies
 
     bodies = gear_bodies(spec, reduced)
-    phases = tooth_phases(as_general(spec))
+    phases = tooth_phases(spec)
     gears = [deformed_gear(name, bodies[name], motion, phases[name]) for name, motion in deformation.gears.items()]
     return [write_series(gear, deformation.time, folder) for gear in gears]
 

@@ -27,15 +27,17 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
-    from gearfmu.spec.forms.members import body_names, members
+    from gearfmu.spec.forms.members import carrier_of, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
     toothed = members(spec)
-    for name in _chosen(body_names(spec), only):
-        sector, part = body_sector(spec, name, scale), toothed[name].gear if name in toothed else spec.carrier
-        own = name in toothed and part.imported is None
-        flank = (toothed[name].geometry.r_b, part.body.strip_half_width) if own else ()
+    for name in _chosen(spec.files, only):
+        sector = body_sector(spec, name, scale)
+        member = toothed.get(name)
+        part = carrier_of(spec).part if member is None else member.gear
+        own = member is not None and part.imported is None
+        flank = (member.geometry.r_b, member.gear.body.strip_half_width) if member and own else ()
         path = out / f"{name}.vtu"
         written = sector.full() if full else sector
         write_vtu(written, path)

@@ -31,13 +31,12 @@ def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE, of a pair or planetary set, over the internal step and the
     slices."""
     from gearfmu.commands.models import bodies_for_motion
-    from gearfmu.spec.forms.members import carriers
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage, require_pair
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):
-        if not carriers(stage := load_stage(name)):
+        if not (stage := load_stage(name)).carriers:
             require_pair(stage)
         bodies_for_motion(name)
     for spec in specs:

@@ -156,7 +156,7 @@ def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where:
     from gearfmu.stage.run.set_te import set_te
     from gearfmu.stage.run.trace import write_columns
 
-    with progress_bar(f"te {model.spec.name}") as progress:
+    with progress_bar(f"te {model.name}") as progress:
         known = {name: where[name] for name in ("level",) if name in where}
         result = set_te(model, torques, where["positions"], where["pitches"], progress, **known)
     write_columns(out, result.columns())
@@ -165,7 +165,7 @@ def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where:
     _tell(result)
     if doubled:
         _tell_slices(model, torques, None, where)
-    for text in above_sharing(result, model.spec.load_sharing):
+    for text in above_sharing(result, model.stage.load_sharing):
         click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")
     _draw_flanks(model, out)

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from gearfmu.cosim.dynamics import Dynamics, Mode
-from gearfmu.cosim.friction import sticking_torques
 
+MAX_SWEEPS = 500  # of the Gauss–Seidel iteration
 SLIP_TOLERANCE = 1e-12  # rad/s, for speeds up to about 1e3 rad/s some ten units in the last place
 TORQUE_TOLERANCE = 1e-10  # relative to the capacity plus 1 N·m
 GAP_TOLERANCE = 1e-15  # m or rad
@@ -191,3 +191,23 @@ def initial_mode(dynamics: Dynamics, x: np.ndarray, u: np.ndarray, capacity: np.
     signs = tuple(0 if abs(s) <= SLIP_TOLERANCE else 1 if s > 0 else -1 for s in slips)
     at_rest = [k for k, sign in enumerate(signs) if sign == 0]
     return resolve(dynamics, (signs, tuple(gaps)), at_rest, x, u, capacity)
+
+
+def sticking_torques(delassus: np.ndarray, slip_acceleration: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Torques T (m,), |T| ≤ bound, such that each clutch sticks (slip acceleration zero) or transmits ±bound along
+    its slip acceleration.
+
+    delassus : (m, m) G = D M⁻¹ Dᵀ, 1/(kg·m²), positive definite; slip_acceleration : (m,) of the clutches without
+    torque, rad/s²; bound : (m,) N·m. The slip acceleration with them is slip_acceleration − G T. Projected
+    Gauss–Seidel, which converges for every positive definite G (Cottle, Pang, Stone: The Linear Complementarity
+    Problem, 5.3).
+    """
+    torque = np.zeros_like(slip_acceleration)
+    for _ in range(MAX_SWEEPS):
+        before = torque.copy()
+        for i in range(len(torque)):
+            rest = slip_acceleration[i] - delassus[i] @ torque + delassus[i, i] * torque[i]
+            torque[i] = min(max(rest / delassus[i, i], -bound[i]), bound[i])
+        if np.all(np.abs(torque - before) <= 1e-14 * (bound + np.abs(torque))):
+            break
+    return torque

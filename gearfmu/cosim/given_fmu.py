@@ -7,7 +7,6 @@ scene's, the run takes the FMU's, at its start too, and says so.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
 from gearfmu.cosim.drive import Drive
 from gearfmu.errors import Problem, SpecError
@@ -21,7 +20,7 @@ UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": 
 UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}
 
 
-def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
+def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Stage | None = None) -> SceneSpec:
     """The scene with the stage of an FMU. own : the stage that it must be, when given; else it must be of the kind of
     the scene's stage, where that can be read. SpecError that names FMU and stage."""
     if own is not None:
@@ -29,14 +28,13 @@ def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
             raise SpecError(problems)
         return scene
     usual = _usual(scene)
-    if usual is not None and usual.kind != opened.model.spec.kind:
+    own_kind = opened.model.stage.written.kind
+    if usual is not None and (kind := usual.written.kind) != own_kind:
         remedy = (
-            f"scene {scene.name} is made for a stage of kind {usual.kind}, {scene.stage.name}: choose a scene for this "
+            f"scene {scene.name} is made for a stage of kind {kind}, {scene.stage.name}: choose a scene for this "
             f"kind, or name the FMU's stage beside the FMU (--stage) to run it here all the same"
         )
-        raise SpecError(
-            [Problem(str(opened.path), f"kind of stage {opened.model.name}", opened.model.spec.kind, remedy)]
-        )
+        raise SpecError([Problem(str(opened.path), f"kind of stage {opened.model.name}", own_kind, remedy)])
     if usual is not None and not opened.problems_of(usual):
         return scene
     return scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": opened.model.name})})
@@ -50,7 +48,7 @@ def fitted(
     show."""
     export = f"export it with `gearfmu export {opened.model.name} --scene SCENE`"
     problems = list(_recording(scene, opened, export))
-    own: Mapping[str, PortSpec] = opened.model.spec.ports
+    own: Mapping[str, PortSpec] = opened.model.stage.ports
     try:
         drive = drive_of(scene, opened.model.stage)
     except SpecError as error:
@@ -68,7 +66,7 @@ def fitted(
     return drive.with_shafts(own) if drive.with_shafts else scene, (f"{head}: {'; '.join(remarks)}",)
 
 
-def _usual(scene: SceneSpec) -> Any:
+def _usual(scene: SceneSpec) -> Stage | None:
     """The stage that the scene names, None where it cannot be read: a run with an FMU does not need it."""
     try:
         return load_stage(scene.stage.name)
@@ -86,7 +84,7 @@ def _recording(scene: SceneSpec, opened: OpenedFmu, export: str) -> Iterator[Pro
 
 
 def _misfits(scene: SceneSpec, opened: OpenedFmu, name: str, wanted: PortSpec, export: str) -> Iterator[Problem]:
-    own = opened.model.spec.ports[name]
+    own = opened.model.stage.ports[name]
     if own.kind != wanted.kind:
         remedy = f"scene {scene.name} needs a port of kind {wanted.kind}: {export}"
         yield Problem(str(opened.path), f"ports.{name}.kind", own.kind, remedy)

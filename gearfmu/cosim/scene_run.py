@@ -29,10 +29,9 @@ from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
-from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import Form
-from gearfmu.spec.forms.turning import require_driven, shafts_of, with_ports
+from gearfmu.spec.forms.turning import require_driven, shafts_of
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -55,26 +54,29 @@ class Staged:
 
     @classmethod
     def of(
-        cls, scene: SceneSpec, spec: Any = None, bodies: Sequence[Any] | None = None, observe: Sequence[str] = ()
+        cls,
+        scene: SceneSpec,
+        stage: Stage | None = None,
+        bodies: Sequence[Any] | None = None,
+        observe: Sequence[str] = (),
     ) -> Staged:
-        """spec : of the stage, as the file that the scene names when None; bodies : of `load_bodies(spec)` when None;
+        """stage : that of the file that the scene names when None; bodies : of `load_bodies(stage)` when None;
         observe : gears whose motion is an output, beside those that the scene records deformed.
         SpecError, BodyError and ModelError as `load_stage`, `load_bodies` and `assemble`."""
-        spec = load_stage(scene.stage.name) if spec is None else spec
+        stage = load_stage(scene.stage.name) if stage is None else stage
         recorded = scene.deformation.gears if scene.deformation is not None else ()
-        bodies = load_bodies(spec) if bodies is None else bodies
-        return cls(
-            scene, assemble(in_drivetrain(scene, spec), bodies, observe=list(dict.fromkeys([*recorded, *observe])))
-        )
+        bodies = load_bodies(stage) if bodies is None else bodies
+        observed = list(dict.fromkeys([*recorded, *observe]))
+        return cls(scene, assemble(in_drivetrain(scene, stage), bodies, observe=observed))
 
     @classmethod
-    def of_fmu(cls, scene: SceneSpec, path: str | Path, spec: Any = None) -> Staged:
+    def of_fmu(cls, scene: SceneSpec, path: str | Path, stage: Stage | None = None) -> Staged:
         """The scene with the stage that an FMU was exported from: nothing is read of the scene's stage but its kind.
 
-        spec : the stage that the FMU must be of, when given; else it must be of the kind of the scene's. FmuError for a
+        stage : the one that the FMU must be of, when given; else it must be of the kind of the scene's. FmuError for a
         file that is no FMU of ours, SpecError with everything that does not fit the scene."""
         opened = read_fmu(path)
-        scene = of_scene(scene, opened, spec)
+        scene = of_scene(scene, opened, stage)
         scene, remarks = fitted(scene, opened, drive_of)
         return cls(scene, opened.model, opened.path, remarks)
 
@@ -157,10 +159,11 @@ def drive_of(scene: SceneSpec, stage: Stage) -> Drive:
     return rig_drive(scene, scene.test_rig, shafts)
 
 
-def in_drivetrain(scene: SceneSpec, spec: Form) -> Form:
-    """The stage with the ports that the scene's drive needs. SpecError: `drive_of`."""
-    changed: Form = with_ports(spec, dict(drive_of(scene, as_general(spec)).ports))
-    return changed
+def in_drivetrain(scene: SceneSpec, stage: Stage) -> Stage:
+    """The stage with the ports that the scene's drive needs. SpecError: `drive_of`, and for a stage that does not say
+    all that it needs to move."""
+    stage.require_motion()
+    return with_ports(stage, drive_of(scene, stage).ports)
 
 
 @contextmanager

@@ -12,6 +12,8 @@ from typing import Any
 from gearfmu.body import body_hashes, load_bodies
 from gearfmu.errors import BodyError, FmuError, ModelError, Problem, SpecError
 from gearfmu.fmu.stage_file import EXPORT_AGAIN, MODEL_FILE, STAGE_FILE, read_stage_file, refused
+from gearfmu.spec.forms.expand import with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stored import differences, restored, stored_files
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.observed import MOTION
@@ -34,17 +36,17 @@ class OpenedFmu:
         known = self.model.kernel().variables
         return tuple(gear.name for gear in self.model.stage.gears if f"{gear.name}{MOTION}x" in known)
 
-    def problems_of(self, own: Any) -> list[Problem]:
+    def problems_of(self, own: Stage) -> list[Problem]:
         """Everything in which the FMU's stage differs from another one, but for the ports; empty for the stage that it
         was exported from."""
-        found, name = differences(self.model.spec, own), str(getattr(own, "source", own.name))
-        found += [] if stored_files(own) == self.files else [("files", "others", "others")]
+        found, name = differences(self.model.stage, own), str(own.source)
+        found += [] if stored_files(own.written) == self.files else [("files", "others", "others")]
         remedy = f"{name} says {{}}: name the stage that the FMU was exported from, or export it again"
         problems = [Problem(str(self.path), field, value, remedy.format(other)) for field, value, other in found]
         more = [Problem(str(self.path), "", "", f"and {len(problems) - MOST_SHOWN} more differences")]
         return problems if len(problems) <= MOST_SHOWN else problems[:MOST_SHOWN] + more
 
-    def with_bodies(self, own: Any) -> tuple[Any, Sequence[Any]]:
+    def with_bodies(self, own: Stage) -> tuple[Stage, Sequence[Any]]:
         """The FMU's stage with the files and the reduced bodies that lie beside a stage file. own : the stage of that
         file. BodyError where its bodies are others than those of the FMU, SpecError where its files are."""
         if body_hashes(own) != self.model.body_hashes:
@@ -53,8 +55,8 @@ class OpenedFmu:
         if self.files:
             if problems := self.problems_of(own):
                 raise SpecError(problems)
-            return own.model_copy(update={"ports": self.model.spec.ports}), load_bodies(own)
-        return self.model.spec.model_copy(update={"source": own.source}), load_bodies(own)
+            return with_ports(own, self.model.stage.ports), load_bodies(own)
+        return self.model.stage.model_copy(update={"source": own.source}), load_bodies(own)
 
 
 def read_fmu(path: str | Path) -> OpenedFmu:
@@ -64,8 +66,8 @@ def read_fmu(path: str | Path) -> OpenedFmu:
     blob, content = _members(file)
     facts = read_stage_file(content, str(file))
     try:
-        spec = restored(facts["stage"], file)
-        model = StageModel(spec, blob, tuple(facts["hashes"]["bodies"].values()))
+        stage = restored(facts["stage"], file)
+        model = StageModel(stage, blob, tuple(facts["hashes"]["bodies"].values()))
         found = model.kernel().hash
     except SpecError as error:
         raise refused(str(file), "", f"{error}; {EXPORT_AGAIN}", "stage") from error

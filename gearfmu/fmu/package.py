@@ -157,7 +157,7 @@ def _common_files(
         identifier,
         model.guid,
         metadata.version("gearfmu"),
-        model.spec.description,
+        model.stage.description,
         native,
         sources,
         {name: text for name in RIGHTS if (text := str(extras.get(name, "")))},

@@ -61,7 +61,7 @@ def _facts(model: StageModel) -> dict[str, Any]:
     limits = ("torque_max", "speed_max")
     return {
         "name": model.name,
-        "kind": model.spec.kind,
+        "kind": model.stage.written.kind,
         "level": level.items[int(level.start)],
         **dict(zip(("input", "output", "ratio"), ends, strict=True)),
         "teeth": {gear.name: gear.teeth for gear in model.stage.gears},
@@ -70,8 +70,8 @@ def _facts(model: StageModel) -> dict[str, Any]:
             for mesh in model.stage.engagements
         },
         "hashes": {"model": model.hash, "bodies": model.bodies},
-        "files": stored_files(model.spec),
-        "stage": stored(model.spec),
+        "files": stored_files(model.stage.written),
+        "stage": stored(model.stage.written),
     }
 
 

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
+from scipy.optimize import linear_sum_assignment
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
-from gearfmu.modes.followed import followed
 from gearfmu.spec.forms.general import ShaftBody, Stage
 from gearfmu.spec.forms.turning import rolling
 from gearfmu.stage import StageModel
@@ -142,7 +142,7 @@ def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
     beside what its ends yield beyond them; None where the stage has no shafts."""
     if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):
         return None
-    layout = stage_layout(model.stage, bodies, tangents=tangents_of(model.spec, bodies))
+    layout = stage_layout(model.stage, bodies, tangents=tangents_of(model.stage, bodies))
     group = mount_sets(layout)[0]
     own = [_elastic(group, b) for b, body in enumerate(layout.bodies) if body.flank is None]
     return np.vstack(own)
@@ -231,3 +231,16 @@ class Linearised:
         on_supports = linear.damper[:, None] * (linear.damper_rows @ shapes) ** 2
         modal = (2 * linear.zeta * linear.omega)[:, None] * shapes**2
         return across.sum(axis=0) + on_supports.sum(axis=0) + modal.sum(axis=0)
+
+
+def followed(mass: np.ndarray, shapes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Order (k,) of the modes at every position in which column j is one mode throughout: from each position to the
+    next those are paired whose modal assurance criteria (MAC) add up to the most.
+
+    mass (n,): of the coordinates; shapes: (n, k) at each position, mass-normalised.
+    """
+    order = [np.arange(shapes[0].shape[1])]
+    for before, after in zip(shapes[:-1], shapes[1:], strict=True):
+        alike = (before.T @ (mass[:, None] * after)) ** 2
+        order.append(linear_sum_assignment(alike, maximize=True)[1][order[-1]])
+    return order

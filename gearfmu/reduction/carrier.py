@@ -14,31 +14,29 @@ from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_orde
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
-from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
+from gearfmu.spec.forms.members import CarrierMember
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 _COARSER = 0.75  # … of the mesh from which that one's frequencies are extrapolated where it is large
 _LARGE = 1e9  # bytes
 
 
-def carrier_full_order(spec: Form, scale: float = 1.0) -> FullOrder:
-    """The carrier of a planetary set: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
+def carrier_full_order(carrier: CarrierMember, scale: float = 1.0) -> FullOrder:
+    """A carrier with interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
 
     scale : factor on all element counts (1: about 150 000 unknowns); an imported carrier has none and is taken as it
     is. Rotations count with the bolt circle's radius. Raises MeshError.
     """
-    carrier = carrier_of(spec)
     if carrier.part.imported is not None:
-        return imported_carrier(spec).full
+        return imported_carrier(carrier).full
     sector = scaled_sector(carrier, scale)
     full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.geometry.a))
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full
 
 
-def carrier_need(spec: Form) -> Need:
+def carrier_need(carrier: CarrierMember) -> Need:
     """Memory that the reduction of a carrier meshed here takes, from its counts, the mesh beside it by which its error
     is known among it (`compared_scale`)."""
-    carrier = carrier_of(spec)
     own, bolts = _sector_size(scaled_sector(carrier, 1.0))
     size, vectors, cyclic = own * bolts, 3 * carrier.part.modes, cyclic_carrier(carrier)
     need = parts_need(size, bolts, vectors) if cyclic else whole_need(size, vectors, CARRIER_FACTORS)

@@ -17,19 +17,18 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.carrier import FINER, carrier_full_order, compared_scale, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
+from gearfmu.spec.forms.members import CarrierMember
 
 COMPARED = 20  # lowest elastic modes
 _POWER = 3  # of the element's length
 
 
-def carrier_mesh_error(spec: Form) -> dict[str, Any]:
+def carrier_mesh_error(carrier: CarrierMember) -> dict[str, Any]:
     """How far the lowest free frequencies of a carrier, coupled as the file says, lie above those
     of a finer mesh: plain facts, largest of the relative errors. `compared`: scale of the mesh that was made beside its
     own. Raises MeshError."""
-    carrier = carrier_of(spec)
     scale = compared_scale(carrier)
-    own, other = (free_frequencies(spec, each, COMPARED) for each in (1.0, scale))
+    own, other = (free_frequencies(carrier, each, COMPARED) for each in (1.0, scale))
     nodes, others = (len(scaled_sector(carrier, each).nodes) for each in (1.0, scale))
     ratio = (nodes / others) ** (1 / 3)  # of lengths, counts being rounded
     error = own / other - 1 if scale > 1 else extrapolated(other / own - 1, ratio)
@@ -43,14 +42,13 @@ def extrapolated(coarser: np.ndarray, ratio: float) -> np.ndarray:
     return coarser * (1 - FINER**-_POWER) / (ratio**_POWER - 1)
 
 
-def free_frequencies(spec: Form, scale: float, count: int) -> np.ndarray:
+def free_frequencies(carrier: CarrierMember, scale: float, count: int) -> np.ndarray:
     """The `count` lowest elastic frequencies (Hz) of the free carrier; `scale`: factor on all element counts.
 
     By one sector where bolts are evenly spaced and coupled alike, by the whole body else. Raises MeshError.
     """
-    carrier = carrier_of(spec)
     if not cyclic_carrier(carrier):
-        squared, _ = Elastic(carrier_full_order(spec, scale)).modes(count)
+        squared, _ = Elastic(carrier_full_order(carrier, scale)).modes(count)
         return np.sqrt(squared) / (2 * np.pi)
     space = _space(carrier, scale)
     families = []

@@ -19,19 +19,18 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.spec.forms.members import Form, member_of
+from gearfmu.spec.forms.members import Member
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5
 
 
-def ring_full_order(spec: Form, scale: float = RING_SCALE, mounted: bool = True, name: str = "ring") -> FullOrder:
-    """The ring `name` of any stage with its input nodes tooth0 …, three displacements each.
+def ring_full_order(member: Member, scale: float = RING_SCALE, mounted: bool = True) -> FullOrder:
+    """A ring with its input nodes tooth0 …, three displacements each.
 
     mounted : its springs are in the stiffness, and nothing else holds it. Otherwise the body is free, and the mounts
     (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
-    member = member_of(spec, name)
     geometry, gear, counts = member.geometry, member.gear, member.gear.body.mesh
     assert isinstance(geometry, InternalGearGeometry)
     sector = ring_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
@@ -39,22 +38,21 @@ def ring_full_order(spec: Form, scale: float = RING_SCALE, mounted: bool = True,
     couplings, mounts = _teeth(sector, body), ring_mounts(sector, body, member.mounts)
     if mounted and member.mounts is not None:
         springs = mount_springs(body, mounts, member.mounts.stiffness)
-        return full_order(name, body, couplings, Judgement((), geometry.r), springs)
+        return full_order(member.name, body, couplings, Judgement((), geometry.r), springs)
     ground = tuple(mount.name for mount in mounts)
-    return full_order(name, body, [*couplings, *mounts], Judgement(ground, geometry.r))
+    return full_order(member.name, body, [*couplings, *mounts], Judgement(ground, geometry.r))
 
 
-def gear_full_order(spec: Form, name: str, scale: float = GEAR_SCALE) -> FullOrder:
-    """The external gear `name` of any stage, with one input node a tooth and the node of its bore (averaging, or rigid
+def gear_full_order(member: Member, scale: float = GEAR_SCALE) -> FullOrder:
+    """An external gear with one input node a tooth and the node of its bore (averaging, or rigid
     where the gear says so), which is the ground when it is judged."""
-    member = member_of(spec, name)
     gear, geometry, counts = member.gear, member.geometry, member.gear.body.mesh
     assert isinstance(geometry, GearGeometry)
     sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, gear.material)
     kind = "rigid" if gear.rigid_bore else "averaging"
     bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
-    return full_order(name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
+    return full_order(member.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
 
 
 def ring_mounts(sector: FeMesh, body: Elements, mounts: Any) -> list[Coupling]:

@@ -15,7 +15,6 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
 from gearfmu.report.signals import GEAR_SPEED, input_shaft
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage, ToothedBody
 
 PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
@@ -85,7 +84,7 @@ def of_set(run: Run) -> list[tuple[str, str]]:
 def _phasing(run: Run) -> list[tuple[str, str]]:
     if run.spec is None or run.planets is None:
         return []
-    phases = planet_phases(as_general(run.spec), run.planets.planets, list(run.planets.meshes))
+    phases = planet_phases(run.spec, run.planets.planets, list(run.planets.meshes))
     return [
         (f"Planets at the {central}", f"{phasing(own)} ({', '.join(f'{_fraction(p)}' for p in own)} of a pitch)")
         for central, own in phases.items()

@@ -15,6 +15,7 @@ from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.plan import plan_sections
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
 from gearfmu.report.run import Run
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
 
@@ -26,7 +27,7 @@ def write(
     trace: Trace,
     summary: Mapping[str, Any],
     out_dir: str | os.PathLike[str],
-    spec: Any = None,
+    spec: Stage | None = None,
     bodies: Sequence[Any] | None = None,
     deformation: Deformation | None = None,
 ) -> Path:

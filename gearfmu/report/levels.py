@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.reading.library import model_folder
 
 COLUMNS = (
@@ -37,9 +38,9 @@ HEADER = (
 TEXT, WHOLE = ("scene", "level", "bodies"), ("n_dyn", "slices")
 
 
-def levels_path(spec: Any) -> Path:
-    """Where the price list of a StageSpec lies."""
-    return model_folder(spec) / f"levels_{spec.name}.csv"
+def levels_path(stage: Stage) -> Path:
+    """Where the price list of a stage lies."""
+    return model_folder(stage) / f"levels_{stage.name}.csv"
 
 
 def read_levels(path: Path) -> list[dict[str, Any]]:

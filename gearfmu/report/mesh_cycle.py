@@ -33,11 +33,11 @@ STATIC, RUN = "quasi-static", "in the run"
 
 
 def static_loads(
-    trace: Trace, window: Window, meshes: Sequence[str], spec: Any, bodies: Sequence[Any]
+    trace: Trace, window: Window, meshes: Sequence[str], stage: Stage, bodies: Sequence[Any]
 ) -> tuple[dict[str, FlankLoads], list[str]]:
     """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
     there; those with hardly a load are left out."""
-    model, part, found = assemble(spec, bodies), trace.window(window.start, window.end), {}
+    model, part, found = assemble(stage, bodies), trace.window(window.start, window.end), {}
     missing, kernel = [], None
     slices = float(trace.meta.get("slices") or 5)
     positions = POSITIONS if model.stage.frame_of(model.stage.engagements[0]) is None else POSITIONS_OF_SET

@@ -12,7 +12,6 @@ from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.plots_set import PlanetSet, planet_set
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.deformation import Deformation
@@ -27,7 +26,7 @@ class Run:
 
     trace: Trace
     summary: Mapping[str, Any]
-    spec: Any = None
+    spec: Stage | None = None
     bodies: Sequence[Any] | None = None
     deformation: Deformation | None = None
 
@@ -54,7 +53,7 @@ class Run:
     @cached_property
     def stage(self) -> Stage | None:
         """The stage in general terms, where it and its bodies are at hand."""
-        return as_general(self.spec) if self.spec is not None and self.bodies else None
+        return self.spec if self.bodies else None
 
     @cached_property
     def shown_meshes(self) -> list[str]:
@@ -69,7 +68,7 @@ class Run:
         """Statics under the run's mean load by engagement, and why some are missing; empty without stage and bodies."""
         if self.stage is None:
             return {}, []
-        return static_loads(self.trace, self.window, self.shown_meshes, self.spec, self.bodies or ())
+        return static_loads(self.trace, self.window, self.shown_meshes, self.stage, self.bodies or ())
 
     @property
     def loads(self) -> dict[str, FlankLoads]:
@@ -86,7 +85,7 @@ class Run:
         first = next(iter(self.known), "")
         if found is None or self.stage is None or f"{first}.force" not in found.signals:
             return found
-        return replace(found, resonances=resonances(found, first, self.spec, self.bodies or ()))
+        return replace(found, resonances=resonances(found, first, self.stage, self.bodies or ()))
 
     @property
     def title(self) -> str:

@@ -16,6 +16,7 @@ from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
 from gearfmu.report.signals import GEAR_SPEED, Window, bearings
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
@@ -196,10 +197,10 @@ def _loudest_bearings(part: Trace) -> list[str]:
     return [name for name in found if name in loud]
 
 
-def resonances(run: RunUp, mesh: str, spec: Any, bodies: Sequence[Any]) -> tuple[float, ...]:
+def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Any]) -> tuple[float, ...]:
     """Natural frequencies (Hz) of a pair or train linearised under the run's mean mesh force, those modes that a
     transmission error drives; none where the stage finds no equilibrium with its flanks in contact."""
-    model = assemble(spec, bodies)
+    model = assemble(stage, bodies)
     place = place_of(model, mesh)
     torque = float(np.mean(run.signals[f"{mesh}.force"].values)) * place.lever
     if abs(torque) < LEAST_LOAD * place.most:

@@ -4,12 +4,11 @@ teeth mesh."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
-from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing, meshings
 from gearfmu.stage.run.trace import Trace
 
@@ -66,16 +65,16 @@ def drive_side(trace: Trace, mesh: str) -> int:
     return -1 if together < 0 else 1
 
 
-def known_meshings(trace: Trace, spec: Any = None) -> dict[str, Meshing]:
-    """Meshing of every engagement, from the stage `spec` or the trace's meta "meshes"."""
-    if spec is not None:
-        return meshings(as_general(spec))
+def known_meshings(trace: Trace, stage: Stage | None = None) -> dict[str, Meshing]:
+    """Meshing of every engagement, from the stage or the trace's meta "meshes"."""
+    if stage is not None:
+        return meshings(stage)
     return {mesh: Meshing.of_plain(own) for mesh, own in dict(trace.meta.get("meshes") or {}).items()}
 
 
-def mesh_angles(trace: Trace, spec: Any = None) -> dict[str, np.ndarray]:
+def mesh_angles(trace: Trace, stage: Stage | None = None) -> dict[str, np.ndarray]:
     """Mesh angle (n,) rad of every engagement whose gear's speed and teeth are known: `known_meshings`."""
-    known = known_meshings(trace, spec)
+    known = known_meshings(trace, stage)
     speeds = {name.removesuffix(GEAR_SPEED): trace[name] for name in trace.channels if name.endswith(GEAR_SPEED)}
     return {
         mesh: mesh_angle(trace.time, meshing.relative(speeds), meshing.teeth)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.reading.base import Spec
-from gearfmu.spec.stage import StageSpec
 
 
 def stage_schema() -> dict[str, Any]:

@@ -1,24 +1,24 @@
-"""stage.toml → StageSpec, PlanetarySpec or Stage, read and checked with the geometry."""
+"""stage.toml → Stage, read and checked with the geometry."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeAlias
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.spec.forms.bearing_checks import use_problems, uses_of_gears
+from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
-from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.general import Form, Stage
 from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
-from gearfmu.spec.forms.members import members
-from gearfmu.spec.forms.pair import StageSpec as StageSpec
-from gearfmu.spec.forms.pair import in_order
+from gearfmu.spec.forms.pair import StageSpec, in_order
 from gearfmu.spec.forms.pair_checks import geometry_problems
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import set_problems
-from gearfmu.spec.reading.base import Spec, validate
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.reading.base import validate
 from gearfmu.spec.reading.changes import Changes, changed_tables
 from gearfmu.spec.reading.judge import read_and_judge
 from gearfmu.spec.reading.layers import Layers, read_layers
@@ -28,9 +28,8 @@ from gearfmu.spec.tables.imported import missing_files
 from gearfmu.units import to_si
 
 
-def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Any:
-    """The StageSpec, PlanetarySpec or Stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
-    "fzg_c/stage_relief", "planetary54").
+def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Stage:
+    """The stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c", "fzg_c/stage_relief", "planetary54").
 
     changes : fields that are to be other than in the file (`changes.py`), {"gears.pinion.tip_relief.amount": "20 um"};
     the file itself stays. SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that
@@ -39,39 +38,44 @@ def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) ->
     layers = read_layers(find_stage(stage))
     kind = stage_class(layers.tables)
     layers = layers.changed(changed_tables(kind, changes or {}))
-    if kind is PlanetarySpec:
-        return _load_set(layers)
-    if kind is Stage:
-        return _load_general(layers)
-    return _load_pair(layers)
+    load = {PlanetarySpec: _load_set, Stage: _load_general}.get(kind, _load_pair)
+    found, problems = load(layers)
+    problems += missing_files(layers)
+    if found is None or problems:
+        raise SpecError(layers.attributed(problem) for problem in problems)
+    spec = expand(found)
+    if problems := _topography_problems(spec, layers):
+        raise SpecError(layers.attributed(problem) for problem in problems)
+    return spec
 
 
-def stage_class(tables: Mapping[str, Any]) -> type[Spec]:
+def stage_class(tables: Mapping[str, Any]) -> type[Form | Stage]:
     """StageSpec, PlanetarySpec or Stage: what the tables of a stage file are read as."""
-    kinds: dict[Any, type[Spec]] = {"planetary_set": PlanetarySpec, "general": Stage}
+    kinds: dict[Any, type[Form | Stage]] = {"planetary_set": PlanetarySpec, "general": Stage}
     return kinds.get(tables.get("kind"), StageSpec)
 
 
 ROLLING = "by its rolling bearing"
 
 
-def require_pair(spec: Any) -> None:
-    """SpecError unless `spec` is a pair: a verb about one pair, or its gears' files, means nothing else."""
-    if spec.kind != "external_pair":
+def require_pair(stage: Stage) -> None:
+    """SpecError unless the file is of a pair: a verb about one pair, or its gears' files, means nothing else."""
+    if (kind := stage.written.kind) != "external_pair":
         remedy = "this is about one pair: name a stage of kind external_pair, such as fzg_c"
-        raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
+        raise SpecError([Problem(str(stage.source), "kind", f'"{kind}"', remedy)])
 
 
-def _load_pair(layers: Layers) -> StageSpec:
+Read: TypeAlias = "tuple[Form | Stage | None, list[Problem]]"  # with files as seen from here, and all that is wrong
+
+
+def _load_pair(layers: Layers) -> Read:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
     spec, found = read_and_judge(StageSpec, raw | {"source": path}, str(path), _pair_problems)
     if spec is None and not found.judged:
         problems += _geometry_of_what_can_be_read(layers)
     problems += found.problems
-    problems += missing_files(layers)
-    spec = _judged(spec and _with_paths(spec, layers), layers, problems)
-    return _with_relief_rolls(spec)
+    return (None if spec is None or problems else _with_relief_rolls(_with_paths(spec, layers))), problems
 
 
 def _pair_problems(spec: StageSpec) -> list[Problem]:
@@ -98,45 +102,30 @@ def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
     ]
 
 
-def _load_set(layers: Layers) -> PlanetarySpec:
+def _load_set(layers: Layers) -> Read:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
     named = {key: raw[key] | {"name": key} for key in ("sun", "planet", "ring") if isinstance(raw.get(key), dict)}
     judge = partial(set_problems, str(path))
     spec, found = read_and_judge(PlanetarySpec, raw | named | {"source": path}, str(path), judge)
-    problems += found.problems
-    problems += missing_files(layers)
-    return _judged(spec and _set_with_paths(spec, layers), layers, problems)
+    return spec and _set_with_paths(spec, layers), problems + found.problems
 
 
-def _load_general(layers: Layers) -> Stage:
+def _load_general(layers: Layers) -> Read:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
     spec, found = read_and_judge(Stage, raw | {"source": path}, str(path), partial(general_problems, str(path)))
     problems += found.problems
-    problems += missing_files(layers)
-    if spec is not None:
-        bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
-        spec = spec.model_copy(update={"bodies": spec.bodies | bodies})
-    return with_relief_rolls(_judged(spec, layers, problems))
+    if spec is None or problems:
+        return None, problems
+    bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
+    return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies})), []
 
 
-Loaded = TypeVar("Loaded", bound=Spec)
-
-
-def _judged(spec: Loaded | None, layers: Layers, problems: list[Problem]) -> Loaded:
-    """The stage, files as seen from here, where nothing is wrong with it; topographies are read here."""
-    if spec is not None and not problems:
-        problems = _topography_problems(spec, layers)
-    if problems or spec is None:
-        raise SpecError(layers.attributed(problem) for problem in problems)
-    return spec
-
-
-def _topography_problems(spec: Any, layers: Layers) -> list[Problem]:
+def _topography_problems(stage: Stage, layers: Layers) -> list[Problem]:
     """What is wrong with the topographies of all gears."""
-    found = members(spec).values()
-    return [problem for m in found for problem in topography_problems(m.gear, m.geometry, layers, m.place)]
+    found = (topography_problems(g, gear_shape(g), layers, stage.table_of(g.name)) for g in stage.gears)
+    return list(dict.fromkeys(problem for problems in found for problem in problems))  # planets share a table
 
 
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:

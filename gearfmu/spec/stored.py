@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.forms.expand import expand
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.reading.base import Spec, validate
 from gearfmu.spec.stage import stage_class
 
@@ -16,7 +18,7 @@ FREE = ("description", "ports")  # fields in which two exports of one stage may 
 
 
 def stored(spec: Spec) -> dict[str, Any]:
-    """The fields of a StageSpec, Stage or PlanetarySpec for JSON, SI, without `source`; files by their names
+    """The fields of a stage, or of what is written in its file, for JSON, SI, without `source`; files by their names
     without folders."""
     tables = spec.model_dump(mode="json", exclude={"source"})
     for table, key, _ in _files(tables):
@@ -37,18 +39,19 @@ def stored_files(spec: Spec) -> dict[str, str]:
     return found
 
 
-def restored(tables: Mapping[str, Any], source: Path) -> Any:
-    """The StageSpec, Stage or PlanetarySpec of `stored` tables. source : the file that held them, for messages.
+def restored(tables: Mapping[str, Any], source: Path) -> Stage:
+    """The stage of `stored` tables of what is written in its file. source : the file that held them, for messages.
     SpecError with everything that is wrong."""
     spec, problems = validate(stage_class(tables), {**tables, "source": source}, str(source), from_file=False)
     if spec is None:
         raise SpecError(problems)
-    return spec
+    return expand(spec)
 
 
-def differences(one: Spec, other: Spec) -> list[tuple[str, str, str]]:
-    """(field, value, other value) of all differences of two stages but for descriptions, ports and folders of files."""
-    first, second = ({key: value for key, value in stored(spec).items() if key not in FREE} for spec in (one, other))
+def differences(one: Stage, other: Stage) -> list[tuple[str, str, str]]:
+    """(field, value, other value) of all differences of two stage files but for descriptions, ports and folders."""
+    tables = (stored(stage.written) for stage in (one, other))
+    first, second = ({key: value for key, value in own.items() if key not in FREE} for own in tables)
     return list(_differences(first, second, ""))
 
 

@@ -21,6 +21,7 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
@@ -132,9 +133,9 @@ class KeptSource:
 
 def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
-    along a flank; changes: of the StageSpec."""
-    spec = load_stage(scene.stage.name).model_copy(update=changes)
-    return assemble(in_drivetrain(scene, spec), bodies or load_bodies(spec), rolls)
+    along a flank; changes: of what is written in its file."""
+    stage = rewritten(load_stage(scene.stage.name), **changes)
+    return assemble(in_drivetrain(scene, stage), bodies or load_bodies(stage), rolls)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from gearfmu.spec.forms.members import carriers
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.levels import LEVELS
@@ -45,7 +44,7 @@ def points(scene: SceneSpec, quick: bool = False) -> list[Point]:
 
 def of_set(scene: SceneSpec) -> bool:
     """Whether the scene's stage has a carrier."""
-    return bool(carriers(load_stage(scene.stage.name)))
+    return bool(load_stage(scene.stage.name).carriers)
 
 
 def window(scene: SceneSpec, quick: bool = False) -> SceneSpec:

@@ -11,6 +11,7 @@ from typing import Any
 from gearfmu.body import load_bodies, reduce_apart, reduce_bodies
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.kernel.build import source_hash, sources
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
@@ -29,7 +30,7 @@ class Variant:
     changes: tuple[tuple[str, Any], ...] = ()
     folder: str | None = None
 
-    def spec(self) -> Any:
+    def spec(self) -> Stage:
         """Its numbers; SpecError."""
         return load_stage(self.file, dict(self.changes))
 

@@ -12,6 +12,7 @@ from gearfmu.cosim.scene_run import Staged
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
 from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
@@ -50,9 +51,9 @@ def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
     return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
-def run_scene(scene: SceneSpec, spec: Any, bodies: list[Any]) -> Trace:
+def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Any]) -> Trace:
     """The scene on the stage of these bodies; by the kernel, which has the bits of its FMU."""
-    return cosim.run(Staged.of(scene, spec, bodies), unit="kernel")
+    return cosim.run(Staged.of(scene, stage, bodies), unit="kernel")
 
 
 def ended(trace: Trace) -> tuple[str, str]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gearfmu.body import body_hashes, load_bodies
 from gearfmu.errors import BodyError, GearfmuError
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import load_scene
 from gearfmu.sweeps.journal import Journal
 from gearfmu.sweeps.plan import RUN, Plan, split
@@ -83,7 +84,7 @@ def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) 
     fingerprints of bodies."""
     spec = variant.spec()
     hashes = body_hashes(spec)
-    fingerprint = _digest([spec.model_dump(mode="json", exclude={"source"}), list(hashes)])
+    fingerprint = _digest([spec.written.model_dump(mode="json", exclude={"source"}), list(hashes)])
     key = (variant.file, *hashes)
     if variant.changes and key not in fitting:
         fitting[key] = _fit(spec, None)
@@ -92,7 +93,7 @@ def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) 
     return replace(variant, folder=str((out / BODIES / _digest(list(hashes))[:12]).resolve())), fingerprint
 
 
-def _fit(spec: Any, folder: str | None) -> bool:
+def _fit(spec: Stage, folder: str | None) -> bool:
     """Whether the stored bodies are those of the stage."""
     try:
         load_bodies(spec, folder)

@@ -106,7 +106,7 @@ def test_shipped_spur_gears_know_their_profile_and_what_turning_does() -> None:
 
 def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:
     """Points of the drawn tip circle at the ends of the face width are turned by ± b/2·twist."""
-    for body, shape, gear in zip(made.bodies, made.spec.geometry.gears, made.spec.gears, strict=True):
+    for body, shape, gear in zip(made.bodies, made.spec.written.geometry.gears, made.spec.gears, strict=True):
         assert drawn_counts(shape, gear.face_width).width > 1
         points, pitch = np.asarray(body.display.points, float), 2 * np.pi / body.teeth
         radius, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])

@@ -23,19 +23,17 @@ from gearfmu.body.layout import RIM_ENTRIES
 from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.spec.forms.members import body_names
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")
-NAMES = body_names(SPEC)
-COARSE = SPEC.model_copy(
-    update={"carrier": SPEC.carrier.model_copy(update={
-        "mesh": SPEC.carrier.mesh.model_copy(update={"scale": 0.34}), "modes": 72, "method": "rubin"
-    })}
-)  # fmt: skip
+NAMES = SPEC.files
+COARSE = rewritten(SPEC, carrier=SPEC.written.carrier.model_copy(update={
+        "mesh": SPEC.written.carrier.mesh.model_copy(update={"scale": 0.34}), "modes": 72, "method": "rubin"
+    }))  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +68,11 @@ def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands(
 
 
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
-    ring, carrier = ring_geometry(SPEC.ring, SPEC.set), carrier_geometry(SPEC)
+    ring, carrier = ring_geometry(SPEC.written.ring, SPEC.written.set), carrier_geometry(SPEC.written)
     (area, moment), (middle, about) = section(ring), carrier_moments(carrier)
-    volume = ring.z * area * SPEC.ring.face_width
+    volume = ring.z * area * SPEC.written.ring.face_width
     assert shipped["ring"].mass == pytest.approx(7850 * volume, rel=1e-5)
-    polar = 7850 * ring.z * moment * SPEC.ring.face_width
+    polar = 7850 * ring.z * moment * SPEC.written.ring.face_width
     assert shipped["ring"].inertia[2, 2] == pytest.approx(polar, rel=1e-5)
     assert shipped["carrier"].mass == pytest.approx(7850 * carrier.volume, rel=1e-4)
     assert shipped["carrier"].inertia[2, 2] == pytest.approx(7850 * about, rel=1e-4)
@@ -110,7 +108,9 @@ def test_residual_of_the_carrier_is_positive_semidefinite(shipped, dynamic):
 def test_ring_on_its_mounts(shipped):
     """Six modes that were rigid."""
     frequency = mounted_frequencies(shipped["ring"])
-    rigid = np.sqrt(6 * SPEC.ring.mounts.stiffness / shipped["ring"].mass) / (2 * np.pi)  # axial, on six springs
+    rigid = np.sqrt(6 * SPEC.written.ring.mounts.stiffness / shipped["ring"].mass) / (
+        2 * np.pi
+    )  # axial, on six springs
     assert len(frequency) == 6 + shipped["ring"].modes and 0.6 * rigid < frequency[0] < rigid
 
 
@@ -175,8 +175,8 @@ def test_missing_and_stale_bodies_are_refused(carrier, tmp_path):
 def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_path):
     mesh = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=1)
     small = {"mesh": mesh, "modes": 12, "roll_points": 4, "width_functions": 1}
-    gears = {g.name: g.model_copy(update={"body": g.body.model_copy(update=small)}) for g in COARSE.gears}
-    spec = COARSE.model_copy(update=gears)
+    gears = {g.name: g.model_copy(update={"body": g.body.model_copy(update=small)}) for g in COARSE.written.gears}
+    spec = rewritten(COARSE, **gears)
     save_interface_body(carrier, tmp_path / "carrier.h5")  # current already
     before, said = (tmp_path / "carrier.h5").stat().st_mtime_ns, []
     bodies = reduce_bodies(spec, tmp_path, progress=lambda what, share: said.append(what))

@@ -19,18 +19,20 @@ from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import seal
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 TINY = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=2)
 
 
-def tiny_stage(folder: Path) -> StageSpec:
+def tiny_stage(folder: Path) -> Stage:
     """The FZG pair on the coarsest mesh, its files in `folder`."""
     spec = load_stage("fzg_c")
     body = {"mesh": TINY, "modes": 31, "roll_points": 5, "width_functions": 3}
-    gears = tuple(gear.model_copy(update={"body": gear.body.model_copy(update=body)}) for gear in spec.gears)
-    return spec.model_copy(update={"gears": gears, "source": folder / "stage.toml"})
+    gears = tuple(gear.model_copy(update={"body": gear.body.model_copy(update=body)}) for gear in spec.written.gears)
+    return rewritten(spec, gears=gears, source=folder / "stage.toml")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +66,7 @@ def test_a_reduction_is_stored_to_what_the_layout_says_and_packed_once(made, tmp
 def test_a_body_reads_back_as_it_was_written(made):
     spec, bodies, _ = made
     for index, body in enumerate(bodies):
-        again = load_body(body_path(spec, spec.gears[index].name))
+        again = load_body(body_path(spec, spec.written.gears[index].name))
         for entry in entries_of(body.groups):
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
         assert (again.name, again.input_hash, again.mesh, again.material) == (
@@ -90,8 +92,10 @@ def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(ma
     assert np.array_equal(reduce_bodies(spec)[0].frequency, bodies[0].frequency)
     assert body_path(spec, "pinion").stat().st_mtime_ns == before
     assert [b.name for b in load_bodies(spec)] == ["pinion", "wheel"]
-    softer = spec.gears[0].material.model_copy(update={"youngs_modulus": 103e9})
-    other = spec.model_copy(update={"gears": (spec.gears[0].model_copy(update={"material": softer}), spec.gears[1])})
+    softer = spec.written.gears[0].material.model_copy(update={"youngs_modulus": 103e9})
+    other = rewritten(
+        spec, gears=(spec.written.gears[0].model_copy(update={"material": softer}), spec.written.gears[1])
+    )
     with pytest.raises(BodyError, match="pinion.h5: stale: made from other numbers.*gearfmu reduce"):
         load_bodies(other)
     remade = reduce_bodies(other, folder / "other")[0]
@@ -109,9 +113,9 @@ def test_a_body_of_an_older_reduction_is_refused_by_its_version(made, tmp_path):
 
 def test_contact_ports_and_backlash_leave_the_body_alone(made):
     spec, _, _ = made
-    pair = spec.pair.model_copy(update={"backlash": 3e-4})
-    contact = spec.contact.model_copy(update={"slices": 9})
-    assert len(load_bodies(spec.model_copy(update={"pair": pair, "contact": contact}))) == 2
+    pair = spec.written.pair.model_copy(update={"backlash": 3e-4})
+    contact = spec.written.contact.model_copy(update={"slices": 9})
+    assert len(load_bodies(rewritten(spec, pair=pair, contact=contact))) == 2
 
 
 def test_inspect_tells_what_the_file_holds(made):

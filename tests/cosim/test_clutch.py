@@ -10,7 +10,7 @@ from analytic_stage import Smooth
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gearfmu.cosim.friction import sticking_torques
+from gearfmu.cosim.events import sticking_torques
 from gearfmu.cosim.network import Clutch, Inertia, Network, Source, Spring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Constant, Ramp

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from gearfmu.cosim.scene_run import drive_of, in_drivetrain
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import load_scene, shipped_scenes
 from gearfmu.spec.stage import load_stage
 
@@ -14,8 +13,8 @@ from gearfmu.spec.stage import load_stage
 def test_a_stage_with_the_ports_that_a_drive_needs_has_the_same_drive(name):
     """Scenes are run on the stage that has their ports already, an FMU brings its own."""
     scene = load_scene(name)
-    bare = as_general(load_stage(scene.stage.name))
-    ready = as_general(in_drivetrain(scene, load_stage(scene.stage.name)))
+    bare = load_stage(scene.stage.name)
+    ready = in_drivetrain(scene, load_stage(scene.stage.name))
     first, second = drive_of(scene, bare), drive_of(scene, ready)
     assert first.ports == second.ports and first.ports
     assert first.start() == second.start() and first.silent == second.silent
@@ -29,7 +28,7 @@ def test_a_stage_with_the_ports_that_a_drive_needs_has_the_same_drive(name):
 
 def test_alternating_torques_and_clutches_of_a_drive_are_known():
     known = {name: load_scene(name) for name in ("planetary_backfire", "clutch_closure", "planetary_shift")}
-    drives = {name: drive_of(s, as_general(load_stage(s.stage.name))) for name, s in known.items()}
+    drives = {name: drive_of(s, load_stage(s.stage.name)) for name, s in known.items()}
     assert drives["planetary_backfire"].frequencies == (300.0,) and not drives["planetary_backfire"].watched
     assert drives["clutch_closure"].watched == () and drives["clutch_closure"].signals  # its clutch is in the stage
     assert set(drives["planetary_shift"].watched) == set(known["planetary_shift"].drivetrain.clutches)

@@ -155,7 +155,7 @@ def test_ports_that_do_not_fit_are_all_named(plain: Path, scene: str, message: s
 
 
 def test_another_kind_of_port_is_named() -> None:
-    spec = gf.assemble("fzg_c", ports={"wheel": "torque"}).spec
+    spec = gf.assemble("fzg_c", ports={"wheel": "torque"}).stage
     opened = OpenedFmu(Path("pair.fmu"), StageModel(spec, b"", ("", "")), {})
     with pytest.raises(SpecError, match=r"pair.fmu: ports.wheel.kind = torque: scene pair_loaded needs .* kind spring"):
         fitted(gf.load_scene("pair_loaded"), opened, drive_of)

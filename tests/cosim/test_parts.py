@@ -13,7 +13,6 @@ from gearfmu.cosim.network import Driven
 from gearfmu.cosim.parts import Rest, Start, part_network, part_ports, start_of, start_speeds_of
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.errors import SpecError
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
@@ -61,7 +60,7 @@ def speeds_of(scene: SceneSpec, stage: Stage) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def pair() -> Stage:
-    return as_general(load_stage("fzg_c"))
+    return load_stage("fzg_c")
 
 
 def scene_of(folder: Path, text: str) -> SceneSpec:
@@ -168,7 +167,7 @@ def brake_of(scene: SceneSpec, capacity: float, peak: float = 1.0) -> SceneSpec:
 def test_a_brake_that_holds_carries_the_ring_and_one_that_does_not_slips() -> None:
     """The ring carries three quarters of the carrier's torque (54/72), the sun one: in balance, as the scene begins.
     With less capacity than that the brake carries what it can."""
-    scene, stage = load_scene(SHIFT), as_general(load_stage("planetary54/stage_ring_port"))
+    scene, stage = load_scene(SHIFT), load_stage("planetary54/stage_ring_port")
     seen: dict[str, float] = {}
     start = begin(scene, stage, rest_at(dict.fromkeys(stage.ports, 0.0), seen))
     assert start.speed == pytest.approx({"turbine": 85.0, "drum": 0.0, "output": 340.0, "vehicle": 340.0})
@@ -185,7 +184,7 @@ def test_a_brake_that_holds_carries_the_ring_and_one_that_does_not_slips() -> No
 def test_a_port_on_the_ground_is_held_at_the_angle_its_torque_needs(tmp_path: Path) -> None:
     text = (SHIPPED / f"{SHIFT}.toml").read_text(encoding="utf-8").replace('on = "drum"', 'on = "ground"')
     text = text.replace('between = ["drum", "ground"]', 'between = ["drum", "turbine"]')
-    scene, stage = scene_of(tmp_path, text), as_general(load_stage("planetary54/stage_ring_port"))
+    scene, stage = scene_of(tmp_path, text), load_stage("planetary54/stage_ring_port")
     scene = brake_of(scene, 0.0)
     start = begin(scene, stage, rest_at({"carrier": 0.0, "sun": 0.0, "ring": 1e-3}, {}))
     assert start.ground == {"ground.ring": pytest.approx(1e-3 - 150.0 / stage.ports["ring"].k)}

@@ -11,7 +11,6 @@ from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.scene_run import drive_of
 from gearfmu.cosim.signals import Ramp
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 
@@ -19,7 +18,7 @@ SHAFTS = ("pinion", "wheel")
 
 
 def network(name: str) -> Network:
-    return drive_of(load_scene(name), as_general(load_stage("fzg_c"))).partner(lambda torques: {})
+    return drive_of(load_scene(name), load_stage("fzg_c")).partner(lambda torques: {})
 
 
 def drivetrain(name: str) -> PyUnit:

@@ -37,7 +37,7 @@ def willis(trace: Trace) -> np.ndarray:
 
 def momentum(trace: Trace, model: StageModel) -> np.ndarray:
     """Angular momentum of all rotors of the set about its axis, kg·m²/s."""
-    sun, planet, ring, carrier = load_bodies(model.spec)
+    sun, planet, ring, carrier = load_bodies(model.stage)
     own = {"sun": sun, "ring": ring, "carrier": carrier} | {f"planet{k}": planet for k in (1, 2, 3, 4)}
     spins = sum(body.inertia[2, 2] * trace[f"{name}.gear.w"] for name, body in own.items())
     return spins + 4.0 * planet.mass * PIN_CIRCLE**2 * trace["carrier.gear.w"]

@@ -18,7 +18,6 @@ from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.source import Source
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.spec.scenes.shaft_loads import ShaftLoad
 from gearfmu.spec.stage import load_stage
@@ -31,7 +30,7 @@ PAPER = "planetary_paper"
 def test_the_scene_of_the_paper_is_in_balance_at_the_start() -> None:
     """600 N·m on the carrier at 85 rad/s, −150 N·m on the sun at four times that: no power left over."""
     scene = load_scene(PAPER)
-    stage = as_general(load_stage(scene.stage.name))
+    stage = load_stage(scene.stage.name)
     speeds = start_speeds(scene, stage, "carrier")
     assert scene.duration == 0.1 and scene.start.pinion_speed == SPEED and speeds == {"carrier": 85.0, "sun": 340.0}
     power = {name: Law(load).at(0.0, speeds[name]) * speeds[name] for name, load in scene.shaft_loads.items()}

@@ -25,8 +25,8 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 SPEC = load_stage("planetary54")
-RING, WIDTH = ring_geometry(SPEC.ring, SPEC.set), SPEC.ring.face_width
-CARRIER = carrier_geometry(SPEC)
+RING, WIDTH = ring_geometry(SPEC.written.ring, SPEC.written.set), SPEC.written.ring.face_width
+CARRIER = carrier_geometry(SPEC.written)
 UNIT = SimpleNamespace(youngs_modulus=1.0, poisson_ratio=0.3, density=1.0)
 COUNTS = MeshSpec(flank=6, thickness=2, root=3, rim=2, width=2)
 
@@ -114,7 +114,7 @@ def test_carrier_elements_are_good_cuts_match_and_sets_are_the_seats(carrier):
 
 
 def test_default_carrier_has_about_150_000_unknowns():
-    full = carrier_sector(CARRIER, SPEC.carrier.mesh).full()
+    full = carrier_sector(CARRIER, SPEC.written.carrier.mesh).full()
     assert 140e3 < 3 * len(full.nodes) < 160e3
     assert len(np.unique(np.round(full.nodes, 10), axis=0)) == len(full.nodes)
 
@@ -133,8 +133,8 @@ def test_carriers_with_other_numbers_of_planets_mesh(planets):
 
 def test_bolts_stand_where_unequally_spaced_planets_are():
     """72 teeth of sun and ring, five planets: two of the steps are longer than the others."""
-    uneven = SPEC.set.model_copy(update={"planets": 5, "positions": (0, 14, 29, 43, 58)})
-    g = carrier_geometry(SPEC.model_copy(update={"set": uneven}))
+    uneven = SPEC.written.set.model_copy(update={"planets": 5, "positions": (0, 14, 29, 43, 58)})
+    g = carrier_geometry(SPEC.written.model_copy(update={"set": uneven}))
     sector = carrier_sector(g, CarrierMeshSpec(scale=0.5))
     mesh = whole_carrier(g, sector)
     for k, turn in enumerate((0, 14, 29, 43, 58)):

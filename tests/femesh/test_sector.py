@@ -18,7 +18,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 
 STAGE = load_stage("fzg_c")
-SHAPES = [gear_geometry(gear, STAGE.pair) for gear in STAGE.gears]
+SHAPES = [gear_geometry(gear, STAGE.written.pair) for gear in STAGE.gears]
 WIDTH = STAGE.gears[0].face_width
 COARSE = MeshSpec(scale=0.4)
 

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gearfmu.spec.forms.expand import rewritten, with_ports
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 
@@ -24,8 +25,8 @@ def small_model(stage: str = "fzg_c/stage_relief", name: str | None = None, **po
     """The stage's model on invented bodies; ports: fields to change by shaft, e.g. wheel={"kind": "torque"}."""
     spec = load_stage(stage)
     changed = {shaft: port.model_copy(update=ports.get(shaft, {})) for shaft, port in spec.ports.items()}
-    spec = spec.model_copy(update={"ports": changed, "name": name or spec.name})
-    geometry = spec.geometry
+    spec = rewritten(with_ports(spec, changed), name=name or spec.name)
+    geometry = spec.written.geometry
     return assemble(spec, [body(spec.gears[i], geometry.gears[i]) for i in (0, 1)])
 
 

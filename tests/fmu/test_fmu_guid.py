@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from gearfmu.body import load_bodies
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 
@@ -26,7 +27,7 @@ print(model.hash, model.guid)
 
 def made(**changes: object) -> StageModel:
     spec = load_stage("fzg_c/stage_relief")
-    return assemble(spec.model_copy(update=changes), load_bodies(spec))
+    return assemble(rewritten(spec, **changes), load_bodies(spec))
 
 
 @pytest.mark.parametrize("stage", ["fzg_c", "helical_demo"])
@@ -51,7 +52,7 @@ def test_what_a_model_is_made_of_changes_the_guid() -> None:
     ports = {name: port.model_copy(update={"k": 1e5}) for name, port in spec.ports.items()}
     others = [
         made(),
-        made(torque_max=math.nextafter(spec.torque_max, math.inf)),
+        made(torque_max=math.nextafter(spec.written.torque_max, math.inf)),
         made(name="another"),
         made(ports=ports),
         base.with_starts({"level": 1.0}),

@@ -16,6 +16,7 @@ from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import write_archive
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.validate import _stage as stage_findings
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.reading.library import shipped_stages
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.stored import restored, stored
@@ -47,20 +48,20 @@ def test_an_fmu_gives_back_its_model_and_its_stage(runtime: str, model: StageMod
     path = request.getfixturevalue(runtime)
     opened = read_fmu(path)
     assert (opened.model.blob, opened.model.bodies, opened.model.shafts) == (model.blob, model.bodies, model.shafts)
-    assert opened.model.spec == model.spec.model_copy(update={"source": path})
-    assert opened.problems_of(model.spec) == [] and opened.observed == () and opened.files == {}
+    assert opened.model.stage == model.stage.model_copy(update={"source": path})
+    assert opened.problems_of(model.stage) == [] and opened.observed == () and opened.files == {}
 
 
 @pytest.mark.parametrize("name", shipped_stages())
 def test_every_shipped_stage_survives_json(name: str) -> None:
     spec = load_stage(name)
-    assert restored(json.loads(json.dumps(stored(spec))), spec.source) == spec
+    assert restored(json.loads(json.dumps(stored(spec.written))), spec.source) == spec
 
 
 def test_the_file_says_what_a_person_asks_first(members: dict[str, bytes], model: StageModel) -> None:
     facts = json.loads(members[STAGE_FILE])
     assert facts["teeth"] == {"pinion": 16, "wheel": 24} and facts["ratio"] == -1.5 and facts["level"] == "standard"
-    assert facts["meshes"]["mesh"]["torque_max"] == model.spec.torque_max
+    assert facts["meshes"]["mesh"]["torque_max"] == model.stage.written.torque_max
     assert facts["hashes"] == {"model": model.hash, "bodies": model.bodies}
     fast = json.loads(stage_file(model.with_starts({"level": 1.0})))
     assert fast["level"] == "fast" and fast["hashes"]["model"] != model.hash
@@ -73,18 +74,18 @@ def test_places_of_files_are_no_part_of_it(tmp_path: Path) -> None:
         folder.mkdir()
         (folder / "wheel.csv").write_text(TOPOGRAPHY.replace("3\n", "4\n") if folder.name == "else" else TOPOGRAPHY)
     base = small_model("fzg_c")
-    here, there, other = (StageModel(_measured(base.spec, folder), base.blob, base.body_hashes) for folder in folders)
+    here, there, other = (StageModel(_measured(base.stage, folder), base.blob, base.body_hashes) for folder in folders)
     assert stage_file(here) == stage_file(there) != stage_file(other)
     assert not any(str(tmp_path).encode() in stage_file(model) for model in (here, there, other))
     opened = read_fmu(export(here, tmp_path / "measured.fmu"))
-    assert opened.model.spec.gears[1].topography == "wheel.csv" and opened.problems_of(there.spec) == []
-    assert [problem.field for problem in opened.problems_of(other.spec)] == ["files"]
+    assert opened.model.stage.written.gears[1].topography == "wheel.csv" and opened.problems_of(there.stage) == []
+    assert [problem.field for problem in opened.problems_of(other.stage)] == ["files"]
 
 
 def _measured(spec, folder: Path):
-    pinion, wheel = spec.gears
+    pinion, wheel = spec.written.gears
     wheel = wheel.model_copy(update={"topography": str(folder / "wheel.csv")})
-    return spec.model_copy(update={"gears": (pinion, wheel), "source": folder / "stage.toml"})
+    return rewritten(spec, gears=(pinion, wheel), source=folder / "stage.toml")
 
 
 def test_another_stage_is_told_by_its_fields(native: Path) -> None:
@@ -170,6 +171,6 @@ def test_validate_looks_at_the_stage(members, model, other_model, tmp_path: Path
 
 
 def test_files_that_cannot_be_read_are_named(model: StageModel, tmp_path: Path) -> None:
-    lost = StageModel(_measured(model.spec, tmp_path), model.blob, model.body_hashes)
+    lost = StageModel(_measured(model.stage, tmp_path), model.blob, model.body_hashes)
     with pytest.raises(SpecError, match="wheel.csv: cannot be read"):
         stage_file(lost)

@@ -64,7 +64,7 @@ def test_the_kernel_refuses_a_model_with_starts_that_cannot_be(reference: int, v
     model = small_model()
     bad = read_blob(model.with_starts({"level": 1.0}).blob) | {"start_reference": [reference], "start_value": [value]}
     with pytest.raises(ModelError, match="starts"):
-        StageModel(model.spec, write_blob(bad), ()).kernel()
+        StageModel(model.stage, write_blob(bad), ()).kernel()
 
 
 def test_without_terminals_there_is_no_such_file(model: StageModel, tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_windup_carries_the_torque_from_the_start(pinion: str, wheel: str) -> No
     for name, value in inputs.items():
         kernel.set(name, value)
     kernel.initialize(0.0)
-    force = 200.0 / model.spec.geometry.gears[0].r_b
+    force = 200.0 / model.stage.written.geometry.gears[0].r_b
     assert kernel.get("mesh.force") == pytest.approx(force, rel=0.05 if pinion == "spring" else 1e-3)
     assert set(inputs) <= {"pinion.phi", "pinion.w", "pinion.tau", "wheel.phi", "wheel.w", "wheel.tau"}
 

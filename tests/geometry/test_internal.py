@@ -13,7 +13,7 @@ from gearfmu.spec.forms.shapes import carrier_geometry, set_geometry
 from gearfmu.spec.stage import load_stage
 
 SPEC = load_stage("planetary54")
-SET = set_geometry(SPEC)
+SET = set_geometry(SPEC.written)
 RING = SET.ring_mesh.ring
 
 
@@ -99,7 +99,7 @@ def test_tips_collide_when_the_ring_has_few_teeth_more_than_the_planet():
 
 
 def test_carrier_volume_is_a_sum_of_cylinders():
-    g = carrier_geometry(SPEC)
+    g = carrier_geometry(SPEC.written)
     plate, bolt = math.pi * (60e-3**2 - 20e-3**2) * 12e-3, math.pi * 8e-3**2 * 22e-3
     assert g.volume == pytest.approx(plate + 4 * bolt)
     assert g.bolt_axis(1) == pytest.approx([0, 45e-3, 0], abs=1e-15)

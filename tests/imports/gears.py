@@ -10,16 +10,17 @@ from decks import write_deck
 
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.reading.library import find_stage
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 
 COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
           "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 8",
           "width_functions = 5": "width_functions = 3"}  # fmt: skip
 
 
-def stage(folder: Path, section: str = "") -> StageSpec:
+def stage(folder: Path, section: str = "") -> Stage:
     """fzg_c on a coarse mesh, with `section` as [gears.pinion.import]."""
     text = find_stage("fzg_c").read_text(encoding="utf-8")
     for old, new in COUNTS.items():
@@ -37,7 +38,7 @@ def stage(folder: Path, section: str = "") -> StageSpec:
 def pinion(whole: bool = True) -> FeMesh:
     """The coarse mesh of fzg_c's pinion, all teeth or one sector."""
     spec = load_stage("fzg_c")
-    geometry = gear_geometry(spec.gears[0], spec.pair)
+    geometry = gear_geometry(spec.gears[0], spec.written.pair)
     mesh = spec.gears[0].body.mesh.model_copy(update={"flank": 6, "thickness": 2, "root": 3, "rim": 2, "width": 2})
     sector = gear_sector(geometry, spec.gears[0].face_width, mesh)
     return sector.full() if whole else sector

@@ -23,12 +23,12 @@ from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.modes.planetary import mounted_ring_modes
+from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.spec.forms.members import member_of
-from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import carrier_of, member_of
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -39,7 +39,7 @@ CARRIER += f"bolts = {BOLTS}\n".replace("'", '"')
 PLANET = '[planet.import]\nfile = "planet.inp"\nlength = "1 mm"\nbore = "BORE"\n'
 
 
-def stage(folder: Path, section: str = "") -> PlanetarySpec:
+def stage(folder: Path, section: str = "") -> Stage:
     """planetary54 on coarse meshes, with import sections at its end."""
     text = find_stage("planetary54").read_text(encoding="utf-8")
     coarse = re.sub(r"(?m)^(\[(?:sun|planet|ring)\.body\.mesh\]|\[carrier\.mesh\])$", r"\1\nscale = 0.35", text)
@@ -52,7 +52,9 @@ def stage(folder: Path, section: str = "") -> PlanetarySpec:
 @lru_cache(maxsize=1)
 def carrier_parts() -> tuple[FeMesh, dict[str, np.ndarray]]:
     spec = load_stage("planetary54")
-    sector = carrier_sector(carrier_geometry(spec), spec.carrier.mesh.model_copy(update={"scale": 0.35}))
+    sector = carrier_sector(
+        carrier_geometry(spec.written), spec.written.carrier.mesh.model_copy(update={"scale": 0.35})
+    )
     mesh = sector.full()
     sets = {name: sector.sector_nodes(k)[sector.sets["bolt"]] for k, name in enumerate(BOLTS)}
     return mesh, sets | {"SHAFT": mesh.sets["bore"]}
@@ -72,10 +74,12 @@ def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready
     section = CARRIER
     if ready:
         mesh, _ = carrier_parts()
-        for name, matrix in zip("km", hex20.assemble(mesh.nodes, mesh.elements, own.carrier.material), strict=True):
+        for name, matrix in zip(
+            "km", hex20.assemble(mesh.nodes, mesh.elements, own.written.carrier.material), strict=True
+        ):
             sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
         section += 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
-    body, native = carrier_full_order(stage(tmp_path, section)), carrier_full_order(own)
+    body, native = carrier_full_order(carrier_of(stage(tmp_path, section))), carrier_full_order(carrier_of(own))
     assert [(i.name, i.kind) for i in body.interfaces] == [(i.name, i.kind) for i in native.interfaces]
     assert body.ground == native.ground and body.length == native.length
     for one, other in zip(body.interfaces, native.interfaces, strict=True):
@@ -89,7 +93,7 @@ def test_a_carrier_with_a_node_that_flies_away_is_refused(tmp_path: Path) -> Non
     """Matrices without the stiffness of the elements at one corner: rigid motion needs no force, and more than that."""
     carrier_deck(tmp_path)
     mesh, _ = carrier_parts()
-    material = stage(tmp_path / "own").carrier.material
+    material = stage(tmp_path / "own").written.carrier.material
     _, mass = hex20.assemble(mesh.nodes, mesh.elements, material)
     lone = mesh.elements[np.bincount(mesh.elements.ravel())[mesh.elements] == 1][0]
     solid = mesh.elements[~np.any(mesh.elements == lone, axis=1)]
@@ -163,7 +167,7 @@ def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
     own = stage(tmp_path / "own")
     ring_deck(tmp_path, body_sector(own, "ring"))
     spec = stage(tmp_path, RING)
-    body, native = imported_full_order(member_of(spec, "ring")), ring_full_order(own, 1.0)
+    body, native = imported_full_order(member_of(spec, "ring")), ring_full_order(member_of(own, "ring"), 1.0)
     assert body.rigid.size == 0 and body.ground == () and body.length == native.length
     assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
     for name in ("stiffness", "mass"):
@@ -208,7 +212,7 @@ def turned(angle: float) -> np.ndarray:
 def test_a_carrier_that_lies_elsewhere_is_refused(tmp_path: Path, nodes, message: str) -> None:
     carrier_deck(tmp_path, nodes())
     with pytest.raises(MeshError, match=message) as caught:
-        carrier_full_order(stage(tmp_path, CARRIER))
+        carrier_full_order(carrier_of(stage(tmp_path, CARRIER)))
     assert str(tmp_path / "carrier.inp") in str(caught.value) and "\n" not in str(caught.value)
 
 

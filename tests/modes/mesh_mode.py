@@ -30,7 +30,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     model = assemble(spec, bodies)
     result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
     stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
-    gears = spec.geometry.gears
+    gears = spec.written.geometry.gears
     path = own_path(model, torque)
     mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
     width = min(gear.face_width for gear in spec.gears)
@@ -43,7 +43,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
             flexible = (1 / stiffness - path / pairs) / (1 + 2 * spec.gears[0].modal_damping * s / omega)
             closing = 1 / (flexible + path / pairs / (1 + s * damping * width * path))
             matrix = closing * np.outer(CLOSING, CLOSING).astype(complex)
-            for i, (gear, body) in enumerate(zip(spec.gears, bodies, strict=True)):
+            for i, (gear, body) in enumerate(zip(spec.written.gears, bodies, strict=True)):
                 c = 2 * gear.bearing.damping_ratio * np.sqrt(gear.bearing.stiffness * body.mass)
                 matrix[2 * i, 2 * i] += gear.bearing.stiffness + s * c
             values, shapes = eig(matrix, np.diag(mass))

@@ -13,7 +13,7 @@ from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import ReducedBody
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.tables import excited_modes, resampling, symmetric_functions
 
 DRIVE, BORE = 0, (0, 1, 5)  # flank; directions of the bore: x, y and spin
@@ -31,9 +31,9 @@ class Contact:
     force: float
 
 
-def loaded_contacts(spec: StageSpec, kernel: Kernel, torque: float, position: float) -> list[Contact]:
+def loaded_contacts(spec: Stage, kernel: Kernel, torque: float, position: float) -> list[Contact]:
     """The slices that carry load at a position, wheel held, by the static contact routine."""
-    pair = spec.geometry
+    pair = spec.written.geometry
     pinion, wheel = pair.gears
     forces = kernel.transmission(-position * 2 * math.pi / wheel.z, torque).forces
     found = []
@@ -59,16 +59,16 @@ class Gear:
 
 
 def gear_at(
-    spec: StageSpec, bodies: Sequence[ReducedBody], index: int, position: float, contacts: Sequence[Contact]
+    spec: Stage, bodies: Sequence[ReducedBody], index: int, position: float, contacts: Sequence[Contact]
 ) -> Gear:
-    pair, body = spec.geometry, bodies[index]
+    pair, body = spec.written.geometry, bodies[index]
     shape, side = pair.gears[index], (1.0, -1.0)[index]
     degrees = symmetric_functions(min(b.width_functions for b in bodies))
     chosen = excited_modes(body, degrees)
     angle = (0.0, pair.wheel_phase)[index] + side * 2 * math.pi * position / shape.z
     direction = math.pi / 2 - pair.alpha_wt - angle  # of the line of action in the body's frame
     rigid = np.array([side * math.cos(direction), side * math.sin(direction), shape.r_b])
-    weights = slice_weights(spec.contact.slices, degrees)
+    weights = slice_weights(spec.written.contact.slices, degrees)
     places = [(c.teeth[index], resampling(body.roll, c.rolls[index], c.rolls[index], 1)[0]) for c in contacts]
     flank = [
         on_tooth(np.einsum("r,a,ran->n", place, weights[c.slice], body.flank_rows[DRIVE][:, degrees][..., chosen]),
@@ -154,7 +154,7 @@ class Parts:
         return np.sqrt(np.maximum(squared, 0)) / (2 * math.pi)
 
 
-def couple(spec: StageSpec, gears: Sequence[Gear], contacts: Sequence[Contact], held: bool = False) -> Parts:
+def couple(spec: Stage, gears: Sequence[Gear], contacts: Sequence[Contact], held: bool = False) -> Parts:
     """Both gears with their contacts, bearings (rigid when held) and ports, which are springs."""
     first, second = gears
     c = len(contacts)
@@ -164,7 +164,7 @@ def couple(spec: StageSpec, gears: Sequence[Gear], contacts: Sequence[Contact], 
     fold[:c, :c] = fold[:c, c + 3 : 2 * c + 3] = np.eye(c)
     fold[c : c + 3, c : c + 3] = fold[c + 3 :, 2 * c + 3 :] = np.eye(3)
     springs = []
-    for gear in spec.gears:
+    for gear in spec.written.gears:
         k = spec.ports[gear.name].k
         assert k is not None and spec.ports[gear.name].chain is None
         springs += [*[0.0 if held else 1 / gear.bearing.stiffness] * 2, 1 / k]
@@ -177,11 +177,14 @@ def couple(spec: StageSpec, gears: Sequence[Gear], contacts: Sequence[Contact], 
     )
 
 
-def tangents(spec: StageSpec, contacts: Sequence[Contact]) -> np.ndarray:
+def tangents(spec: Stage, contacts: Sequence[Contact]) -> np.ndarray:
     """δ′ (m/N) of the local law of each contact at its force, both bodies (docs/theory.md eqs. 7 and 8)."""
     yields = [2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in spec.gears]
     strips = [math.log(4 * g.body.strip_half_width) - 1 for g in spec.gears]
-    constant, length = float(np.dot(yields, strips)), min(g.face_width for g in spec.gears) / spec.contact.slices
+    constant, length = (
+        float(np.dot(yields, strips)),
+        min(g.face_width for g in spec.gears) / spec.written.contact.slices,
+    )
     result = []
     for contact in contacts:
         radius = 1 / (1 / contact.rolls[0] + 1 / contact.rolls[1])

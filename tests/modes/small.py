@@ -22,13 +22,13 @@ def pinion() -> tuple[FeMesh, Material]:
     spec = load_stage("fzg_c")
     gear = spec.gears[0]
     counts = gear.body.mesh.model_copy(update={"scale": 0.25})
-    return gear_sector(gear_geometry(gear, spec.pair), gear.face_width, counts), gear.material
+    return gear_sector(gear_geometry(gear, spec.written.pair), gear.face_width, counts), gear.material
 
 
 def set_body(name: str, scale: float) -> tuple[FeMesh, Material]:
     """One sector of a body of planetary54."""
     spec = load_stage("planetary54")
-    return body_sector(spec, name, scale), getattr(spec, name).material
+    return body_sector(spec, name, scale), getattr(spec.written, name).material
 
 
 @lru_cache

@@ -66,7 +66,7 @@ def frequencies_from_sections(spec, sections, contacts, number):
     """Natural frequencies (Hz) with contacts closed, from the blob alone; the local law's flexibility `own` beside
     it."""
     s = sections
-    weights = slice_weights(spec.contact.slices, s["degrees"])
+    weights = slice_weights(spec.written.contact.slices, s["degrees"])
     a = math.hypot(s["engagement"][0, 2] - s["engagement"][0, 0], s["engagement"][0, 3] - s["engagement"][0, 1])
     t = -math.acos((s["gear0"][0] + s["gear1"][0]) / a)
     normal = np.array([-math.sin(t), math.cos(t)])
@@ -101,7 +101,7 @@ def frequencies_from_sections(spec, sections, contacts, number):
 def test_frequencies_in_loaded_contact_are_those_of_the_parts(held):
     spec = load_stage("fzg_c")
     bodies = load_bodies(spec)
-    grids = [np.linspace(shape.s_form, shape.s_tip, ROLLS) for shape in spec.geometry.gears]
+    grids = [np.linspace(shape.s_form, shape.s_tip, ROLLS) for shape in spec.written.geometry.gears]
     contacts = [
         Contact(teeth, k, (grids[0][rolls[0]], grids[1][rolls[1]]), 1200.0) for teeth, rolls in PLACES for k in range(5)
     ]

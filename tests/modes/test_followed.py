@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearfmu.modes.followed import followed
+from gearfmu.modes.linear import followed
 
 
 @pytest.mark.parametrize("seed", range(5))

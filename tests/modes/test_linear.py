@@ -19,6 +19,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
 from gearfmu.modes.linear import Linearised, full_kernel, linearised, shaft_rows, stage_modes
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
@@ -61,7 +62,7 @@ def stages(fzg: Stage) -> dict[str, Stage]:
 
 def with_ports(stage: Stage, **ports: dict) -> StageModel:
     changed = {name: port.model_copy(update=ports.get(name, {})) for name, port in stage.spec.ports.items()}
-    return assemble(stage.spec.model_copy(update={"ports": changed}), stage.bodies)
+    return assemble(rewritten(stage.spec, ports=changed), stage.bodies)
 
 
 # ---- by hand --------------------------------------------------------------------------------------------------------
@@ -330,9 +331,9 @@ def stiffer(fzg: Stage, group: int, factor: float) -> StageModel:
         return with_ports(fzg, **{name: {"k": factor * port.k} for name, port in fzg.spec.ports.items()})
     gears = tuple(
         g.model_copy(update={"bearing": g.bearing.model_copy(update={"stiffness": factor * g.bearing.stiffness})})
-        for g in fzg.spec.gears
+        for g in fzg.spec.written.gears
     )
-    return assemble(fzg.spec.model_copy(update={"gears": gears}), fzg.bodies)
+    return assemble(rewritten(fzg.spec, gears=gears), fzg.bodies)
 
 
 @pytest.mark.parametrize("group", [1, 2])

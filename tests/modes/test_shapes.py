@@ -12,13 +12,14 @@ from small import COUNT, frequencies, pinion, pinion_modes, set_body
 from gearfmu.errors import BodyError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.modes.gear import as_stored
 from gearfmu.modes.harmonics import MOST, harmonic_shares
-from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes
 from gearfmu.modes.shapes import energy_shares
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.stage import load_stage
 
 
@@ -113,7 +114,9 @@ def test_a_ring_by_sectors_and_as_a_whole() -> None:
     """Two methods: 54 sectors, and all teeth at once without symmetry."""
     mesh, material = set_body("ring", 0.2)
     sectors = cyclic_modes("ring", mesh, material, 8)
-    whole = whole_modes(ring_full_order(load_stage("planetary54"), 0.2, mounted=False), mesh.full(), {}, material, 8)
+    whole = whole_modes(
+        ring_full_order(member_of(load_stage("planetary54"), "ring"), 0.2, mounted=False), mesh.full(), {}, material, 8
+    )
     assert np.allclose(frequencies(sectors)[:8], frequencies(whole)[:8], rtol=1e-7)
     assert [m.nodal_diameter for m in whole.modes] == [m.nodal_diameter for m in sectors.modes]
     assert [m.parity for m in whole.modes] == [m.parity for m in sectors.modes]
@@ -124,8 +127,8 @@ def test_a_ring_by_sectors_and_as_a_whole() -> None:
 def test_springs_at_the_rim_hold_the_ring() -> None:
     """Soft mounts: six modes of the rigid ring below its elastic ones, √(Σk/m) in each direction."""
     spec = load_stage("planetary54")
-    soft = spec.ring.mounts.model_copy(update={"stiffness": 1e4})
-    spec = spec.model_copy(update={"ring": spec.ring.model_copy(update={"mounts": soft})})
+    soft = spec.written.ring.mounts.model_copy(update={"stiffness": 1e4})
+    spec = rewritten(spec, ring=spec.written.ring.model_copy(update={"mounts": soft}))
     found = mounted_ring_modes(spec, 7, scale=0.2)
     mesh, material = set_body("ring", 0.2)
     mass = mesh.teeth * hex20.assemble(mesh.nodes, mesh.elements, material)[1][::3, ::3].sum()
@@ -137,7 +140,7 @@ def test_springs_at_the_rim_hold_the_ring() -> None:
 
 def test_the_ring_without_mounts_has_no_mounted_modes() -> None:
     spec = load_stage("planetary54")
-    spec = spec.model_copy(update={"ring": spec.ring.model_copy(update={"mounts": None})})
+    spec = rewritten(spec, ring=spec.written.ring.model_copy(update={"mounts": None}))
     with pytest.raises(BodyError, match="the ring has no mounts"):
         mounted_ring_modes(spec, 7)
 
@@ -145,17 +148,17 @@ def test_the_ring_without_mounts_has_no_mounted_modes() -> None:
 def test_rigid_couplings_of_the_carrier() -> None:
     """Its bolts and its bore move as rigid bodies, which makes it stiffer than the bare carrier, not softer."""
     spec = load_stage("planetary54")
-    found = set_body_modes(spec, "carrier", 6, scale=0.4)
+    found = body_modes(spec, "carrier", 6, scale=0.4)
     mesh, material = set_body("carrier", 0.4)
     assert np.all(frequencies(found)[:6] > frequencies(cyclic_modes("carrier", mesh, material, 6))[:6])
-    assert all(mode.damping_ratio == spec.carrier.modal_damping for mode in found.modes)
+    assert all(mode.damping_ratio == spec.written.carrier.modal_damping for mode in found.modes)
     radius = np.hypot(found.points[:, 0], found.points[:, 1])
-    bore = found.points[np.abs(radius - spec.carrier.bore_diameter / 2) < 1e-9]
+    bore = found.points[np.abs(radius - spec.written.carrier.bore_diameter / 2) < 1e-9]
     fields = np.zeros((len(bore), 3, 6))
     fields[:, [0, 1, 2], [0, 1, 2]] = 1.0
     fields[..., 3:] = -np.cross(bore[:, None, :], np.eye(3)[None], axis=-1).transpose(0, 2, 1)
     for mode in found.modes:
-        shape = mode.shape[0][np.abs(radius - spec.carrier.bore_diameter / 2) < 1e-9].ravel()
+        shape = mode.shape[0][np.abs(radius - spec.written.carrier.bore_diameter / 2) < 1e-9].ravel()
         fit, *_ = np.linalg.lstsq(fields.reshape(-1, 6), shape, rcond=None)
         assert np.allclose(fields.reshape(-1, 6) @ fit, shape, atol=1e-9 * np.abs(mode.shape).max())
 

@@ -21,8 +21,10 @@ from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import member_of
-from gearfmu.spec.forms.planetary import MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.spec.forms.planetary import MountsSpec, RingSpec
 from gearfmu.spec.forms.shapes import ring_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
@@ -35,16 +37,16 @@ def ring_spec(modes: int = 81, mounts: MountsSpec | None = MOUNTS) -> RingSpec:
     body = BodySpec(strip_half_width=5e-4, modes=modes, roll_points=4, width_functions=3, mesh=COARSE)
     return RingSpec(
         teeth=24, tip_diameter=57.6e-3, rim_diameter=76e-3, face_width=8e-3, mounts=mounts, body=body,
-        material=load_stage("planetary54").ring.material,
+        material=load_stage("planetary54").written.ring.material,
     )  # fmt: skip
 
 
-def set_spec(**changes) -> PlanetarySpec:
+def set_spec(**changes) -> Stage:
     """planetary54 with the small ring, for builders that take a whole set."""
-    return load_stage("planetary54").model_copy(update={"ring": ring_spec(**changes)})
+    return rewritten(load_stage("planetary54"), ring=ring_spec(**changes))
 
 
-GEOMETRY = ring_geometry(ring_spec(), load_stage("planetary54").set)
+GEOMETRY = ring_geometry(ring_spec(), load_stage("planetary54").written.set)
 STEEL = ring_spec().material
 
 

@@ -17,9 +17,9 @@ from gearfmu.spec.tables.gear import MeshSpec
 
 FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
 CASES = {
-    "pinion": (FZG.gears[0], FZG.pair, gear_geometry, 20),
-    "sun": (SET.sun, SET.set, gear_geometry, 12),
-    "ring": (SET.ring, SET.set, ring_geometry, 12),
+    "pinion": (FZG.gears[0], FZG.written.pair, gear_geometry, 20),
+    "sun": (SET.written.sun, SET.written.set, gear_geometry, 12),
+    "ring": (SET.written.ring, SET.written.set, ring_geometry, 12),
 }
 
 

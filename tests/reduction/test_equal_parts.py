@@ -10,6 +10,7 @@ import pytest
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.spec.forms.members import carrier_of
 from gearfmu.spec.stage import load_stage
 
 SCALE = 0.3
@@ -19,8 +20,8 @@ SOFT = {name: "averaging" for name in ("bolt0", "bolt1", "bolt2", "bolt3", "bore
 
 def carrier(stage: str, coupling: dict[str, str]) -> FullOrder:
     spec = load_stage(stage)
-    coupled = spec.carrier.model_copy(update={"coupling": coupling or spec.carrier.coupling})
-    return carrier_full_order(spec.model_copy(update={"carrier": coupled}), SCALE)
+    coupled = spec.written.carrier.model_copy(update={"coupling": coupling or spec.written.carrier.coupling})
+    return carrier_full_order(replace(carrier_of(spec), part=coupled), SCALE)
 
 
 @pytest.fixture(params=[("planetary54", {}), ("helical_set", {}), ("planetary54", SOFT)], scope="module")

@@ -37,16 +37,16 @@ def test_rows_of_contact_points_are_derivatives_of_their_gaps(modules: SimpleNam
     """Rigid motion of either gear by 0.1 µm and 0.1 µm/r_b: the gaps' closed form moves as the rows say. Faces of a
     coarse mesh follow the involute to some 1e-3 of the normal's arm."""
     spec = load_stage("planetary54")
-    geometry = set_geometry(spec)
+    geometry = set_geometry(spec.written)
     sun = modules.scenes.placed_gear(
-        spec.sun,
+        spec.written.sun,
         geometry.sun_mesh.gears[0],
         np.zeros(2),
-        0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth,
+        0.0 if spec.written.planet.teeth % 2 else np.pi / spec.written.sun.teeth,
         0.17,
     )
     planet = modules.scenes.placed_gear(
-        spec.planet, geometry.sun_mesh.gears[1], np.array([spec.set.center_distance, 0.0]), 0.0, 0.17
+        spec.written.planet, geometry.sun_mesh.gears[1], np.array([spec.written.set.center_distance, 0.0]), 0.0, 0.17
     )
     grid = modules.contact_points.Grid(along=21, across=3, reach=0.2e-3)
     before = modules.contact_points.contact_points(planet, sun, grid, {1: 0.0, -1: 0.0})
@@ -68,7 +68,7 @@ def test_backlash_is_shared_by_both_flanks(modules: SimpleNamespace) -> None:
     """The hammering scene begins in the middle: the smallest gaps of both flanks are half of j_wt cos α_wt."""
     scene = modules.scenes.hammering(modules.scenes.Meshes(0.35, 0.17))
     spec = load_stage("planetary54")
-    mesh = set_geometry(spec).sun_mesh
+    mesh = set_geometry(spec.written).sun_mesh
     for side in (1, -1):
         least = scene.points.gap[scene.points.side == side].min()
         assert least == pytest.approx(mesh.normal_backlash / 2, rel=2e-3)

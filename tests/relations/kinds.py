@@ -17,9 +17,8 @@ import numpy as np
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import Stage, SupportSpec, ToothedBody
-from gearfmu.spec.forms.members import body_names, members
+from gearfmu.spec.forms.members import members
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
@@ -173,7 +172,13 @@ def loaded(kind: Kind) -> Inputs:
 
 def assembled(stage: Stage, bodies: Mapping[str, Any]) -> StageModel:
     """The model of a stage whose bodies are found by name, in whatever order the stage has them."""
-    return assemble(stage, [bodies[name] for name in body_names(stage)])
+    return assemble(stage, listed(stage, bodies))
+
+
+def listed(stage: Stage, bodies: Mapping[str, Any]) -> list[Any]:
+    """Bodies found by name as `assemble` takes them, one for every file."""
+    own = {stage.file_of(name): body for name, body in bodies.items()}
+    return [own[name] for name in stage.files]
 
 
 def level_number(model: StageModel, level: str) -> int:
@@ -215,7 +220,7 @@ def _stage(file: str) -> Stage:
         ports = {name: port.model_copy(update=spring) for name, port in spec.ports.items()}
         rotors = {name: rotor.model_copy(update={"stands": False}) for name, rotor in spec.rotors.items()}
         return spec.model_copy(update={"bodies": coarse, "ports": ports, "rotors": rotors})
-    return as_general(load_stage(file))
+    return load_stage(file)
 
 
 @cache
@@ -224,7 +229,7 @@ def bodies_of(file: str) -> dict[str, Any]:
     if file == "internal":
         return {name: reduced_gear(member, "0" * 64) for name, member in members(_stage(file)).items()}
     spec = load_stage(file)
-    return spread(spec, load_bodies(spec))
+    return spec.by_name(load_bodies(spec))
 
 
 @cache

@@ -13,10 +13,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number, loaded
+from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
 
 from gearfmu.spec.forms.general import CarrierBody
-from gearfmu.spec.forms.members import body_names
 from gearfmu.stage import assemble
 from gearfmu.stage.build.free import free_carrier
 from gearfmu.stage.build.groups import Layout
@@ -175,7 +174,7 @@ def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | 
     kind, step = KINDS[name], 0.5 * STEP
     stage, bodies = kind.stage, bodies_of(kind.file)
     gears = [gear.name for gear in stage.gears]
-    observed = assemble(stage, [bodies[name] for name in body_names(stage)], observe=gears).driven_by_springs()
+    observed = assemble(stage, listed(stage, bodies), observe=gears).driven_by_springs()
     set_up = {"level": float(level_number(observed, "full")), "h": step}
     on = {f"effect.{effect}": 1.0} if effect else {}
     out = channels(simulate(observed, loaded(kind), 150 * step, step, set_up | on))

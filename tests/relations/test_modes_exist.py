@@ -11,12 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from kinds import KINDS, Kind, bodies_of, drawn
+from kinds import KINDS, Kind, bodies_of, drawn, listed
 
 from gearfmu.kernel import Kernel
 from gearfmu.modes import linear
 from gearfmu.report.campbell import LOUD, crossings, mesh_families
-from gearfmu.spec.forms.members import body_names
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.limits import engagements_per_turn
 
@@ -37,7 +36,7 @@ def one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def modes_of(kind: Kind, model: StageModel, positions: int) -> linear.StageModes:
-    bodies = [bodies_of(kind.file)[name] for name in body_names(kind.stage)]
+    bodies = listed(kind.stage, bodies_of(kind.file))
     return linear.stage_modes(model, bodies, kind.torque, COUNT, positions)
 
 

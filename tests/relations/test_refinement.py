@@ -226,7 +226,7 @@ def test_level_full_is_not_worse_than_standard_under_a_brake() -> None:
     """A set under a brake whose torque follows sampled speeds. Sees: oscillators that the step does not follow, dynamic
     at level full, ring with such a brake (.99 % of the transmission error where standard has .46)."""
     scene, spec = window(load_scene("planetary_paper")), load_stage("planetary54")
-    model = models_for(scene, load_bodies(spec), set=spec.set, carrier=spec.carrier)
+    model = models_for(scene, load_bodies(spec), set=spec.written.set, carrier=spec.written.carrier)
 
     def run(level: str, h: float) -> Any:
         return measure(scene, model, Point(level, h=h, slices=scene.stage.slices)).signals

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, bodies_of, drawn
+from kinds import KINDS, Kind, bodies_of, drawn, listed
 from said import Said
 
 from gearfmu import report
-from gearfmu.spec.forms.members import body_names
 from gearfmu.stage.run.trace import Trace
 
 SLOW = [pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train", "helical_set")]
@@ -38,7 +37,7 @@ def run(kind: Kind, length: float, scale: float) -> Trace:
 
 def said(name: str, folder: Path, scale: float = 1.0, with_bodies: bool = False) -> Said:
     kind, trace = KINDS[name] if name in KINDS else drawn(int(name)), trace_of(name, scale)
-    bodies = [bodies_of(kind.file)[body] for body in body_names(kind.stage)] if with_bodies else None
+    bodies = listed(kind.stage, bodies_of(kind.file)) if with_bodies else None
     trace.save(folder / "trace.h5")
     report.write(trace, dict(trace.meta), folder, kind.stage, bodies)
     return Said(folder)

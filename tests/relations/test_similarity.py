@@ -25,9 +25,8 @@ from kinds import KINDS, Drawn, Kind, assembled, channels, differences, drawn
 
 from gearfmu.body import reduce_body
 from gearfmu.body.beam import BeamBody
-from gearfmu.spec.forms.expand import as_general, spread
+from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.general import ToothedBody
-from gearfmu.spec.forms.members import body_names
 from gearfmu.spec.forms.planetary import CarrierMeshSpec, CarrierSpec
 from gearfmu.spec.reading.base import Quantity, Spec
 from gearfmu.spec.stage import load_stage
@@ -90,7 +89,7 @@ def _scaled(value: Any, c: float, powers: set[int], place: str) -> Any:
 def file_of(name: str) -> Any:
     """The stage of a kind as its file is written, with coarse bodies."""
     kind = KINDS[name]
-    return coarse(kind.stage if kind.file == "internal" else load_stage(kind.file))
+    return coarse(kind.stage if kind.file == "internal" else load_stage(kind.file).written)
 
 
 def coarse(value: Any) -> Any:
@@ -110,8 +109,8 @@ def coarse(value: Any) -> Any:
 @cache
 def bodies_at(name: str, c: float) -> dict[str, Any]:
     """Bodies of a kind, scaled and reduced anew, by the names of its general form."""
-    spec = scaled(file_of(name), c)
-    return spread(spec, [reduce_body(spec, body) for body in body_names(spec)])
+    spec = expand(scaled(file_of(name), c))
+    return spec.by_name([reduce_body(spec, body) for body in spec.files])
 
 
 @cache
@@ -119,7 +118,7 @@ def model_at(kind: Kind, c: float) -> StageModel:
     """The scaled stage of a kind; of a drawn one with pitch errors instead of a class of tolerances."""
     name = kind.name.split("-")[0]
     if not isinstance(kind, Drawn):
-        return assembled(as_general(scaled(file_of(name), c)), bodies_at(name, c))
+        return assembled(expand(scaled(file_of(name), c)), bodies_at(name, c))
     errors = {"deviations": None, "index_deviation": {0: 4e-6, 1: -3e-6, 2: 6e-6}}
     teeth = {n: b.model_copy(update=errors) if isinstance(b, ToothedBody) else b for n, b in kind.stage.bodies.items()}
     return assembled(scaled(kind.stage.model_copy(update={"bodies": teeth}), c), bodies_at(name, c))

@@ -19,7 +19,6 @@ from typing import Any
 import pytest
 from kinds import COARSE, KINDS, ROOT, assembled, bodies_of
 
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.reading.layers import read_layers
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -111,7 +110,7 @@ def office(text: str) -> bytes:
 
 def is_same(one: Any, other: Any) -> bool:
     """Whether two stages have equal fields, floats to the last bit, and equal orders where the model has one."""
-    stages = [as_general(spec) for spec in (one, other)]
+    stages = [spec for spec in (one, other)]
     orders = [[list(getattr(stage, name)) for name in ORDERED["general"]] for stage in stages]
     return one == other and stages[0] == stages[1] and orders[0] == orders[1]
 
@@ -120,7 +119,7 @@ def model_hash(kind: str, spec: Any) -> str:
     """Hash of the assembled model, with the bodies that all relations share."""
     if kind == "internal":
         return assembled(with_coarse_bodies(spec), bodies_of(KINDS[kind].file)).hash
-    return assembled(as_general(spec), bodies_of(KINDS[kind].file)).hash
+    return assembled(spec, bodies_of(KINDS[kind].file)).hash
 
 
 def with_coarse_bodies(spec: Any) -> Any:

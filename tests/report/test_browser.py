@@ -16,7 +16,6 @@ from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.femesh.mesh import rotated
 from gearfmu.report.moving import _unit_loads, moving_view
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.observed import gear_bodies
 from gearfmu.stage.run.trace import Trace
@@ -104,7 +103,7 @@ def displaced(body: Any, loads: list[tuple[int, float, float]]) -> np.ndarray:
 def test_the_turning_view_moves_by_the_displacement_under_its_loads(opened: Browser, trace: Trace) -> None:
     """The script's sum of unit loads is the one that Python makes, within the steps in which they are stored."""
     spec = load_stage("fzg_c/stage_relief")
-    stage, bodies = as_general(spec), gear_bodies(spec, load_bodies(spec))
+    stage, bodies = spec, gear_bodies(spec, load_bodies(spec))
     start, end = opened.value("gearfmuPage.stage.run(false), gearfmuPage.stage.state.at = 40, gearfmuPage.stage.span")
     view = moving_view(trace, stage, bodies, (start, end))
     assert view is not None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu.report.flanks import write_flanks
-from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import ProfileSpec
@@ -19,15 +19,15 @@ from gearfmu.stage.build.flanks import FlankField
 def test_only_flanks_that_are_not_nominal_are_drawn(tmp_path: Path) -> None:
     for name, drawn in (("fzg_c", False), ("fzg_c/stage_relief", True)):
         path = tmp_path / f"{drawn}.png"
-        assert write_flanks(expand_pair(load_stage(name)), path) is drawn and path.exists() is drawn
+        assert write_flanks(load_stage(name), path) is drawn and path.exists() is drawn
 
 
 def test_what_is_drawn_is_everything_that_is_said() -> None:
     """Tip relief of 15 µm to the tip circle, profile slope 4 µm and lead crowning 5 µm at the corners of a flank."""
     spec = load_stage("fzg_c/stage_relief")
     more = {"profile": ProfileSpec(slope=4e-6), "lead": LeadSpec(crowning=5e-6)}
-    pinion = spec.gears[0].model_copy(update=more)
-    stage = expand_pair(spec.model_copy(update={"gears": (pinion, spec.gears[1])}))
+    pinion = spec.written.gears[0].model_copy(update=more)
+    stage = rewritten(spec, gears=(pinion, spec.written.gears[1]))
     gear = stage.gears[0]
     field = FlankField(gear, shape := gear_shape(gear))
     material = field.whole(np.array([-0.5, 0.0, 0.5]) * gear.face_width)

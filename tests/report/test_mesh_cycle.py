@@ -23,7 +23,6 @@ from gearfmu.report.mesh_cycle import (
 )
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.signals import SETTLED, Window, window_of_interest
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
@@ -112,7 +111,7 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     te = np.interp(np.mod(pitches, 1.0), np.append(table.position, 1.0), np.append(table.te[0], table.te[0, 0]))
     names = {"mesh.te": te, "wheel.gear.phi": -pitches * 2 * np.pi / pair.gears[1].z}
     trace = steady(np.full(time.size, TORQUE / pair.gears[0].r_b), time, **names)
-    window, stage = window_of_interest(trace), as_general(spec)
+    window, stage = window_of_interest(trace), spec
     loads, missing = static_loads(trace, window, ["mesh"], spec, bodies)
     assert missing == []
     plot = transmission_error(trace, window, stage, ["mesh"], loads)

@@ -15,7 +15,6 @@ from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.observed import gear_bodies
@@ -45,7 +44,7 @@ def turning_pair(sign: float = 1.0) -> tuple[Trace, Any, dict[str, Any]]:
         "pinion.gear.phi": Channel(angle, "rad"),
         "wheel.gear.phi": Channel(-angle * 16 / 24, "rad"),
     }
-    return Trace(TIME, channels, {}), as_general(spec), gear_bodies(spec, load_bodies(spec))
+    return Trace(TIME, channels, {}), spec, gear_bodies(spec, load_bodies(spec))
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +114,7 @@ def test_the_page_gets_one_sector_and_small_numbers(view: View) -> None:
 def test_planets_stand_between_sun_and_ring() -> None:
     """In a set at rest under a load every mesh has its contacts, and the points of both gears are one."""
     spec = load_stage("planetary54")
-    stage, bodies = as_general(spec), gear_bodies(spec, load_bodies(spec))
+    stage, bodies = spec, gear_bodies(spec, load_bodies(spec))
     carrier = 85.0 * TIME
     channels = {"carrier.gear.phi": Channel(carrier, "rad"), "sun.gear.phi": Channel(4 * carrier, "rad")}
     for k in range(1, 5):
@@ -142,14 +141,14 @@ def test_planets_stand_between_sun_and_ring() -> None:
 
 def test_shafts_and_carriers_of_the_stage_are_drawn_with_its_measures() -> None:
     """A shaft of its cylinders' radii; a carrier's bolts on the axes of its planets, all round its own axis."""
-    train = as_general(load_stage("two_stage"))
+    train = load_stage("two_stage")
     shafts = {name: (rotor, profile) for name, rotor, profile, _, _ in parts(train)}
     assert set(shafts) == {"input_shaft", "intermediate_shaft", "output_shaft"}
     rotor, profile = shafts["input_shaft"]
     body = train.bodies["input_shaft"]
     assert rotor == "input" and max(z for _, z in profile) == pytest.approx(body.length)
     assert max(radius for radius, _ in profile) == max(0.5 * s.outer_diameter for s in body.sections)
-    planets = as_general(load_stage("planetary54"))
+    planets = load_stage("planetary54")
     found = {name: axis for name, rotor, _, axis, _ in parts(planets) if rotor == "carrier"}
     bolts = [axis for name, axis in found.items() if "bolt" in name]
     assert len(found) == 5 and [math.hypot(*axis) for axis in bolts] == pytest.approx([0.045] * 4)
@@ -166,7 +165,7 @@ def test_a_pair_without_shafts_has_its_gears_alone(view: View) -> None:
 @pytest.mark.parametrize("phi", np.linspace(0, 2 * math.pi / 16, 7))
 def test_teeth_touch_where_both_flanks_are(sg: int, phi: float) -> None:
     """The flank points of both gears at the rolls found coincide in space, to rounding."""
-    pair = load_stage("fzg_c/stage_relief").geometry
+    pair = load_stage("fzg_c/stage_relief").written.geometry
     angles = meshing_angles(pair, phi, sg)
     contacts = contacts_at(pair, angles, sg)
     assert 1 <= len(contacts) <= 2

@@ -17,7 +17,6 @@ from gearfmu.report.metrics import Spectrum, band_rms
 from gearfmu.report.plots_set import LEAST_SPAN, planet_set, planets, shares, sharing
 from gearfmu.report.run import Run
 from gearfmu.report.signals import Window, known_meshings
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace
 
@@ -180,7 +179,7 @@ def test_phasing_of_planets_by_hand(teeth: int, places: tuple[float, ...], words
 
 @pytest.mark.parametrize(("file", "words"), [("planetary54", "counter-phased"), ("helical_set", "sequentially phased")])
 def test_phasing_is_a_key_number_of_a_set(file: str, words: str) -> None:
-    stage = as_general(load_stage(file))
+    stage = load_stage(file)
     planets = [name for name in stage.rotors if name.startswith("planet")]
     found = planet_phases(stage, planets, ["sun", "ring"])
     assert {phasing(own) for own in found.values()} == {words}

@@ -8,16 +8,18 @@ from typing import Any
 import pytest
 
 from gearfmu.spec.forms.body import body_hash, body_inputs
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import expand
+from gearfmu.spec.forms.pair import StageSpec
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, RootRelief, Wobble
 from gearfmu.spec.tables.gear import BodySpec
 from gearfmu.spec.tables.lead import EndRelief, LeadSpec, Misalignment
 
-STAGE = load_stage("fzg_c")
+STAGE = load_stage("fzg_c").written
 
 
 def with_field(field: str, value: Any, stage: StageSpec = STAGE) -> StageSpec:
-    """The stage with one field replaced ("gears.0.teeth")."""
+    """The file's tables with one field replaced ("gears.0.teeth")."""
     parts: list[Any] = [int(part) if part.isdigit() else part for part in field.split(".")]
 
     def put(owner: Any, rest: list[Any]) -> Any:
@@ -34,8 +36,10 @@ def with_field(field: str, value: Any, stage: StageSpec = STAGE) -> StageSpec:
     return put(stage, parts)
 
 
-def fingerprint(stage: StageSpec, index: int = 0) -> str:
-    return body_hash(body_inputs(stage, stage.gears[index].name))
+def fingerprint(form: StageSpec, index: int = 0) -> str:
+    names = [gear.name for gear in form.gears]
+    ports = dict(zip(names, form.ports.values(), strict=True))
+    return body_hash(body_inputs(expand(form.model_copy(update={"ports": ports})), names[index]))
 
 
 SHAPING = [
@@ -110,12 +114,12 @@ def test_every_field_of_a_gear_is_in_one_of_the_two_lists() -> None:
 def test_the_hand_of_a_gear_is_part_of_its_body() -> None:
     """Pinion and wheel of one pair are of opposite hand, and turning the pair's hand round changes both bodies."""
     right, left = with_field("pair.helix_angle", 0.2), with_field("pair.helix_angle", -0.2)
-    assert [body_inputs(right, gear.name)["helix_angle"] for gear in right.gears] == [0.2, -0.2]
+    assert [body_inputs(expand(right), gear.name)["helix_angle"] for gear in right.gears] == [0.2, -0.2]
     assert all(fingerprint(right, k) != fingerprint(left, k) for k in (0, 1))
 
 
 def test_tip_relief_shares_the_bodies() -> None:
-    relieved = load_stage("fzg_c/stage_relief")
+    relieved = load_stage("fzg_c/stage_relief").written
     assert [fingerprint(relieved, k) for k in (0, 1)] == [fingerprint(STAGE, k) for k in (0, 1)]
     assert fingerprint(STAGE, 0) != fingerprint(STAGE, 1)
 
@@ -127,7 +131,7 @@ def test_default_counts_are_those_of_the_shipped_bodies() -> None:
 
 
 def test_hash_is_of_the_values_not_of_their_spelling() -> None:
-    inputs = body_inputs(STAGE, "pinion")
+    inputs = body_inputs(expand(STAGE), "pinion")
     assert body_hash(json.loads(json.dumps(inputs))) == body_hash(dict(reversed(inputs.items())))
     assert body_hash(inputs | {"profile_shift": -0.0}) == body_hash(inputs | {"profile_shift": 0.0})
     assert body_hash({"a": 0.1}) == "9e3d5635fc1c09ff15c19f1089a0bfe03fbd8329cca722f9a2227060ac77dcaa"  # {"a":0.1}

@@ -25,7 +25,7 @@ def test_a_changed_stage_is_the_one_of_a_changed_file(tmp_path: Path) -> None:
     train = load_stage("two_stage", {"bodies.pinion1.face_width": 0.021, "slices": 4.0})  # a count of a range
     assert train.bodies["pinion1"].face_width == 0.021 and train.slices == 4
     moved = load_stage("planetary54", {"set.pin_errors.0": ["0 um", 12e-6]})
-    assert moved.set.pin_errors == {0: (0.0, 12e-6)}
+    assert moved.written.set.pin_errors == {0: (0.0, 12e-6)}
     assert load_stage("fzg_c").gears != written.gears  # the file stays
     assert load_stage("fzg_c/stage_relief", {"gears.pinion.tip_relief": None}).gears[0].tip_relief is None
 

@@ -36,5 +36,7 @@ def test_the_sister_follows_its_stage_and_lies_where_it_is_wanted(tmp_path: Path
     elsewhere = coarse_stage(path, tmp_path / "other" / "place")
     for made in (coarse_stage(path), elsewhere):
         spec = load_stage(made)
-        assert spec.gears[0].body.mesh.scale == pytest.approx(0.6) and spec.pair.backlash == pytest.approx(1.2e-4)
+        assert spec.gears[0].body.mesh.scale == pytest.approx(0.6) and spec.written.pair.backlash == pytest.approx(
+            1.2e-4
+        )
     assert elsewhere == tmp_path / "other" / "place" / "stage.toml"

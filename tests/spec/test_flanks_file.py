@@ -14,7 +14,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.topography import read_topography
 
 BASE = f'base = "{find_stage("fzg_c").as_posix()}"\nname = "other"\n'
-PINION = load_stage("fzg_c").geometry.gears[0]
+PINION = load_stage("fzg_c").written.geometry.gears[0]
 
 
 def stage_file(folder: Path, text: str) -> Path:
@@ -32,7 +32,7 @@ def problems_of(path: Path) -> list[str]:
 def test_points_of_single_contact_become_rolls(tmp_path: Path) -> None:
     text = '[gears.wheel.root_relief]\namount = "10 um"\nkind = "linear"\n'
     spec = load_stage(stage_file(tmp_path, text))
-    pair = spec.geometry
+    pair = spec.written.geometry
     assert spec.gears[1].root_relief.start_roll == pair.inner_single_contact(1) > pair.gears[1].s_form
 
 

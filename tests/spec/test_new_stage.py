@@ -60,7 +60,7 @@ def test_an_optional_table_within_another_has_its_heading(tmp_path: Path, like: 
         text = text[:start] + part + text[end:]
     path.write_text(text, encoding="utf-8")
     found = load_stage(path)
-    lead = found.ring.lead if like == "planetary54" else found.gears[0].lead
+    lead = found.written.ring.lead if like == "planetary54" else found.gears[0].lead
     assert lead.end_relief.amount == pytest.approx(9e-6) and lead.end_relief.length == 1e-3
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.spec.forms.body import body_inputs
-from gearfmu.spec.forms.expand import as_general, motion_problems
+from gearfmu.spec.forms.expand import motion_problems, rewritten
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage
@@ -38,9 +38,13 @@ def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
 
 def test_the_shipped_set_is_read():
     spec = load_stage("planetary54")
-    assert spec.kind == "planetary_set" and [gear.name for gear in spec.gears] == ["sun", "planet", "ring"]
-    assert [gear.teeth for gear in spec.gears] == [18, 18, 54] and spec.set.planets == 4
-    assert spec.ring.mounts.points == 6 and spec.carrier.coupling_of("bolt3") == "rigid"
+    assert spec.written.kind == "planetary_set" and [gear.name for gear in spec.written.gears] == [
+        "sun",
+        "planet",
+        "ring",
+    ]
+    assert [gear.teeth for gear in spec.written.gears] == [18, 18, 54] and spec.written.set.planets == 4
+    assert spec.written.ring.mounts.points == 6 and spec.written.carrier.coupling_of("bolt3") == "rigid"
 
 
 @pytest.mark.parametrize(
@@ -94,29 +98,30 @@ def test_all_problems_come_at_once(tmp_path):
 
 def test_what_a_set_needs_to_move_is_told_all_at_once(tmp_path):
     spec = load_stage("planetary54")
-    bare = spec.model_copy(
-        update={
-            "speed_max": None,
-            "contact": None,
-            "ports": {"carrier": spec.ports["carrier"]},
-            "sun": spec.sun.model_copy(update={"bearing": None}),
-            "planet": spec.planet.model_copy(update={"bearing": spec.planet.bearing.model_copy(update={"tilt": None})}),
-            "ring": spec.ring.model_copy(update={"mounts": None}),
-        }
+    bare = rewritten(
+        spec,
+        speed_max=None,
+        contact=None,
+        ports={"carrier": spec.ports["carrier"]},
+        sun=spec.written.sun.model_copy(update={"bearing": None}),
+        planet=spec.written.planet.model_copy(
+            update={"bearing": spec.written.planet.bearing.model_copy(update={"tilt": None})}
+        ),
+        ring=spec.written.ring.model_copy(update={"mounts": None}),
     )
     with pytest.raises(SpecError) as error:
-        as_general(bare)
+        bare.require_motion()
     found = {problem.field: problem.remedy for problem in error.value.problems}
     assert set(found) == {"speed_max", "contact", "ports", "sun.bearing", "planet.bearing.tilt", "ring.mounts"}
     assert 'write speed_max = "300 rad/s"' in found["speed_max"] and "[ports.sun]" in found["ports"]
-    assert motion_problems(spec) == []
+    assert motion_problems(spec.written) == []
 
 
 def test_pin_errors_move_the_axes_of_planets(tmp_path):
     old = "# pin_errors = { 0 ="
     spec = load_stage(written(tmp_path, (old, "pin_errors = { 1 =")))
-    assert spec.set.pin_errors == {1: (0.0, pytest.approx(12e-6))}
-    rotors = as_general(spec).rotors
+    assert spec.written.set.pin_errors == {1: (0.0, pytest.approx(12e-6))}
+    rotors = spec.rotors
     assert rotors["planet2"].offset == pytest.approx((-12e-6, 0.0)) and rotors["planet1"].offset == (0.0, 0.0)
     assert "the 4 are 0 to 3" in problems(tmp_path, (old, "pin_errors = { 4 ="))["set.pin_errors.4"]
 

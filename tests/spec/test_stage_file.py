@@ -14,11 +14,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.errors import SpecError
+from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.pair_checks import at_most, largest_half_width
 from gearfmu.spec.proposals.new import stage_text
 from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage, model_folder, shipped_stages
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import Bearing
 
 RAW = read_toml(find_stage("fzg_c"))
@@ -74,7 +75,7 @@ def problems(path: Path) -> dict[str, Any]:
 
 
 def test_shipped_stage_in_si() -> None:
-    stage = load_stage("fzg_c")
+    stage = load_stage("fzg_c").written
     pinion, wheel = stage.gears
     assert (stage.name, stage.kind, pinion.name, wheel.name) == ("fzg_c", "external_pair", "pinion", "wheel")
     assert (pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift) == (16, 24, 0.1817, 0.1715)
@@ -91,14 +92,14 @@ def test_shipped_stage_in_si() -> None:
 
 def test_relief_stage_differs_only_in_its_relief() -> None:
     plain, relieved = load_stage("fzg_c"), load_stage("fzg_c/stage_relief")
-    pair = relieved.geometry
+    pair = relieved.written.geometry
     for index, gear in enumerate(relieved.gears):
         assert gear.tip_relief is not None
         assert (gear.tip_relief.amount, gear.tip_relief.kind) == (15e-6, "parabolic")
         assert gear.tip_relief.start_roll == pair.outer_single_contact(index)
         assert gear.model_copy(update={"tip_relief": None}) == plain.gears[index]
     names = {"name", "description", "source", "gears"}
-    assert relieved.model_dump(exclude=names) == plain.model_dump(exclude=names)
+    assert relieved.written.model_dump(exclude=names) == plain.written.model_dump(exclude=names)
     assert model_folder(relieved) == model_folder(plain)
 
 
@@ -187,7 +188,7 @@ def zero_shift_pair(teeth: int, shift: float = 0.0) -> dict[str, Any]:
 def test_seventeen_teeth_need_no_profile_shift(write: Write) -> None:
     """Undercut is judged at the rack's addendum, whatever its fillet: it was judged where the rack's straight flank
     ends, and 17 teeth without profile shift were refused for a fillet of 0.25."""
-    shape = load_stage(write(zero_shift_pair(17))).geometry.gears[0]
+    shape = load_stage(write(zero_shift_pair(17))).written.geometry.gears[0]
     assert shape.rounding.form_roll < 0 and math.hypot(shape.r_b, shape.s_form) - shape.r_b < 0.002 * shape.m
 
 
@@ -298,7 +299,7 @@ def test_all_problems_come_at_once_geometry_too(write: Write) -> None:
 
 
 def test_the_named_strip_is_wide_enough_and_a_little_less_is_not(write: Write) -> None:
-    stage = load_stage("fzg_c")
+    stage = load_stage("fzg_c").written
     b = largest_half_width(stage.gears, stage.geometry, stage.torque_max)
     assert b == pytest.approx(0.3527e-3, abs=1e-7)  # √(4·1.2669e6·8.731e-3/(π·113.19e9)) with ρ = L/4
     for factor, fine in ((1.5001, True), (1.4999, False)):
@@ -311,13 +312,13 @@ def test_backlash_is_judged_after_the_allowance(write: Write) -> None:
     """The FZG pair has −0.07 µm as given: no problem, because the file declares 0.1 mm; with a hundredth of a module
     in hand.
     """
-    assert load_stage("fzg_c").geometry.nominal_backlash < 0
+    assert load_stage("fzg_c").written.geometry.nominal_backlash < 0
     assert not problems_or_none(write({"pair.backlash": "0 mm"}))
 
 
 @pytest.mark.parametrize(("share", "fine"), [(0.099, True), (0.101, False)])
 def test_teeth_are_thinned_by_a_tenth_of_the_module_at_most(write: Write, share: float, fine: bool) -> None:
-    stage = load_stage("fzg_c")
+    stage = load_stage("fzg_c").written
     backlash = stage.geometry.nominal_backlash + share * stage.pair.normal_module
     found = problems_or_none(write({"pair.backlash": f"{1e3 * backlash:.9f} mm"}))
     assert ("pair.center_distance" not in found) == fine
@@ -361,7 +362,7 @@ def test_python_may_build_a_spec_from_si_numbers() -> None:
     assert Bearing(stiffness="100 N/µm").stiffness == 1e8
     with pytest.raises(ValueError, match="finite"):
         Bearing(stiffness=math.inf)
-    stage = load_stage("fzg_c")
+    stage = load_stage("fzg_c").written
     assert StageSpec.model_validate(stage.model_dump()) == stage
 
 
@@ -386,7 +387,7 @@ def test_whatever_stands_in_the_file_it_loads_or_lists_problems(write: Write, ch
     except TypeError:  # a table replaced by a number and a field inside it: not a file one can write
         return
     try:
-        assert isinstance(load_stage(path), StageSpec)
+        assert isinstance(load_stage(path).written, StageSpec)
     except SpecError as error:
         for problem in error.problems:
             assert problem.file and problem.remedy

@@ -14,7 +14,7 @@ from scipy.optimize import brentq, minimize_scalar, root
 
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 
 DRIVE = 0
 RZ = 5
@@ -25,12 +25,12 @@ BORE = (0, 1, RZ)
 class Pair:
     """A spur pair with drive flanks in contact, both axes in their places; position p in pitches."""
 
-    spec: StageSpec
+    spec: Stage
     bodies: Sequence[ReducedBody]
 
     @property
     def geometry(self) -> PairGeometry:
-        return self.spec.geometry
+        return self.spec.written.geometry
 
     @property
     def width(self) -> float:
@@ -57,7 +57,7 @@ class Pair:
     def secant(self, rolls: tuple[float, float]) -> float:
         """δ/f (m²/N) at torque_max carried by this pair alone."""
         a, c, beta = self.local_law(rolls)
-        return c - 0.5 * a * math.log(beta * self.spec.torque_max / self.geometry.gears[0].r_b / self.width)
+        return c - 0.5 * a * math.log(beta * self.spec.written.torque_max / self.geometry.gears[0].r_b / self.width)
 
     def approach(self, rolls: tuple[float, float], load: np.ndarray, hertz: bool) -> np.ndarray:
         """δ (m) under the line load (N/m)."""

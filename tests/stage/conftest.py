@@ -6,37 +6,38 @@ import pytest
 
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 
 
 @pytest.fixture(scope="session")
-def spec() -> StageSpec:
+def spec() -> Stage:
     return load_stage("fzg_c")
 
 
 @pytest.fixture(scope="session")
-def relief_spec() -> StageSpec:
+def relief_spec() -> Stage:
     return load_stage("fzg_c/stage_relief")
 
 
 @pytest.fixture(scope="session")
-def bodies(spec: StageSpec) -> list[ReducedBody]:
+def bodies(spec: Stage) -> list[ReducedBody]:
     return load_bodies(spec)
 
 
 @pytest.fixture(scope="session")
-def pair(spec: StageSpec) -> PairGeometry:
-    return spec.geometry
+def pair(spec: Stage) -> PairGeometry:
+    return spec.written.geometry
 
 
 @pytest.fixture(scope="session")
-def plain(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def plain(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
     """No profile modification."""
     return assemble(spec, bodies)
 
 
 @pytest.fixture(scope="session")
-def relieved(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def relieved(relief_spec: Stage, bodies: list[ReducedBody]) -> StageModel:
     """Tip relief on both gears."""
     return assemble(relief_spec, bodies)

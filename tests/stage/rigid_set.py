@@ -22,8 +22,8 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
-from gearfmu.spec.forms.expand import spread
-from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import set_geometries
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
@@ -110,10 +110,9 @@ class RigidSet:
         places = self.positions or [steps * k / self.planets for k in range(self.planets)]
         return 2 * np.pi * np.asarray(places) / steps
 
-    def spec(self) -> PlanetarySpec:
+    def spec(self) -> Stage:
         """The set in the terms of a stage file."""
         shipped = load_stage("planetary54")
-        assert isinstance(shipped, PlanetarySpec)
         alike = {"normal_module": self.module, "pressure_angle": self.pressure_angle}
         update = alike | {
             "planets": self.planets,
@@ -127,28 +126,29 @@ class RigidSet:
             update["positions"] = self.positions
         all_mounts = self.ring.bearing
         radius = math.sqrt(self.ring_twist / all_mounts) * self.base("ring")
-        mounts = shipped.ring.mounts.model_copy(
+        mounts = shipped.written.ring.mounts.model_copy(
             update={"points": 1, "stiffness": all_mounts, "damping_ratio": self.damping_ratio}
         )
-        ring = {"teeth": self.ring_teeth, "rim_diameter": 2 * radius, "mounts": mounts} | self._common(shipped.ring)
-        return shipped.model_copy(
-            update={
-                "name": "rigid_set",
-                "set": shipped.set.model_copy(update=update),
-                "sun": shipped.sun.model_copy(
-                    update={"teeth": self.teeth[0], "bearing": self._bearing(self.sun)} | self._common(shipped.sun)
-                ),
-                "planet": shipped.planet.model_copy(
-                    update={"teeth": self.teeth[1], "bearing": self._bearing(self.planet)}
-                    | self._common(shipped.planet)
-                ),
-                "ring": shipped.ring.model_copy(update=ring),
-                "carrier": shipped.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
-                "ports": {"carrier": TORQUE, "sun": TORQUE} | dict(self.ports),
-                "contact": shipped.contact.model_copy(
-                    update={"slices": self.slices, "damping": self.contact_damping / self.width}
-                ),
-            }
+        ring = {"teeth": self.ring_teeth, "rim_diameter": 2 * radius, "mounts": mounts} | self._common(
+            shipped.written.ring
+        )
+        return rewritten(
+            shipped,
+            name="rigid_set",
+            set=shipped.written.set.model_copy(update=update),
+            sun=shipped.written.sun.model_copy(
+                update={"teeth": self.teeth[0], "bearing": self._bearing(self.sun)} | self._common(shipped.written.sun)
+            ),
+            planet=shipped.written.planet.model_copy(
+                update={"teeth": self.teeth[1], "bearing": self._bearing(self.planet)}
+                | self._common(shipped.written.planet)
+            ),
+            ring=shipped.written.ring.model_copy(update=ring),
+            carrier=shipped.written.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
+            ports={"carrier": TORQUE, "sun": TORQUE} | dict(self.ports),
+            contact=shipped.written.contact.model_copy(
+                update={"slices": self.slices, "damping": self.contact_damping / self.width}
+            ),
         )
 
     def _common(self, gear: Any) -> dict[str, Any]:
@@ -167,7 +167,7 @@ class RigidSet:
         return 2 * (math.hypot(roll + EDGE, r_b) + (-EDGE if name == "ring" else EDGE))
 
     def _bearing(self, body: Rigid) -> Any:
-        shipped = load_stage("planetary54").sun.bearing
+        shipped = load_stage("planetary54").written.sun.bearing
         return shipped.model_copy(
             update={
                 "stiffness": body.bearing, "axial": OUT_OF_PLANE, "tilt": OUT_OF_PLANE,
@@ -178,7 +178,10 @@ class RigidSet:
     def bodies(self) -> list[Any]:
         """Sun, planet, ring and carrier as `assemble` reads them."""
         spec = self.spec()
-        gears = [_gear(self, gear, shape) for gear, shape in zip(spec.gears, set_geometries(spec), strict=True)]
+        gears = [
+            _gear(self, gear, shape)
+            for gear, shape in zip(spec.written.gears, set_geometries(spec.written), strict=True)
+        ]
         return [*gears, _carrier(self)]
 
     def model(self) -> StageModel:
@@ -271,7 +274,7 @@ class Motion:
     model: StageModel
 
     def group(self) -> Group:
-        stage, bodies = self.model.stage, spread(self.model.spec, self.rigid.bodies())
+        stage, bodies = self.model.stage, self.model.stage.by_name(self.rigid.bodies())
         gears = [bodies[gear.name] for gear in stage.gears]
         return mount_sets(stage_layout(stage, gears, carriers={"carrier": bodies["carrier"]}))[0]
 

@@ -9,6 +9,7 @@ import pytest
 
 from gearfmu.body.bodies import reduce_body
 from gearfmu.body.mounted import mounted_frequencies
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
@@ -24,10 +25,12 @@ def test_a_set_with_61_teeth_in_its_ring_is_reduced_and_moves(tmp_path: Path) ->
     mesh = MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2)
     gears = {
         gear.name: gear.model_copy(update={"body": gear.body.model_copy(update={**COARSE, "mesh": mesh})})
-        for gear in spec.gears
+        for gear in spec.written.gears
     }
-    plate = spec.carrier.model_copy(update={"mesh": spec.carrier.mesh.model_copy(update={"scale": 0.4})})
-    spec = spec.model_copy(update={**gears, "carrier": plate})
+    plate = spec.written.carrier.model_copy(
+        update={"mesh": spec.written.carrier.mesh.model_copy(update={"scale": 0.4})}
+    )
+    spec = rewritten(spec, **gears, carrier=plate)
     bodies = [reduce_body(spec, name) for name in (*gears, "carrier")]
     assert mounted_frequencies(bodies[2])[0] > 500  # Hz: six mounts hold it in every direction
     model = assemble(spec, bodies)

@@ -7,7 +7,6 @@ import pytest
 from flank_reader import full_tables
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 from gearfmu.stage.build.assembly import general_sections, mount_sets
@@ -46,13 +45,13 @@ def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
     stage = load_stage("helical_demo")
     bodies = load_bodies(stage)
     sections = general_sections(stage, bodies)
-    layout = stage_layout(as_general(stage), bodies)
+    layout = stage_layout(stage, bodies)
     group = mount_sets(layout)[1]
     for g in (0, 1):
         flank = layout.bodies[g].flank
         assert flank is not None and sections[f"size{g}"][SIZES.index("mirrored")] == 1
         if not mirrored:
-            own = stage_layout(as_general(stage), bodies, points=[np.eye(body.roll.size) for body in bodies])
+            own = stage_layout(stage, bodies, points=[np.eye(body.roll.size) for body in bodies])
             of_points = own.bodies[g].flank
             assert of_points is not None
             sections |= residual_sections(g, of_points.residual, sections["degrees"])

@@ -11,7 +11,8 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.expand import with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 
@@ -21,10 +22,10 @@ SHAFTS = ("pinion", "wheel")
 
 
 @pytest.fixture(scope="module")
-def held(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def held(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
     """A given torque on the pinion, the wheel's bore held."""
     ports = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}
-    return assemble(spec.model_copy(update={"ports": ports}), bodies)
+    return assemble(with_ports(spec, ports), bodies)
 
 
 def at_rest(held: StageModel, torque: float) -> Kernel:
@@ -48,7 +49,7 @@ def push(pair: PairGeometry, drive: bool = True) -> np.ndarray:
 
 @pytest.mark.parametrize("torque", [LOAD, 30.0, -LOAD])
 def test_at_rest_bearings_and_ports_hold_the_contact_force(
-    held: StageModel, spec: StageSpec, pair: PairGeometry, torque: float
+    held: StageModel, spec: Stage, pair: PairGeometry, torque: float
 ) -> None:
     """On drive and coast flanks."""
     kernel = at_rest(held, torque)
@@ -60,7 +61,7 @@ def test_at_rest_bearings_and_ports_hold_the_contact_force(
     assert kernel.get("wheel.tau") == pytest.approx(-torque * 24 / 16, rel=1e-6)
     assert np.allclose(on_pinion, abs(force) * along, rtol=0, atol=5e-5 * abs(force))
     assert np.allclose(on_wheel, -on_pinion, rtol=0, atol=1e-5 * abs(force))
-    for gear in spec.gears:
+    for gear in spec.written.gears:
         place = np.array([kernel.get(f"{gear.name}.gear.{axis}") for axis in "xy"])
         assert np.allclose(place * gear.bearing.stiffness, bearing(kernel, gear.name), rtol=1e-6)
         assert np.allclose(bearing(kernel, gear.name, mean=True), bearing(kernel, gear.name), rtol=1e-12)

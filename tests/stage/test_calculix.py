@@ -16,7 +16,7 @@ import sections
 
 from evidence.peers.calculix import positions, rigid_bores, section, solid, sun_planet
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +32,7 @@ def test_pair_stiffness_at_the_pitch_point(plain: StageModel, pair: PairGeometry
     kernel.prepare()
     pinion, wheel = pair.gears
     turn = pair.path["C"] / pinion.r_b - pinion.psi_b - pair.alpha_wt
-    torque = LINE_LOAD * plain.spec.gears[0].face_width * pinion.r_b
+    torque = LINE_LOAD * plain.stage.gears[0].face_width * pinion.r_b
     secant = 1e-9 * LINE_LOAD / kernel.transmission(-turn * pinion.r_b / wheel.r_b, torque).te
     print(f"kernel {secant:.3f}, CalculiX {SECANT['half_width_averaged']:.3f} N/(mm µm)")
     assert secant == pytest.approx(SECANT["half_width_averaged"], rel=0.015)
@@ -54,7 +54,7 @@ def test_transmission_error_over_one_pitch(plain: StageModel, torque: str) -> No
 
 
 @pytest.mark.full
-def test_transmission_error_on_rigid_bores(spec: StageSpec) -> None:
+def test_transmission_error_on_rigid_bores(spec: Stage) -> None:
     """Bores clamped node by node there, rigid here, all positions and loads: mean and peak to peak within 3 %, as for
     averaged bores, which are 4 % softer; in truth single positions stay within 1 %."""
     bodies = rigid_bores.rigid_bore_bodies(spec)

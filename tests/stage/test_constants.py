@@ -69,9 +69,9 @@ def test_a_run_takes_the_speeds_and_the_load_of_its_contact(spur: StageModel) ->
     law = {"friction_law": BENEDICT_KELLEY, "oil_viscosity": viscosity, "flank_roughness": 1e-9}
     rigid = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0, "slices": 1.0}
     trace = simulate(spur, Steady(spur, speed, 100.0), 6e-3, 1e-5, rigid | law)
-    pair = spur.spec.geometry
+    pair = spur.stage.written.geometry
     (a, b), pitch = pair.gears, 2 * math.pi / pair.gears[0].z
-    ratio, width = a.r_b / b.r_b, min(gear.face_width for gear in spur.spec.gears)
+    ratio, width = a.r_b / b.r_b, min(gear.face_width for gear in spur.stage.gears)
     roll = a.r_b * (a.psi_b + pair.alpha_wt + trace["pinion.gear.phi"])
     roll = pair.path["B"] + np.mod(roll - pair.path["B"], a.r_b * pitch)
     slides, rolls = np.abs(roll - pair.path["C"]) * (1 + ratio) * speed, (roll + (pair.length - roll) * ratio) * speed
@@ -117,7 +117,7 @@ def test_helical_flanks_are_curved_in_their_normal_section(inner_library: Path) 
     helical = gf.assemble("helical_demo")
     inner = Inner(inner_library, helical.blob, {"slices": 1.0})
     places = [p for p in inner.places(np.zeros(6)) if p.flank == 0]
-    tips = [gear.s_tip for gear in helical.spec.geometry.gears]
+    tips = [gear.s_tip for gear in helical.stage.written.geometry.gears]
     inside = [p for p in places if all(0 < roll < tip - 1e-4 for roll, tip in zip(p.roll, tips, strict=True))]
     assert inside
     for place in inside:

@@ -15,8 +15,9 @@ from gearfmu import cli
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
+from gearfmu.spec.forms.expand import with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import Effects
-from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
@@ -34,15 +35,15 @@ APART = HELD | {"effect.coast_flank": 0.0}
 
 
 @pytest.fixture(scope="module")
-def hand(spec: StageSpec, bodies: list[ReducedBody]) -> Pair:
+def hand(spec: Stage, bodies: list[ReducedBody]) -> Pair:
     return Pair(spec, bodies)
 
 
 @pytest.fixture(scope="module")
-def free(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def free(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
     """Given torques on both shafts."""
     ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
-    return assemble(spec.model_copy(update={"ports": ports}), bodies)
+    return assemble(with_ports(spec, ports), bodies)
 
 
 def state(model: StageModel, position: float, torque: float, **parameters: float):
@@ -90,7 +91,7 @@ def test_elastic_off_leaves_a_rigid_gear(free: StageModel, bodies: list[ReducedB
 def test_modes(free: StageModel, bodies: list[ReducedBody], level: float) -> None:
     """The bore of a free gear under a sudden torque: rigid body, static share at once, and the torsional modes below
     the cut of the level ring about theirs. Off (rigid): all of it is there at once."""
-    cut = {RIGID: 0.0, STANDARD: free.spec.levels.standard_cut, FULL: math.inf}[level]
+    cut = {RIGID: 0.0, STANDARD: free.stage.levels.standard_cut, FULL: math.inf}[level]
     assert elastic_angle_error(spun(free, {"level": level, **APART}), bodies[1], cut, damped=True) < 0.02
 
 
@@ -196,7 +197,7 @@ def test_contact_damping(free: StageModel, hand: Pair, damping: float) -> None:
     assert error < 0.02 and trace["mesh.contact"].min() == 1
 
 
-def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: StageSpec, pair: PairGeometry) -> None:
+def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: Stage, pair: PairGeometry) -> None:
     """Unloaded: te is the smallest depth of relief, both gears together, among the pairs on their flanks. Off: none."""
     flanks = {"effect.tip_contact": 0.0}
     off = loaded_te(relieved, [0.0], 24, **flanks, **{"effect.tip_relief": 0.0})
@@ -209,7 +210,7 @@ def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: StageS
     assert np.allclose(on.te[0], by_hand, atol=1e-8)
 
 
-def depth(spec: StageSpec, pair: PairGeometry, rolls: tuple[float, float]) -> float:
+def depth(spec: Stage, pair: PairGeometry, rolls: tuple[float, float]) -> float:
     """δ_A + δ_B of quadratic relief."""
     total = 0.0
     for gear, shape, roll in zip(spec.gears, pair.gears, rolls, strict=True):
@@ -269,7 +270,7 @@ def _roll_at_zero(hand: Pair) -> float:
 
 def test_bearings(plain: StageModel, hand: Pair) -> None:
     """Between rigid gears on held axes te is the local law's; bearings add F/k each. Off in motion: axes stay."""
-    springs = sum(1 / gear.bearing.stiffness for gear in hand.spec.gears)
+    springs = sum(1 / gear.bearing.stiffness for gear in hand.spec.written.gears)
     force = LOAD / hand.geometry.gears[0].r_b
     off, on = (te(plain, SINGLE, LOAD, **STIFF, **{"effect.bearings": flag}) for flag in (0.0, 1.0))
     print(f"bearings add {1e6 * (on - off):.3f} µm, by hand {1e6 * force * springs:.3f} µm")

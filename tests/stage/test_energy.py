@@ -16,7 +16,7 @@ from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
 from gearfmu.body import ReducedBody
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Steady, simulate
 
 FAST = 1
@@ -31,7 +31,7 @@ def libraries(double_library: Path) -> dict[str, Path | None]:
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(relief_spec: Stage, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 

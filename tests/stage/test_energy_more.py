@@ -12,14 +12,14 @@ from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 
 FAST, FULL, EXPLICIT = 1, 3, 5
 CENTRAL = 3
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(relief_spec: Stage, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 

@@ -18,7 +18,9 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.relief import ReliefCurve
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten, with_ports
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
 from gearfmu.spec.tables.gear import GearSpec
 from gearfmu.spec.tables.lead import EndRelief, LeadSpec, Misalignment
@@ -38,9 +40,9 @@ PROFILES: dict[str, dict[str, Any]] = {
 }
 
 
-def changed(spec: StageSpec, pinion: dict[str, Any], wheel: dict[str, Any] | None = None) -> StageSpec:
+def changed(spec: Stage, pinion: dict[str, Any], wheel: dict[str, Any] | None = None) -> Stage:
     """The stage with other fields of its gears; reliefs begin in the middle of single contact, said or not."""
-    pair, gears = spec.geometry, []
+    pair, gears = spec.written.geometry, []
     for i, update in enumerate((pinion, wheel or {})):
         middle = (pair.inner_single_contact(i) + pair.outer_single_contact(i)) / 2
         reliefs = {
@@ -48,8 +50,8 @@ def changed(spec: StageSpec, pinion: dict[str, Any], wheel: dict[str, Any] | Non
             for name in ("tip_relief", "root_relief")
             if update.get(name) is not None and isinstance(update[name].start_roll, str)
         }
-        gears.append(spec.gears[i].model_copy(update=update | reliefs))
-    return spec.model_copy(update={"gears": tuple(gears)})
+        gears.append(spec.written.gears[i].model_copy(update=update | reliefs))
+    return rewritten(spec, gears=tuple(gears))
 
 
 def depth_by_hand(gear: GearSpec, shape: GearGeometry, roll: float) -> float:
@@ -65,11 +67,14 @@ def depth_by_hand(gear: GearSpec, shape: GearGeometry, roll: float) -> float:
     return depth
 
 
-def gap_by_hand(spec: StageSpec, pair: PairGeometry, position: float) -> float:
+def gap_by_hand(spec: Stage, pair: PairGeometry, position: float) -> float:
     """The smallest depth of both gears together among the pairs that are on their flanks."""
     pairs = Pair(spec, ()).rolls(position).values()
     return min(
-        sum(depth_by_hand(gear, shape, roll) for gear, shape, roll in zip(spec.gears, pair.gears, rolls, strict=True))
+        sum(
+            depth_by_hand(gear, shape, roll)
+            for gear, shape, roll in zip(spec.written.gears, pair.gears, rolls, strict=True)
+        )
         for rolls in pairs
     )
 
@@ -78,7 +83,7 @@ def gap_by_hand(spec: StageSpec, pair: PairGeometry, position: float) -> float:
 @pytest.mark.parametrize("name", PROFILES)
 @pytest.mark.parametrize("gear", [0, 1])
 def test_unloaded_te_is_the_gap_of_the_modified_profile(
-    name: str, gear: int, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+    name: str, gear: int, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
 ) -> None:
     """A linear relief's bend is rounded over one interval of the table: by an eighth of what it changes there."""
     update = PROFILES[name]
@@ -91,7 +96,7 @@ def test_unloaded_te_is_the_gap_of_the_modified_profile(
 
 
 def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_and_the_largest_gap(
-    spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+    spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
 ) -> None:
     """Whatever the pairs share: pressed further by more than the largest gap they would carry more than the load, by
     less than the smallest less. Axes are held, so that the pinion's rolls have grown by te."""
@@ -112,7 +117,7 @@ def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_an
 
 
 def test_without_the_effect_flanks_are_nominal_to_the_last_bit(
-    spec: StageSpec, bodies: list[ReducedBody], plain: StageModel
+    spec: Stage, bodies: list[ReducedBody], plain: StageModel
 ) -> None:
     off = {"effect.flank_deviations": 0.0}
     modified = assemble(changed(spec, *list(PROFILES.values())[:2]), bodies)
@@ -120,7 +125,7 @@ def test_without_the_effect_flanks_are_nominal_to_the_last_bit(
     assert "effect.flank_deviations" not in plain.kernel().variables
 
 
-def test_a_stage_that_says_nothing_of_its_flanks_is_the_stage_it_was(spec: StageSpec, plain: StageModel) -> None:
+def test_a_stage_that_says_nothing_of_its_flanks_is_the_stage_it_was(spec: Stage, plain: StageModel) -> None:
     sections = read_blob(plain.blob)
     assert not [name for name in sections if name.startswith(("flank", "runout", "index", "lead"))]
 
@@ -141,7 +146,7 @@ def orders(te: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("gear", "teeth"), [(0, 16), (1, 24)])
 @pytest.mark.parametrize("torque", [0.1, 302.0])
 def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
-    gear: int, teeth: int, torque: float, spec: StageSpec, bodies: list[ReducedBody]
+    gear: int, teeth: int, torque: float, spec: Stage, bodies: list[ReducedBody]
 ) -> None:
     """The projection on the line of action is e sin(φ + …), all flanks of one side alike: amplitude e at the shaft
     order, loaded or not. What it turns the line of action by is of the order e²/a."""
@@ -152,10 +157,10 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
 
 
-def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: Stage, bodies: list[ReducedBody]) -> None:
     """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
     e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
-    psi, pair = 0.7, spec.geometry
+    psi, pair = 0.7, spec.written.geometry
     model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6, angle=psi)}), bodies)
     te = revolution(model, 16, 4, 0.01)
     phi = 2 * math.pi * np.arange(te.size) / te.size
@@ -171,12 +176,12 @@ class Turn:
     true: np.ndarray
 
     @classmethod
-    def of(cls, spec: StageSpec, bodies: list[ReducedBody], positions: int, torque: float, e: float) -> Turn:
+    def of(cls, spec: Stage, bodies: list[ReducedBody], positions: int, torque: float, e: float) -> Turn:
         """Where the pinion's teeth lie at C, the pair is the true one at the centre distance |C_B − C|, turned by that
         line's angle, with the torque about C. True pairs at five distances, and the polynomial between them."""
-        psi, pair = 0.7, spec.geometry
-        base, pitch = [gear.r_b for gear in pair.gears], 2 * math.pi / spec.gears[1].teeth
-        wheel = -pitch * np.arange(spec.gears[0].teeth * positions) / positions
+        psi, pair = 0.7, spec.written.geometry
+        base, pitch = [gear.r_b for gear in pair.gears], 2 * math.pi / spec.written.gears[1].teeth
+        wheel = -pitch * np.arange(spec.written.gears[0].teeth * positions) / positions
         eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e, angle=psi)}), bodies)
         found = cls._te(eccentric, wheel, np.full(wheel.size, torque))
         offset = e * np.exp(1j * ((found - base[1] * wheel) / base[0] + psi))
@@ -187,8 +192,8 @@ class Turn:
         nodes = pair.a + e * np.cos(np.pi * (np.arange(5) + 0.5) / 5)
         curves = []
         for a in nodes:
-            other = spec.model_copy(update={"pair": spec.pair.model_copy(update={"center_distance": a})})
-            shift = pair.wheel_phase - other.geometry.wheel_phase
+            other = rewritten(spec, pair=spec.written.pair.model_copy(update={"center_distance": a}))
+            shift = pair.wheel_phase - other.written.geometry.wheel_phase
             curves.append(cls._te(assemble(other, bodies), wheel - turned + shift, about))
         weights = np.array([[lagrange(nodes, k, a) for k in range(len(nodes))] for a in distance])
         phases = np.array([replace(pair, a=a).wheel_phase for a in distance]) - pair.wheel_phase
@@ -230,12 +235,12 @@ def test_an_eccentric_helical_pinion_is_a_true_one_at_another_place() -> None:
     assert np.abs(turn.eccentric - turn.true).max() < 20e-9 and np.ptp(turn.true) > 35e-6
 
 
-def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: Stage, bodies: list[ReducedBody]) -> None:
     """The pinion under a constant torque, the wheel's shaft end turning evenly; one turn of the pinion of two. The
     shaft's inertia and spring carry 32 Hz without resonance."""
     e, ports = 100e-6, spec.ports | {"pinion": PortSpec(kind="torque")}
     eccentric = changed(spec, {"eccentricity": Eccentricity(amount=e)})
-    model = assemble(eccentric.model_copy(update={"ports": ports}), bodies)
+    model = assemble(with_ports(eccentric, ports), bodies)
     speed, steps = 200.0, 640
     turn = 2 * math.pi / speed
 
@@ -251,7 +256,7 @@ def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: StageSpec, bodies:
     assert abs(trace["energy.residual"]).max() < 1e-3 * trace["energy.stored"].max()
 
 
-def test_without_the_effect_gears_run_true(spec: StageSpec, bodies: list[ReducedBody], plain: StageModel) -> None:
+def test_without_the_effect_gears_run_true(spec: Stage, bodies: list[ReducedBody], plain: StageModel) -> None:
     model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6)}), bodies)
     off = {"effect.runout": 0.0}
     assert np.array_equal(loaded_te(model, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
@@ -259,15 +264,15 @@ def test_without_the_effect_gears_run_true(spec: StageSpec, bodies: list[Reduced
 
 # ---- wobble ----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("quarter", [0, 1])
-def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodies: list[ReducedBody]) -> None:
     """Wheel at rest at angle 0, its toothing leaning towards +x (from +z: the centre distance grows) or +y: the pair
     with that parallelism error, to the last digits."""
     tilt, span = 2e-4, 0.1
-    phase = spec.geometry.wheel_phase
+    phase = spec.written.geometry.wheel_phase
     wobble = Wobble(amount=tilt, angle=quarter * math.pi / 2 - phase)
     error = {"in_plane": tilt * span} if quarter == 0 else {"out_of_plane": tilt * span}
-    misaligned = spec.model_copy(
-        update={"pair": spec.pair.model_copy(update={"misalignment": Misalignment(span=span, **error)})}
+    misaligned = rewritten(
+        spec, pair=spec.written.pair.model_copy(update={"misalignment": Misalignment(span=span, **error)})
     )
     turned = statics_of(assemble(changed(spec, {}, {"wobble": wobble}), bodies)).transmission(0.0, 302.0)
     at_rest = statics_of(assemble(misaligned, bodies)).transmission(0.0, 302.0)
@@ -276,7 +281,7 @@ def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: StageSpec, 
     assert np.allclose(slices, same, rtol=1e-4, atol=1e-3) and np.ptp(slices[0]) > 0.05 * slices[0].mean()
 
 
-def test_a_wobble_tips_the_load_over_once_a_turn(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_a_wobble_tips_the_load_over_once_a_turn(spec: Stage, bodies: list[ReducedBody]) -> None:
     """The first slice's share swings as a cosine of the pinion's angle; its mean is that of true running."""
     model = assemble(changed(spec, {"wobble": Wobble(amount=1e-4)}), bodies)
     kernel = statics_of(model)
@@ -307,12 +312,12 @@ def crowned(shape: GearGeometry, width: float, roll: np.ndarray, z: np.ndarray) 
 
 
 def test_a_topography_is_the_same_flank_as_its_closed_form(
-    tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+    tmp_path: Path, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
 ) -> None:
     """A coarse file of a flank that is a parabola both ways: splines through its points are that parabola, so that
     table and transmission error are those of `profile` and `lead`. Across the width strips take means of straight
     lines between 33 places either way."""
-    shape, gear = pair.gears[0], spec.gears[0]
+    shape, gear = pair.gears[0], spec.written.gears[0]
     roll = np.linspace(shape.s_form, shape.s_tip, 7)
     z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
     write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
@@ -334,9 +339,7 @@ def test_a_topography_is_the_same_flank_as_its_closed_form(
     assert same[0] == pytest.approx(same[1], rel=1e-9)
 
 
-def test_one_tooth_of_a_topography_is_met_once_a_turn(
-    tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody]
-) -> None:
+def test_one_tooth_of_a_topography_is_met_once_a_turn(tmp_path: Path, spec: Stage, bodies: list[ReducedBody]) -> None:
     """Tooth 3 of the pinion stands 5 µm out on its left flanks: te falls by 5 µm while it is in mesh, as if it were out
     of its place, and nowhere else; right flanks are driven the other way round and stay."""
     rows = ["tooth,flank,roll_mm,z_mm,deviation_um"]
@@ -358,7 +361,7 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     from gearfmu.body import load_bodies
 
     spec = load_stage("helical_demo")
-    bodies, pair = load_bodies(spec), spec.geometry
+    bodies, pair = load_bodies(spec), spec.written.geometry
     modified = changed(
         spec,
         {"tip_relief": None, "lead": None, "profile": ProfileSpec(crowning=20e-6)},
@@ -366,7 +369,7 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     )
     model = assemble(modified, bodies)
     te = loaded_te(model, [0.0], 6, **NO_CORNERS).te[0]
-    slices, width = modified.contact.slices, modified.gears[0].face_width
+    slices, width = modified.slices, modified.gears[0].face_width
     shape, found = pair.gears[0], []
     for p in np.arange(6) / 6:
         gaps = []
@@ -383,10 +386,10 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     assert te == pytest.approx(found, abs=0.3e-6)
 
 
-def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: Stage, bodies: list[ReducedBody]) -> None:
     """Lead and profile crowning as said and as a topography: nodes of flanks run alike; and not as without."""
-    pair = spec.geometry
-    shape, gear = pair.gears[0], spec.gears[0]
+    pair = spec.written.geometry
+    shape, gear = pair.gears[0], spec.written.gears[0]
     roll = np.linspace(shape.s_form, shape.s_tip, 7)
     z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
     write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
@@ -400,10 +403,10 @@ def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: StageSpec, bod
     assert runs[0] == pytest.approx(runs[1], abs=2e-9) and np.abs(runs[0] - runs[2]).max() > 0.5e-6
 
 
-def test_end_relief_kinds(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_end_relief_kinds(spec: Stage, bodies: list[ReducedBody]) -> None:
     """Depth of the lead's table at the ends and half way in."""
     for kind, halfway in (("linear", 0.5), ("parabolic", 0.25), ("arc", 0.25)):
-        relief = EndRelief(amount=8e-6, length=spec.gears[0].face_width / 8, kind=kind)
+        relief = EndRelief(amount=8e-6, length=spec.written.gears[0].face_width / 8, kind=kind)
         sections = read_blob(assemble(changed(spec, {"lead": LeadSpec(end_relief=relief)}), bodies).blob)
         depth = np.asarray(sections["lead0"]).reshape(2, 33)
         expected = np.array([[8e-6, halfway * 8e-6, 0, 0, 8e-6]] * 2)
@@ -420,7 +423,7 @@ def test_te_over_several_pitches_is_that_of_one_after_the_other(plain: StageMode
     assert two.harmonics(3) == pytest.approx(one.harmonics(3), rel=1e-6)
 
 
-def test_the_kernel_refuses_what_are_no_deviations(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_the_kernel_refuses_what_are_no_deviations(spec: Stage, bodies: list[ReducedBody]) -> None:
     update = {"profile": ProfileSpec(slope=4e-6), "eccentricity": Eccentricity(amount=5e-6)}
     sections = read_blob(assemble(changed(spec, update), bodies).blob)
     size, depth = np.asarray(sections["flank_size0"]), np.asarray(sections["flank0"])

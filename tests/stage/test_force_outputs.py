@@ -77,7 +77,12 @@ def test_means_sum_to_the_impulse(bodies, plain: StageModel) -> None:
         kernel.set(name, value)
     kernel.initialize()
     inertia = bodies[0].inertia[2, 2]
-    r_b = plain.spec.pair.normal_module * plain.spec.gears[0].teeth / 2 * math.cos(plain.spec.pair.pressure_angle)
+    r_b = (
+        plain.stage.written.pair.normal_module
+        * plain.stage.gears[0].teeth
+        / 2
+        * math.cos(plain.stage.written.pair.pressure_angle)
+    )
     before, impulse = kernel.get("pinion.gear.w"), 0.0
     for k in range(200):
         for name, value in steady(k * H).items():

@@ -17,7 +17,9 @@ from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pa
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten, with_ports
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.build.blob import read_blob
@@ -29,7 +31,7 @@ EM = 1.0
 
 
 @pytest.fixture(scope="module")
-def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(spec: Stage, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(spec, bodies)
 
 
@@ -93,9 +95,9 @@ def turning_points(block: Mapping[str, float], potential: Callable[[float], floa
     raise AssertionError("it does not come to rest")
 
 
-def swinging(spec: StageSpec, bodies: Sequence[Any], port: PortSpec) -> bytes:
+def swinging(spec: Stage, bodies: Sequence[Any], port: PortSpec) -> bytes:
     ports = {"pinion": port, "wheel": PortSpec(kind="torque")}
-    pair = FreePair(spec.model_copy(update={"ports": ports}), bodies)
+    pair = FreePair(with_ports(spec, ports), bodies)
     return pair.place(Rattle(position=0.62, load=1.0))
 
 
@@ -138,7 +140,7 @@ def extremes(path: np.ndarray, least: float) -> list[float]:
 
 
 def swing(
-    spec: StageSpec,
+    spec: Stage,
     blob: bytes,
     kernel: Kernel,
     act: Callable[[], None],
@@ -147,7 +149,7 @@ def swing(
 ) -> Swings:
     """A started kernel against the exact solution. `act`: what is done before each step; of `potential` (J)."""
     h, torque = kernel.get("h"), kernel.get("wheel.tau")
-    geometry = spec.geometry
+    geometry = spec.written.geometry
     s_a, s_b = rolls(blob, kernel, geometry.alpha_wt)
     r_a, r_b = (gear.r_b for gear in geometry.gears)
     block = dict(r_a=r_a, r_b=r_b, s_a=s_a, s_b=s_b, mu=MU, tau=torque)
@@ -166,7 +168,7 @@ def swing(
 
 @pytest.mark.parametrize("integrator", [0.0, EM])
 def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
-    spec: StageSpec, bodies: list[ReducedBody], integrator: float
+    spec: Stage, bodies: list[ReducedBody], integrator: float
 ) -> None:
     """Pinion on a soft spring, wheel under a torque, one tooth pair that slides at a frozen position: the turning
     points shrink by the friction, then it stands still. The spring yields 10³ times as much as the contact."""
@@ -185,13 +187,13 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
     assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
-def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: Stage, bodies: list[ReducedBody]) -> None:
     """The same with a weight on an arm that turns 60 times as far as the pinion instead of the spring, swinging by 30°
     about where the wheel lifts it to: its torque is set before each step for the angle in its middle."""
     weight, times, torque, h = 0.175, 60.0, 7.5, 1e-5
     blob = swinging(spec, bodies, PortSpec(kind="torque"))
     kernel = Kernel(blob, {**FROZEN, "friction_coefficient": MU, "h": h})
-    r_a, r_b = (gear.r_b for gear in spec.geometry.gears)
+    r_a, r_b = (gear.r_b for gear in spec.written.geometry.gears)
     kernel.set("wheel.tau", torque)
     kernel.set("pinion.tau", torque * r_a / r_b)
     kernel.initialize()
@@ -206,7 +208,7 @@ def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: StageSpec, bod
     assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
-def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_below_the_limit_of_friction_nothing_moves(spec: Stage, bodies: list[ReducedBody]) -> None:
     """A torque that friction can hold: no creep, although friction fades with the speed of the pinion."""
     blob = swinging(spec, bodies, PortSpec(kind="spring", k=2e4, c=0.0))
     frozen = {**CONSERVING, **RIGID, "effect.bearings": 0.0}
@@ -215,7 +217,7 @@ def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list
     kernel.initialize()
     kernel.set("pinion.phi", -0.1e-3)
     kernel.set("pinion.w", 0.0)
-    s_a, s_b = rolls(blob, kernel, spec.geometry.alpha_wt)
+    s_a, s_b = rolls(blob, kernel, spec.written.geometry.alpha_wt)
     slid = []
     for i in range(100):
         kernel.step(i * 1e-3, 1e-3)
@@ -252,10 +254,10 @@ def test_friction_takes_what_the_energy_loses(pair_free: FreePair, start: Rattle
 # ---- forces and losses -----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("rpm", [60, 300])
 def test_force_across_the_line_of_action_jumps_at_the_pitch_point(
-    spec: StageSpec, bodies: list[ReducedBody], rpm: float
+    spec: Stage, bodies: list[ReducedBody], rpm: float
 ) -> None:
     """The off-line force of the pinion's bearing changes by 2 µ F where sliding changes its sign, at any speed."""
-    mu, speed, angle = 0.06, rpm * math.pi / 30, spec.geometry.alpha_wt
+    mu, speed, angle = 0.06, rpm * math.pi / 30, spec.written.geometry.alpha_wt
     model = assemble(spec, bodies)
     pitch = 2 * math.pi / (16 * speed)
     run = {**RIGID, "friction_coefficient": mu, "h": 10e-6}
@@ -272,10 +274,10 @@ def test_force_across_the_line_of_action_jumps_at_the_pitch_point(
     assert jump == pytest.approx(force, rel=0.01)
 
 
-def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_mean_loss_is_the_integral_over_the_path(spec: Stage, bodies: list[ReducedBody]) -> None:
     """Mean power of a slow run against µ Σ λ |v| over a pitch, the load shared as statics without friction say."""
     mu, speed = 0.05, 10.0
-    model, geometry = assemble(spec, bodies), spec.geometry
+    model, geometry = assemble(spec, bodies), spec.written.geometry
     undamped = {**RIGID, "friction_coefficient": mu, "effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
     pitch = 2 * math.pi / 16
     count = 2000
@@ -300,9 +302,9 @@ def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[R
     assert power == pytest.approx(expected, rel=0.005)
 
 
-def test_the_tooth_loss_factor_is_the_integral_of_an_evenly_shared_load(spec: StageSpec) -> None:
+def test_the_tooth_loss_factor_is_the_integral_of_an_evenly_shared_load(spec: Stage) -> None:
     """Ohlendorf's H_V against Σ |v| of all pairs on the path, each with its share, over a base pitch."""
-    pair = spec.geometry
+    pair = spec.written.geometry
     path, p = pair.path, pair.base_pitch
     positions = (np.arange(20000) + 0.5) / 20000 * p
     slides, pairs = np.zeros(20000), np.zeros(20000)
@@ -315,7 +317,7 @@ def test_the_tooth_loss_factor_is_the_integral_of_an_evenly_shared_load(spec: St
     assert loss_factor(pair) == pytest.approx(np.mean(slides / pairs) * (1 / r_a + 1 / r_b), rel=1e-4)
 
 
-def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: Stage, bodies: list[ReducedBody]) -> None:
     """A spur pair with a constant coefficient: teeth that yield share the load more gently than evenly, so that the
     run loses less, but not by a tenth."""
     found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
@@ -361,14 +363,14 @@ def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
     def ratio(speed: float = 100.0, **settings: float) -> float:
         return float(simulate(helical, drives[speed], 4e-4, 1e-4, common | settings)["mesh.friction_ratio"][-1])
 
-    pair = helical.spec.geometry
+    pair = helical.stage.written.geometry
     a, b = pair.gears
     trace = simulate(helical, drives[100.0], 4e-4, 1e-4, {"level": 0.0, "slices": 1.0})
     cosine = math.cos(a.beta_b)
     pitch = [pair.length * gear.r_b / (a.r_b + b.r_b) for gear in (a, b)]
     rho = 1e3 * pitch[0] * pitch[1] / sum(pitch) / cosine
     v_sum = 100.0 * 2 * pitch[0]
-    width = 1e3 * min(gear.face_width for gear in helical.spec.gears)
+    width = 1e3 * min(gear.face_width for gear in helical.stage.gears)
     load = trace["mesh.force"][-1] / width
     expected = 0.048 * (load / (v_sum * rho)) ** 0.2 * 40.0**-0.05 * 0.5**0.25
     assert ratio(friction_law=2.0) == pytest.approx(expected, rel=0.01)
@@ -382,14 +384,14 @@ def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
 # ---- what a stage says -----------------------------------------------------------------------------------------------
 def test_a_stage_file_turns_friction_on(helical: StageModel) -> None:
     own = FrictionSpec(law="iso_tr_14179", viscosity=0.05, roughness=1e-6)
-    stage = helical.spec
-    stage = stage.model_copy(update={"contact": stage.contact.model_copy(update={"friction": own})})
+    stage = helical.stage
+    stage = rewritten(stage, contact=stage.written.contact.model_copy(update={"friction": own}))
     kernel = assemble(stage, load_bodies(stage)).kernel()
     names = ("effect.friction", "friction_law", "oil_viscosity", "flank_roughness")
     assert [kernel.get(name) for name in names] == [1.0, 2.0, 0.05, 1e-6]
 
 
-def test_bodies_that_do_not_know_their_profile_are_refused(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_bodies_that_do_not_know_their_profile_are_refused(spec: Stage, bodies: list[ReducedBody]) -> None:
     bare = [replace(body, tangent=None) for body in bodies]
     with pytest.raises(ModelError, match="reduce its body again"):
         assemble(spec, bare).kernel(**{"effect.friction": 1.0}).prepare()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
 from gearfmu.spec.forms.shapes import gears_in_mesh, mesh_shape
 from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
@@ -31,7 +30,7 @@ SHAFT = {
 @pytest.fixture(scope="module")
 def train(spec) -> Stage:
     """Twice the FZG pair in series, the second stage at 50 degrees, on three shafts."""
-    pair = expand_pair(spec)
+    pair = spec
     gears = {
         f"{name}{i}": pair.bodies[name].model_copy(update={"name": f"{name}{i}"})
         for i in (1, 2)

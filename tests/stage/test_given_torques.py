@@ -12,7 +12,9 @@ import pytest
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import with_ports
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
 
@@ -25,8 +27,8 @@ TORQUE, SPEED, RATIO = 302.0, 200.0, 24 / 16  # of the pair: N·m and rad/s of t
 
 
 @pytest.fixture(scope="module")
-def pair(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
-    return assemble(relief_spec.model_copy(update={"ports": {"pinion": GIVEN, "wheel": GIVEN}}), bodies)
+def pair(relief_spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+    return assemble(with_ports(relief_spec, {"pinion": GIVEN, "wheel": GIVEN}), bodies)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.stage.build.assembly import assemble, general_sections
 from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.compact import ground_rows
@@ -32,7 +31,7 @@ ANISOTROPIC = np.array([[4.0e-9, 1.5e-9], [1.5e-9, 2.5e-9]])
 
 @pytest.fixture(scope="module")
 def layout(spec, bodies):
-    return stage_layout(expand_pair(spec), bodies)
+    return stage_layout(spec, bodies)
 
 
 def with_compliance(layout, compliance):

@@ -11,7 +11,9 @@ import pytest
 
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten, with_ports
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.lead import LeadSpec, Misalignment
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
@@ -26,13 +28,13 @@ SHAFTS = ("pinion", "wheel")
 @pytest.fixture(scope="module")
 def demo() -> SimpleNamespace:
     spec = load_stage("helical_demo")
-    return SimpleNamespace(spec=spec, pair=spec.geometry, bodies=load_bodies(spec))
+    return SimpleNamespace(spec=spec, pair=spec.written.geometry, bodies=load_bodies(spec))
 
 
-def plain(spec: StageSpec, **pair: object) -> StageSpec:
+def plain(spec: Stage, **pair: object) -> Stage:
     """Without profile and lead modification, the pinion under a given torque, the wheel held."""
-    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in spec.gears)
-    return spec.model_copy(update={"gears": gears, "ports": HELD, "pair": spec.pair.model_copy(update=pair)})
+    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in spec.written.gears)
+    return rewritten(spec, gears=gears, ports=HELD, pair=spec.written.pair.model_copy(update=pair))
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +80,7 @@ def test_six_forces_and_moments_of_the_whole_stage_are_in_balance(
     off the line of action."""
     kernel = at_rest(involute, torque, **{"effect.tip_contact": edges})
     (f_p, m_p), (f_w, m_w) = (support(kernel, shaft) for shaft in SHAFTS)
-    arm = np.array([demo.spec.pair.center_distance, 0.0, 0.0])
+    arm = np.array([demo.spec.written.pair.center_distance, 0.0, 0.0])
     at_p, at_w = (np.array([kernel.get(f"{shaft}.gear.{axis}") for axis in "xyz"]) for shaft in SHAFTS)
     moment = m_p + m_w + np.cross(at_p, f_p) + np.cross(arm + at_w, f_w)
     outside = np.array([0.0, 0.0, torque - kernel.get("wheel.tau")])
@@ -95,19 +97,19 @@ def steady(model: StageModel, torque: float = TORQUE, **parameters: float) -> di
     return {name: trace[name][240:] for name in trace.channels}
 
 
-def with_bearings(spec: StageSpec) -> StageSpec:
+def with_bearings(spec: Stage) -> Stage:
     """A spur pair whose gears may move along their axes and tilt."""
     held = {"axial": 1e8, "tilt": 1e5}
-    gears = tuple(g.model_copy(update={"bearing": g.bearing.model_copy(update=held)}) for g in spec.gears)
-    return spec.model_copy(update={"gears": gears, "ports": HELD})
+    gears = tuple(g.model_copy(update={"bearing": g.bearing.model_copy(update=held)}) for g in spec.written.gears)
+    return rewritten(spec, gears=gears, ports=HELD)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_spur_gears_that_may_tilt_are_those_that_may_not(
-    relief_spec: StageSpec, bodies: list[ReducedBody], level: float
+    relief_spec: Stage, bodies: list[ReducedBody], level: float
 ) -> None:
     """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give."""
-    planar = assemble(relief_spec.model_copy(update={"ports": HELD}), bodies)
+    planar = assemble(with_ports(relief_spec, HELD), bodies)
     spatial = assemble(with_bearings(relief_spec), bodies)
     results = []
     for model in (planar, spatial):
@@ -121,7 +123,7 @@ def test_spur_gears_that_may_tilt_are_those_that_may_not(
     assert results[1] == pytest.approx(results[0], rel=1e-6)
 
 
-def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
     """The same bodies on flanks of 1e-10 rad: the rows of the kernel go over continuously."""
     spur = assemble(with_bearings(relief_spec), bodies)
     blobs = dict(read_blob(spur.blob))
@@ -144,20 +146,20 @@ def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.nda
 
 
 @pytest.mark.parametrize("change", ["slope", "out_of_plane", "in_plane"])
-def test_lead_and_misalignment_load_one_end(relief_spec: StageSpec, bodies: list[ReducedBody], change: str) -> None:
+def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[ReducedBody], change: str) -> None:
     """A helix slope of f over the face width opens one end of the flanks as much as axes out of parallel that are
     turned about the direction across the line of action; the other end carries more."""
     spec = with_bearings(relief_spec)
-    width, f = spec.gears[0].face_width, 20e-6
-    alpha = spec.geometry.alpha_wt
+    width, f = spec.written.gears[0].face_width, 20e-6
+    alpha = spec.written.geometry.alpha_wt
 
-    def slope(value: float) -> StageSpec:
-        gears = (spec.gears[0].model_copy(update={"lead": LeadSpec(slope=value)}), spec.gears[1])
-        return spec.model_copy(update={"gears": gears})
+    def slope(value: float) -> Stage:
+        gears = (spec.written.gears[0].model_copy(update={"lead": LeadSpec(slope=value)}), spec.written.gears[1])
+        return rewritten(spec, gears=gears)
 
-    def misaligned(**errors: float) -> StageSpec:
-        pair = spec.pair.model_copy(update={"misalignment": Misalignment(span=width, **errors)})
-        return spec.model_copy(update={"pair": pair})
+    def misaligned(**errors: float) -> Stage:
+        pair = spec.written.pair.model_copy(update={"misalignment": Misalignment(span=width, **errors)})
+        return rewritten(spec, pair=pair)
 
     even = slices_at_rest(assemble(spec, bodies), TORQUE)
     turned = slices_at_rest(assemble(slope(f), bodies), TORQUE)
@@ -214,7 +216,7 @@ def test_a_slice_past_the_end_of_its_flank_carries_by_its_tip_edge(demo: SimpleN
 
 def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: StageModel) -> None:
     """In motion they add up to the mesh force; at rest they are the slices that `te` finds."""
-    slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.contact.slices)]
+    slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.written.contact.slices)]
     trace = steady(assemble(demo.spec, demo.bodies))
     assert np.stack([trace[name] for name in slices]).sum(axis=0) == pytest.approx(trace["mesh.force"], rel=1e-9)
     assert f"mesh.slice_{len(slices) + 1}" not in involute.kernel().variables

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import GearBody, Stage, SupportSpec
-from gearfmu.spec.forms.members import body_names
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 from gearfmu.stage.run.simulate import simulate
@@ -27,7 +25,7 @@ SAME = 3e-6  # of the largest value: ten times the largest difference found
 @pytest.fixture(scope="module")
 def pair() -> tuple[Stage, dict[str, Any]]:
     spec = load_stage("fzg_c/stage_relief")
-    return as_general(spec), spread(spec, load_bodies(spec))
+    return spec, spec.by_name(load_bodies(spec))
 
 
 def held(support: SupportSpec, extra: float = 0.0) -> SupportSpec:
@@ -71,7 +69,7 @@ def opposed(stage: Stage) -> Stage:
 
 def run(stage: Stage, bodies: dict[str, Any], inputs: dict[str, float]) -> dict[str, np.ndarray]:
     """A run at level fast from rest, under inputs that stay."""
-    model = assemble(stage, [bodies[name] for name in body_names(stage)])
+    model = assemble(stage, [bodies[name] for name in stage.files])
     trace = simulate(model, lambda time: inputs, DURATION, H, {"level": FAST})
     return {name: channel.values for name, channel in trace.channels.items()}
 
@@ -103,7 +101,7 @@ def test_a_given_torque_is_met_as_well_after_many_turns() -> None:
     """All teeth of the train are where they were after z2 z4 turns of the input. Seen by it: the tolerance of an island
     in parts of the largest gap of all its rows, among them the angle of the port where a torque is given."""
     spec = load_stage("two_stage")
-    stage, bodies = with_ports(as_general(spec), TORQUE_OUT), spread(spec, load_bodies(spec))
+    stage, bodies = with_ports(spec, TORQUE_OUT), spec.by_name(load_bodies(spec))
     teeth = {name: body.teeth for name, body in stage.bodies.items() if isinstance(body, GearBody)}
     back = 2 * math.pi * teeth["wheel1"] * teeth["wheel2"]
     one, other = (run(stage, bodies, {"input.phi": 3e-3 + phi, "output.tau": 400.0}) for phi in (0.0, back))

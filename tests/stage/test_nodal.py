@@ -13,8 +13,9 @@ import pytest
 from evidence.energy.free import Rattle, energies, free_pair, started
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.expand import expand_pair
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.build.nodal import flank_nodes, mesh_penalty
 
@@ -23,19 +24,17 @@ SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion
 PENALTY = 2e14  # N/m³
 
 
-def with_nodes(spec: StageSpec, **nodal: object) -> StageSpec:
+def with_nodes(spec: Stage, **nodal: object) -> Stage:
     """The stage with other numbers of [contact.nodal]."""
-    contact = spec.contact
-    return spec.model_copy(
-        update={"contact": contact.model_copy(update={"nodal": contact.nodal.model_copy(update=nodal)})}
-    )
+    contact = spec.written.contact
+    return rewritten(spec, contact=contact.model_copy(update={"nodal": contact.nodal.model_copy(update=nodal)}))
 
 
-def test_default_penalty_gives_hertz_half_width(relief_spec: StageSpec, pair: PairGeometry) -> None:
+def test_default_penalty_gives_hertz_half_width(relief_spec: Stage, pair: PairGeometry) -> None:
     """An elastic foundation p = k (δ − x²/2R) carries 2/3 k b³/R on ±b; with Hertz's b² = 4 f R/(π E*) that is f."""
-    stage = expand_pair(relief_spec)
+    stage = relief_spec
     penalty = mesh_penalty(stage, stage.engagements[0])
-    load = relief_spec.torque_max / pair.gears[0].r_b / relief_spec.gears[0].face_width
+    load = relief_spec.written.torque_max / pair.gears[0].r_b / relief_spec.written.gears[0].face_width
     pitch = pair.path["C"]
     radius, modulus = pitch * (pair.length - pitch) / pair.length, 206e9 / (2 * (1 - 0.3**2))
     half = math.sqrt(4 * load * radius / (math.pi * modulus))
@@ -43,9 +42,9 @@ def test_default_penalty_gives_hertz_half_width(relief_spec: StageSpec, pair: Pa
     assert [flank_nodes(stage, gear) for gear in stage.gears] == [(41, 13), (41, 13)]
 
 
-def rigid_error(spec: StageSpec, bodies: list[ReducedBody], along: int, nodes_of: str = "both") -> float:
+def rigid_error(spec: Stage, bodies: list[ReducedBody], along: int, nodes_of: str = "both") -> float:
     """Largest error of the force (share of the largest) while rigid teeth meet and part, one pair in contact."""
-    pair = spec.geometry
+    pair = spec.written.geometry
     a = pair.gears[0]
     roll = a.r_b * (a.psi_b + pair.alpha_wt + math.pi / a.z)  # half a pitch after the flanks of tooth 0 met
     radius = roll * (pair.length - roll) / pair.length
@@ -58,12 +57,12 @@ def rigid_error(spec: StageSpec, bodies: list[ReducedBody], along: int, nodes_of
         found.append([kernel.get("mesh.force"), kernel.get("mesh.te") - 2e-6, kernel.get("mesh.pairs")])
     force, depth, pairs = np.array(found).T
     depth = np.maximum(depth, 0.0)
-    exact = spec.gears[0].face_width * 4 * math.sqrt(2) / 3 * PENALTY * math.sqrt(radius) * depth**1.5
+    exact = spec.written.gears[0].face_width * 4 * math.sqrt(2) / 3 * PENALTY * math.sqrt(radius) * depth**1.5
     assert pairs.max() == 1 and force.max() > 500
     return float(np.abs(force - exact).max() / force.max())
 
 
-def test_rigid_flanks_are_an_elastic_foundation(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[ReducedBody]) -> None:
     """f = 4/3 b k √(2R) δ^(3/2): the error falls with the distance of the nodes, of one gear or of both."""
     errors = {along: rigid_error(spec, bodies, along) for along in (41, 161, 513)}
     one_sided = rigid_error(spec, bodies, 513, "a")
@@ -72,7 +71,7 @@ def test_rigid_flanks_are_an_elastic_foundation(spec: StageSpec, bodies: list[Re
 
 
 @pytest.mark.parametrize("elastic", [0.0, 1.0])
-def test_energy_through_impacts_on_both_flanks(spec: StageSpec, bodies: list[ReducedBody], elastic: float) -> None:
+def test_energy_through_impacts_on_both_flanks(spec: Stage, bodies: list[ReducedBody], elastic: float) -> None:
     """Undamped free rattle, places of contact moving: what is left is the error of the integrator, which central
     differences have at second order (tests/kernel/test_nodal_blocks.py)."""
     free = free_pair(with_nodes(spec, along=81), bodies)
@@ -85,7 +84,7 @@ def test_energy_through_impacts_on_both_flanks(spec: StageSpec, bodies: list[Red
 
 def mean_te(model: StageModel, torque: float, **parameters: float) -> tuple[float, float]:
     """Mean transmission error (m) and mesh force (N) over a mesh period after one to settle."""
-    teeth = model.spec.gears[0].teeth
+    teeth = model.stage.written.gears[0].teeth
     period = 2 * math.pi / (SPEED * teeth)
     settings = {"level": PAPER, "integrator": 2} | parameters
     trace = simulate(model, Steady(model, SPEED, torque), 2 * period, period / 200, settings)
@@ -93,7 +92,7 @@ def mean_te(model: StageModel, torque: float, **parameters: float) -> tuple[floa
     return float(trace["mesh.te"][-200:].mean()), float(trace["mesh.force"][-200:].mean())
 
 
-def test_mean_transmission_is_that_of_line_contact(relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_mean_transmission_is_that_of_line_contact(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
     """Same truncated modes, one mesh period: 81 nodes against five slices with the local law of Hertz. Measured: 0.2 %
     of the mean transmission error, 0.1 % of the mean force."""
     model = assemble(with_nodes(relief_spec, along=81), bodies)

@@ -229,7 +229,7 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
     pitches = ", ".join(['"200 um"'] * 8 + ['"-200 um"'] * 8)
     found = refused(variant(tmp_path, f"[gears.pinion]\npitch_deviation = [{pitches}]\n"))
     assert "they sum to more than a twentieth of the module" in found["gears.pinion.pitch_deviation"].remedy
-    end = load_stage("fzg_c").geometry.gears[0].s_a
+    end = load_stage("fzg_c").written.geometry.gears[0].s_a
     steep = f'[gears.pinion.tip_relief]\namount = "0.4 mm"\nstart_roll = "{1e3 * end - 1e-3:.9g} mm"\n'
     start = refused(variant(tmp_path, steep))["gears.pinion.tip_relief.start_roll"]
     assert start.remedy.startswith("too near the end of the flank: at least 0.006")

@@ -20,14 +20,14 @@ from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.gear import GearSpec
 from gearfmu.stage import StageModel
 
 LINE_LOAD = 300e3  # N/m
 
 
-def theoretical_stiffness(spec: StageSpec) -> float:
+def theoretical_stiffness(spec: Stage) -> float:
     """c'th of ISO 6336-1 for solid spur gears, N/m²."""
     (z1, x1), (z2, x2) = ((gear.teeth, gear.profile_shift) for gear in spec.gears)
     flexibility = (
@@ -44,12 +44,12 @@ def theoretical_stiffness(spec: StageSpec) -> float:
     return 1e9 / flexibility
 
 
-def rack_factor(spec: StageSpec) -> float:
+def rack_factor(spec: Stage) -> float:
     """C_B of ISO 6336-1 for a dedendum other than 1.2 m."""
     return 1 + 0.5 * (1.2 - np.mean([gear.rack.dedendum for gear in spec.gears]))
 
 
-def disc_torsion(spec: StageSpec, pair: PairGeometry) -> float:
+def disc_torsion(spec: Stage, pair: PairGeometry) -> float:
     """Twist of plane discs between bore and root circle as displacement along the line of action, m per N/m (exact,
     plane shear)."""
     total = 0.0
@@ -59,11 +59,11 @@ def disc_torsion(spec: StageSpec, pair: PairGeometry) -> float:
     return total
 
 
-def expected(spec: StageSpec, pair: PairGeometry) -> float:
+def expected(spec: Stage, pair: PairGeometry) -> float:
     return 1 / (1 / (theoretical_stiffness(spec) * rack_factor(spec)) + disc_torsion(spec, pair))
 
 
-def local_compliance(spec: StageSpec, pair: PairGeometry) -> float:
+def local_compliance(spec: Stage, pair: PairGeometry) -> float:
     """Secant of docs/theory eq. (7) for both bodies at the line load, m/N."""
     gear, roll = spec.gears[0], pair.path["C"]
     modulus = gear.material.youngs_modulus / (1 - gear.material.poisson_ratio**2)
@@ -98,11 +98,11 @@ def clamped_compliance(gear: GearSpec, shape: GearGeometry, roll: float, scale: 
     return total
 
 
-def test_formula_is_the_standards(spec: StageSpec) -> None:
+def test_formula_is_the_standards(spec: Stage) -> None:
     assert theoretical_stiffness(spec) == pytest.approx(15.78e9, rel=1e-3) and rack_factor(spec) == 0.975
 
 
-def test_secant_from_the_transmission_error(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
+def test_secant_from_the_transmission_error(plain: StageModel, spec: Stage, pair: PairGeometry) -> None:
     """One pair carries 300 N/mm at the pitch point, axes of the averaged bores held."""
     width = spec.gears[0].face_width
     kernel = plain.kernel(**{"level": 0.0, "effect.bearings": 0.0, "effect.tip_contact": 0.0})
@@ -122,7 +122,7 @@ def test_secant_from_the_transmission_error(plain: StageModel, spec: StageSpec, 
 
 
 @pytest.mark.full
-def test_secant_from_finite_elements_with_clamped_bores(spec: StageSpec, pair: PairGeometry) -> None:
+def test_secant_from_finite_elements_with_clamped_bores(spec: Stage, pair: PairGeometry) -> None:
     rolls = (pair.path["C"], pair.length - pair.path["C"])
     bodies = [clamped_compliance(*parts, scale=0.6) for parts in zip(spec.gears, pair.gears, rolls, strict=True)]
     secant = 1 / (spec.gears[0].face_width * (sum(bodies) + local_compliance(spec, pair)))

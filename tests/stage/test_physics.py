@@ -12,7 +12,8 @@ from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 
@@ -24,14 +25,14 @@ SPEED = 15.0  # rad/s of the pinion before free rattle
 UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 
-def free(spec: StageSpec, bodies: list[ReducedBody], bearing_damping: float) -> StageModel:
+def free(spec: Stage, bodies: list[ReducedBody], bearing_damping: float) -> StageModel:
     """Both shafts free, torque ports; bearings with the damping ratio given."""
     gears = tuple(
         gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})})
-        for gear in spec.gears
+        for gear in spec.written.gears
     )
-    ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
-    return assemble(spec.model_copy(update={"gears": gears, "ports": ports}), bodies)
+    ports = {gear.name: PortSpec(kind="torque") for gear in spec.written.gears}
+    return assemble(rewritten(spec, gears=gears, ports=ports), bodies)
 
 
 def rattle(
@@ -58,7 +59,7 @@ def compliance(model: StageModel, positions: float | np.ndarray, torque: float, 
 
 @pytest.mark.parametrize("level, h", [(0, 7.5e-6), (1, 5e-6), (1, 7.5e-6), (2, 5e-6)])
 def test_free_rattle_keeps_its_energy_and_its_backlash(
-    spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float
+    spec: Stage, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float
 ) -> None:
     """Some 80 impacts without damping, from three speeds: how often they meet in one run is chance. The energy goes up
     and down with the place on the flanks where the gears meet, by the same at every step size: rows depend on the roll,
@@ -80,7 +81,7 @@ def test_free_rattle_keeps_its_energy_and_its_backlash(
     assert np.median(impacts) > 40
 
 
-def test_energy_of_free_rattle_does_not_run_away(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_energy_of_free_rattle_does_not_run_away(spec: Stage, bodies: list[ReducedBody]) -> None:
     """Five times as long: the same bounds, no trend."""
     stored = rattle(free(spec, bodies, 0.0), bodies, duration=0.15, **UNDAMPED)["energy.stored"][1:]
     first, last = np.array_split(stored / stored[0], 5)[::4]
@@ -88,7 +89,7 @@ def test_energy_of_free_rattle_does_not_run_away(spec: StageSpec, bodies: list[R
     assert np.ptp(stored) < 2e-3 * stored[0] and abs(last.mean() - first.mean()) < 5e-4
 
 
-def test_damping_only_ever_takes_energy(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_damping_only_ever_takes_energy(spec: Stage, bodies: list[ReducedBody]) -> None:
     trace = rattle(free(spec, bodies, 0.03), bodies)
     stored = trace["energy.stored"][1:]
     assert np.diff(stored).max() < 1e-6 * stored[0] and stored[-1] < 0.9 * stored[0]
@@ -98,7 +99,7 @@ def test_damping_only_ever_takes_energy(spec: StageSpec, bodies: list[ReducedBod
     )
 
 
-def test_coast_flank_off(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_coast_flank_off(spec: Stage, bodies: list[ReducedBody]) -> None:
     trace = rattle(free(spec, bodies, 0.03), bodies, **{"effect.coast_flank": 0.0})
     assert np.all(trace["mesh.force_coast"] == 0) and trace["mesh.te"].min() < -1e-3  # one impact, then apart for good
 
@@ -145,11 +146,11 @@ def test_residual_off_is_for_level_paper_only(plain: StageModel) -> None:
     assert 0.4 < compliance(plain, 0.7, LOAD, level=4.0, **held) / compliance(plain, 0.7, LOAD, **held) < 0.98
 
 
-def test_hertz_off_makes_the_local_law_linear(plain: StageModel, spec: StageSpec) -> None:
+def test_hertz_off_makes_the_local_law_linear(plain: StageModel, spec: Stage) -> None:
     """One pair in contact, axes held: te is proportional to the torque, and the secant is that of the full law at
     torque_max."""
     off, on = ({"effect.bearings": 0.0, "effect.hertz": flag} for flag in (0.0, 1.0))
-    torques = np.array([1.0, 80.0, LOAD, spec.torque_max])
+    torques = np.array([1.0, 80.0, LOAD, spec.written.torque_max])
     straight, curved = (
         np.concatenate([compliance(plain, 0.75, torque, **flags) for torque in torques]) for flags in (off, on)
     )

@@ -16,6 +16,7 @@ import pytest
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
 from evidence.stability.planetary import ALL_MESHES, TORQUE, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.stage import StageModel, assemble
 
 H, STEPS = 5e-6, 400
@@ -88,11 +89,12 @@ def model(chosen: PlanetSet, damped: bool = False) -> StageModel:
     """The set, by default without the dashpots of its supports."""
     spec = set_spec(chosen)
     if not damped:
+        form = spec.written
         calm = {
-            name: getattr(spec, name).model_copy(update={part: _calm(getattr(getattr(spec, name), part))})
+            name: getattr(form, name).model_copy(update={part: _calm(getattr(getattr(form, name), part))})
             for name, part in (("sun", "bearing"), ("planet", "bearing"), ("carrier", "bearing"), ("ring", "mounts"))
         }
-        spec = spec.model_copy(update=calm)
+        spec = rewritten(spec, **calm)
     return assemble(spec, set_bodies())
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
@@ -90,10 +91,10 @@ def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(model: StageModel) ->
     """The same stiffness against turning, as a spin with a port or as an oscillator: the same statics. What a gear's
     bore yields beyond all modes reaches the engagement that has the port's row alone: 6e-5 of the carrier's angle."""
     spec = load_stage("planetary54")
-    mounts = spec.ring.mounts
-    k = mounts.points * mounts.stiffness * (spec.ring.rim_diameter / 2) ** 2
+    mounts = spec.written.ring.mounts
+    k = mounts.points * mounts.stiffness * (spec.written.ring.rim_diameter / 2) ** 2
     ports = spec.ports | {"ring": PortSpec(kind="spring", k=k, c=0.0)}
-    turning = assemble(spec.model_copy(update={"ports": ports}), load_bodies(spec))
+    turning = assemble(with_ports(spec, ports), load_bodies(spec))
     found = []
     for one in (model, turning):
         assert one.shafts.ratio == 0.25

@@ -19,8 +19,9 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
 from gearfmu.modes.linear import linearised
-from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.forms.turning import turns, with_ports
+from gearfmu.spec.forms.expand import rewritten, with_ports
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import turns
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.place import place_of
@@ -34,26 +35,25 @@ POSITIONS = 8
 PLANETS = [f"planet{k + 1}" for k in range(4)]
 
 
-def with_pins(spec: PlanetarySpec, **errors: tuple[float, float]) -> PlanetarySpec:
+def with_pins(spec: Stage, **errors: tuple[float, float]) -> Stage:
     """pin1=(radial, tangential) in m."""
     pins = {int(name[3:]): error for name, error in errors.items()}
-    return spec.model_copy(update={"set": spec.set.model_copy(update={"pin_errors": pins})})
+    return rewritten(spec, set=spec.written.set.model_copy(update={"pin_errors": pins}))
 
 
 @pytest.fixture(scope="module")
-def spec() -> PlanetarySpec:
+def spec() -> Stage:
     found = load_stage("planetary54")
-    assert isinstance(found, PlanetarySpec)
     return found
 
 
 @pytest.fixture(scope="module")
-def parts(spec: PlanetarySpec) -> list[Any]:
+def parts(spec: Stage) -> list[Any]:
     return load_bodies(spec)
 
 
 @pytest.fixture(scope="module")
-def model(spec: PlanetarySpec, parts: list[Any]) -> StageModel:
+def model(spec: Stage, parts: list[Any]) -> StageModel:
     return assemble(spec, parts)
 
 
@@ -124,7 +124,7 @@ def test_torque_on_the_input_over_mesh_force(model: StageModel, mesh: str) -> No
     torque_max, and the tangent stiffness of each mesh is positive."""
     place = place_of(model, mesh)
     assert abs(place.lever) == pytest.approx(16 * R_SUN, rel=1e-12)
-    assert place.most == pytest.approx(model.spec.torque_max * model.spec.set.load_sharing)
+    assert place.most == pytest.approx(model.stage.written.torque_max * model.stage.written.set.load_sharing)
     assert loaded_te(model, [TORQUE], 2, mesh=mesh).stage_stiffness.min() > 0
 
 
@@ -165,11 +165,13 @@ def test_progress_is_the_part_done_and_the_torque(model: StageModel) -> None:
 
 
 @pytest.mark.full
-def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: PlanetarySpec) -> None:
+def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: Stage) -> None:
     """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
     with the torque."""
     result = set_te(model, [0.0, 60.0, TORQUE], 2)
-    assert np.allclose(result.te[0], -spec.set.backlash * math.cos(spec.set.pressure_angle), atol=0.15e-6)
+    assert np.allclose(
+        result.te[0], -spec.written.set.backlash * math.cos(spec.written.set.pressure_angle), atol=0.15e-6
+    )
     assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
     other = set_te(model, [-TORQUE], 2)
     assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
@@ -177,7 +179,7 @@ def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: 
 
 @pytest.mark.full
 def test_a_pin_that_stands_forward_carries_more(
-    model: StageModel, spec: PlanetarySpec, parts: list[Any], ideal: SetTeResult
+    model: StageModel, spec: Stage, parts: list[Any], ideal: SetTeResult
 ) -> None:
     """The driving carrier presses with the planet whose pin stands ahead of its place; the sum stays, and twice the
     error shifts the load twice as far."""
@@ -191,7 +193,7 @@ def test_a_pin_that_stands_forward_carries_more(
     assert np.allclose(behind.sharing.mean(axis=1)[0, :, 2] - 1, -shift[1][:, 0], atol=5e-3)
 
 
-def test_torques_on_the_set_balance(spec: PlanetarySpec, parts: list[Any]) -> None:
+def test_torques_on_the_set_balance(spec: Stage, parts: list[Any]) -> None:
     """On the carrier, what holds the sun, and from the ring's mounts; the ratio is that of the teeth but for the slope
     of the tip relief."""
     held = spec.ports["sun"].model_copy(update={"kind": "fixed"})
@@ -271,7 +273,7 @@ def test_statics_find_their_equilibrium_at_level_fast(model: StageModel) -> None
 
 def test_a_pair_is_no_set(model: StageModel) -> None:
     with pytest.raises(ModelError, match="is no planetary set"):
-        set_te(replace(model, spec=load_stage("fzg_c")), [TORQUE], 2)
+        set_te(replace(model, stage=load_stage("fzg_c")), [TORQUE], 2)
 
 
 @pytest.mark.full

@@ -11,7 +11,7 @@ import pytest
 import gearfmu as gf
 from gearfmu import cli
 from gearfmu.errors import SpecError
-from gearfmu.spec.forms.turning import with_ports
+from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.spec.tables.profile import Profile, read_profile
 from gearfmu.stage.run.profiled import Line, Profiled, winding_torques
@@ -204,6 +204,6 @@ def test_a_set_on_torque_ports_is_driven_through_the_springs_of_its_file() -> No
     trace = gf.simulate(model, 400.0, 50.0, "2 ms", settle="1 ms", level="rigid").window(1e-3)
     assert trace["sun.tau"].mean() == pytest.approx(100.0, rel=1e-3)
     assert trace["sun.gear.w"].mean() == pytest.approx(200.0, rel=1e-3)
-    bare = replace(model, spec=with_ports(model.spec, {"sun": PortSpec(kind="torque")}))
+    bare = replace(model, stage=with_ports(model.stage, {"sun": PortSpec(kind="torque")}))
     with pytest.raises(gf.GearfmuError, match=r"ports.sun = torque: write k and c of its shaft"):
         gf.simulate(bare, 400.0, 50.0, "1 ms")

@@ -83,7 +83,7 @@ def test_every_level_runs_and_carries_the_load(relieved: StageModel, level: int,
     antisymmetric about mid-width: no symmetric load excites them, the model leaves them out."""
     trace = simulate(relieved, Steady(relieved, SPEED, LOAD), 4e-3, H, {"level": level})
     assert trace.meta["outcome"] == "completed" and trace.meta["n_dyn"] == modes
-    force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / relieved.spec.geometry.gears[0].r_b
+    force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / relieved.stage.written.geometry.gears[0].r_b
     print(f"level {level}: {trace.meta['n_dyn']} modes, h {trace.meta['h']:.3g} s, force {force:.0f} N")
     assert force == pytest.approx(expected, rel=0.03)
 
@@ -202,4 +202,4 @@ def test_meta_of_a_run_needs_nobody_to_complete_it(steady: Trace, relieved: Stag
     assert steady.meta["energy_residual"] == steady["energy.residual"][-1] / (work + stored)
     assert abs(steady.meta["energy_residual"]) < 1e-2 and steady.meta["H"] == H
     assert [gear for gear, *_ in steady.meta["meshes"].values()] == ["pinion"]
-    assert load_stage(steady.meta["stage"]) == load_stage(steady.meta["stage_path"]) == relieved.spec
+    assert load_stage(steady.meta["stage"]) == load_stage(steady.meta["stage_path"]) == relieved.stage

@@ -16,7 +16,7 @@ from slices import by_functions_alone
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.build.blob import read_blob, write_blob
@@ -33,8 +33,8 @@ SLICES = 10
 def involute() -> StageModel:
     """`helical_demo` without modifications: lines of contact end at full load."""
     demo = load_stage("helical_demo")
-    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in demo.gears)
-    return assemble(demo.model_copy(update={"gears": gears}), load_bodies(demo))
+    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in demo.written.gears)
+    return assemble(rewritten(demo, gears=gears), load_bodies(demo))
 
 
 def patches(apart: float, half: float) -> float:
@@ -122,11 +122,11 @@ def test_a_line_that_ends_inside_the_width_has_no_peak_at_its_end() -> None:
 
 
 def test_more_width_functions_than_the_kernel_takes_are_refused() -> None:
-    stage = as_general(load_stage("helical_demo"))
+    stage = load_stage("helical_demo")
     bodies = [SimpleNamespace(width_functions=count) for count in (9, 8)]
     with pytest.raises(ModelError, match="with 8 width functions: this stage takes at most 6: set width_functions = 6"):
         width_degrees(stage, bodies)
-    assert width_degrees(as_general(load_stage("fzg_c")), bodies).tolist() == [0, 2, 4, 6]
+    assert width_degrees(load_stage("fzg_c"), bodies).tolist() == [0, 2, 4, 6]
 
 
 @pytest.mark.parametrize("name", ["smeared", "smeared_tip"])

@@ -11,7 +11,8 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.forms.expand import with_ports
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
@@ -67,7 +68,7 @@ def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageMode
 
 
 def test_unloaded_te_of_a_relieved_pair_is_the_gap_of_the_nearest_flanks(
-    relieved: StageModel, relief_spec: StageSpec, pair: PairGeometry
+    relieved: StageModel, relief_spec: Stage, pair: PairGeometry
 ) -> None:
     """With the axes held: te₀ = min over the pairs in reach of the relief depths at the rolls of contact, to the shift
     of these rolls by te₀ itself (slope of the relief: < 1 %)."""
@@ -126,21 +127,21 @@ def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair
     assert np.allclose(result.stage_stiffness[1][same_pairs], slope[same_pairs], rtol=1e-3)
 
 
-def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: StageSpec) -> None:
+def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -> None:
     """1/k of the stage = 1/k of the mesh + Σ 1/k of the bearings, where both have the same pairs in contact; the mesh
     stiffness is that of held axes."""
     soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid) for rigid in (False, True))
     assert np.allclose(soft.mesh_stiffness, held.stage_stiffness, rtol=1e-10, atol=0)  # other sums of the same numbers
     assert np.array_equal(held.mesh_stiffness, held.stage_stiffness)
     behind = 1 / soft.stage_stiffness - 1 / soft.mesh_stiffness
-    expected = sum(1 / gear.bearing.stiffness for gear in spec.gears)
+    expected = sum(1 / gear.bearing.stiffness for gear in spec.written.gears)
     assert np.median(behind) == pytest.approx(expected, rel=2e-2)
 
 
-def test_bearings_add_their_compliance(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
+def test_bearings_add_their_compliance(plain: StageModel, spec: Stage, pair: PairGeometry) -> None:
     """Isotropic bearings: te grows by F(1/k₁ + 1/k₂); where the moved axes change which pairs carry, by up to a few
     percent more."""
-    expected = LOAD / pair.gears[0].r_b * sum(1 / gear.bearing.stiffness for gear in spec.gears)
+    expected = LOAD / pair.gears[0].r_b * sum(1 / gear.bearing.stiffness for gear in spec.written.gears)
     soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid).te[0] for rigid in (False, True))
     more = (soft - held) / expected
     assert np.allclose(np.median(more), 1.0, atol=2e-3) and np.allclose(more, 1.0, atol=6e-2)
@@ -156,11 +157,11 @@ def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
         assert np.abs(found).max() < 2e-5 and np.median(np.abs(found)) < 2e-6
 
 
-def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[ReducedBody]) -> None:
     """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
     chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
     ports = {shaft: port.model_copy(update={"chain": chain}) for shaft, port in spec.ports.items()}
-    chained = assemble(spec.model_copy(update={"ports": ports}), bodies)
+    chained = assemble(with_ports(spec, ports), bodies)
     assert np.array_equal(loaded_te(chained, [LOAD], 5).te, loaded_te(plain, [LOAD], 5).te)
 
 
@@ -190,7 +191,7 @@ def test_tip_relief_unloads_the_ends_of_contact(plain: StageModel, relieved: Sta
 
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
 def test_smooth_over_the_pitch(
-    name: str, torque: float, spec: StageSpec, relief_spec: StageSpec, bodies: list[ReducedBody]
+    name: str, torque: float, spec: Stage, relief_spec: Stage, bodies: list[ReducedBody]
 ) -> None:
     """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the
     tip corners have real harmonics, and the grid of rolls must not add to them."""

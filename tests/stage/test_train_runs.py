@@ -13,7 +13,6 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import RotorSpec, Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import shafts_of
@@ -82,7 +81,7 @@ def side_by_side(pair: Stage) -> Stage:
 def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, relieved) -> None:
     """Pairs that nothing connects do not know of each other, at different loads and speeds: the same bits as each alone
     at its place."""
-    pair = expand_pair(relief_spec)
+    pair = relief_spec
     both = assemble(side_by_side(pair), [*bodies, *bodies])
     there = {n: rotor.model_copy(update={"axis": (rotor.axis[0], 1.0)}) for n, rotor in pair.rotors.items()}
     apart = assemble(pair.model_copy(update={"rotors": there}), bodies)

@@ -11,7 +11,6 @@ import pytest
 from evidence.study.__main__ import main as program
 from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
-from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.study import Job, study
@@ -54,10 +53,9 @@ def test_another_speed_keeps_the_loads_in_balance() -> None:
 @pytest.mark.parametrize(("planets", "places"), [(3, None), (5, (0, 14, 29, 43, 58))])
 def test_planets_stand_as_evenly_as_teeth_allow(planets: int, places: tuple[int, ...] | None) -> None:
     spec = load_stage("planetary54")
-    assert isinstance(spec, PlanetarySpec)
     changed = with_planets(spec, planets)
-    assert (changed.set.planets, changed.set.positions) == (planets, places)
-    assert changed.carrier.mesh.scale < spec.carrier.mesh.scale
+    assert (changed.written.set.planets, changed.written.set.positions) == (planets, places)
+    assert changed.written.carrier.mesh.scale < spec.written.carrier.mesh.scale
 
 
 def test_only_levels_and_steps_are_drawn(tmp_path: Path) -> None:

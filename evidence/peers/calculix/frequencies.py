@@ -66,11 +66,11 @@ CASES = {
 def body_of(case: Case) -> tuple[Material, FeMesh]:
     """The body's material and the finite elements of one of its sectors."""
     spec = load_stage(case.stage)
-    if spec.kind == "planetary_set":
-        return getattr(spec, case.body).material, body_sector(spec, case.body, case.scale)
+    if spec.carriers:
+        return getattr(spec.written, case.body).material, body_sector(spec, case.body, case.scale)
     (gear,) = (gear for gear in spec.gears if gear.name == case.body)
     counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
-    return gear.material, gear_sector(gear_geometry(gear, spec.pair), gear.face_width, counts)
+    return gear.material, gear_sector(gear_geometry(gear, spec.written.pair), gear.face_width, counts)
 
 
 def ours(case: Case) -> np.ndarray:

@@ -34,7 +34,9 @@ from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_force
 from gearfmu.body import ReducedBody, load_body
 from gearfmu.body.store import save_body
 from gearfmu.geometry import PairGeometry, hertz
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.stage import assemble
@@ -95,20 +97,24 @@ class Ours:
     share: np.ndarray
 
 
-def stage(helix: int = 20, axes: str = "parallel") -> StageSpec:
+def stage(helix: int = 20, axes: str = "parallel") -> Stage:
     """The pair of this comparison. Another helix angle keeps the normal section: teeth, depths and profile shifts."""
     demo = load_stage("helical_demo")
     error = Misalignment(in_plane=0.0, out_of_plane=TILT * WIDTH, span=WIDTH) if axes == "tilted" else None
     beta = math.radians(helix)
-    wider = demo.pair.normal_module * (1 / math.cos(beta) - 1 / math.cos(demo.pair.helix_angle))  # a tooth's diameter
+    wider = demo.written.pair.normal_module * (
+        1 / math.cos(beta) - 1 / math.cos(demo.written.pair.helix_angle)
+    )  # a tooth's diameter
     gears = []
-    for gear in demo.gears:
+    for gear in demo.written.gears:
         body = gear.body.model_copy(update={"mesh": MESH, "roll_points": ROLLS, "width_functions": FUNCTIONS})
         changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body, "bore_coupling": "rigid"}
         gears.append(gear.model_copy(update=changes | {"tip_diameter": gear.tip_diameter + gear.teeth * wider}))
-    distance = demo.pair.center_distance + sum(gear.teeth for gear in gears) * wider / 2
-    pair = demo.pair.model_copy(update={"misalignment": error, "helix_angle": beta, "center_distance": distance})
-    return demo.model_copy(update={"gears": tuple(gears), "pair": pair})
+    distance = demo.written.pair.center_distance + sum(gear.teeth for gear in gears) * wider / 2
+    pair = demo.written.pair.model_copy(
+        update={"misalignment": error, "helix_angle": beta, "center_distance": distance}
+    )
+    return rewritten(demo, gears=tuple(gears), pair=pair)
 
 
 def bodies(work: Path, helix: int = 20) -> list[ReducedBody]:
@@ -130,7 +136,7 @@ def ours(case: Case, gears: list[ReducedBody]) -> Ours:
     state = kernel.transmission(at, torque)
     ends = [kernel.transmission(at, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
     slices = np.sum(list(state.forces.values()), axis=0).reshape(LAYERS, -1).sum(axis=1)
-    lever = spec.geometry.gears[0].r_b
+    lever = spec.written.geometry.gears[0].r_b
     return Ours(state.te, 2 * TANGENT * torque / lever / (ends[1] - ends[0]), slices / slices.sum())
 
 
@@ -155,10 +161,10 @@ def levels_of(divisions: tuple[int, ...]) -> np.ndarray:
 def problem_at(case: Case, te: float) -> Problem:
     """The contact problem of a case at the transmission error te (m)."""
     spec = stage(case.helix, case.axes)
-    pair = spec.geometry
+    pair = spec.written.geometry
     turn = 2 * math.pi / pair.gears[0].z * case.position / POSITIONS
     contacts = touching(pair, turn)
-    steel = spec.gears[0].material
+    steel = spec.written.gears[0].material
     e_star = hertz.contact_modulus((steel.youngs_modulus,) * 2, (steel.poisson_ratio,) * 2)
     radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
     wide = hertz.half_width(case.torque / pair.gears[0].r_b / WIDTH, radius, e_star)
@@ -171,7 +177,7 @@ def problem_at(case: Case, te: float) -> Problem:
         for g, gear in enumerate(pair.gears)
     ]
     phase = pair.wheel_phase - turn * pair.gears[0].r_b / pair.gears[1].r_b
-    error = spec.pair.misalignment
+    error = spec.written.pair.misalignment
     tilt = (0.0, 0.0) if error is None else (-error.out_of_plane / error.span, error.in_plane / error.span)
     return Problem(
         gears=(
@@ -187,7 +193,7 @@ def problem_at(case: Case, te: float) -> Problem:
 def row(case: Case, gears: list[ReducedBody], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
     2 % where ccx does not settle. RuntimeError when ccx gives up."""
-    mine, r_b = ours(case, gears), stage(case.helix, case.axes).geometry.gears[0].r_b
+    mine, r_b = ours(case, gears), stage(case.helix, case.axes).written.geometry.gears[0].r_b
     folder = work / f"helical_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "load_0.inp"

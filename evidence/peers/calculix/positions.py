@@ -34,7 +34,8 @@ from evidence.peers.calculix.sun_planet import set_bodies, sun_planet
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry, hertz
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
 
 POSITIONS = 12
@@ -57,7 +58,7 @@ class Place:
     increments: int = 1
 
 
-def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
+def te_of_gearfmu(spec: Stage, bores: str) -> TeResult:
     """Transmission error and tangent stiffness at all torques and positions."""
     if spec.name == "sun_planet":
         bodies = set_bodies()
@@ -66,7 +67,7 @@ def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
     return loaded_te(assemble(spec, bodies), TORQUES[spec.name], POSITIONS, rigid_bearings=True)
 
 
-def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> Case:
+def case_at(spec: Stage, pair: PairGeometry, torque: float, bores: str) -> Case:
     """Fine zone as wide as contact at this torque (N·m) needs it."""
     materials = [gear.material for gear in spec.gears]
     e_star = hertz.contact_modulus(
@@ -80,10 +81,10 @@ def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> C
     return Case("positions", bores=bores, fine=fine, penalty=PENALTY)
 
 
-def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+def solved(spec: Stage, ours: TeResult, place: Place, work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of one torque and position, made by running it unless `known` comes from the same deck."""
     torque, position = place.torque, place.position
-    pair, width, row = spec.geometry, spec.gears[0].face_width, TORQUES[spec.name].index(torque)
+    pair, width, row = spec.written.geometry, spec.gears[0].face_width, TORQUES[spec.name].index(torque)
     prefix = "" if spec.name == "fzg_c" else f"{spec.name}_"
     folder = work / f"{prefix}position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
     case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)

@@ -12,19 +12,19 @@ from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.stage import StageSpec
 
 
-def rigid_bore_bodies(spec: StageSpec) -> list[ReducedBody]:
+def rigid_bore_bodies(spec: Stage) -> list[ReducedBody]:
     """The stored bodies of a pair with the static tables of gears whose bores are rigid. Their modes stay as they were:
     of use at level rigid only."""
     return [_with_rigid_bore(spec, index, body) for index, body in enumerate(load_bodies(spec))]
 
 
-def _with_rigid_bore(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
+def _with_rigid_bore(spec: Stage, index: int, stored: ReducedBody) -> ReducedBody:
     gear = spec.gears[index]
-    geometry = gear_geometry(gear, spec.pair, (1, -1)[index])
+    geometry = gear_geometry(gear, spec.written.pair, (1, -1)[index])
     sector = gear_sector(geometry, gear.face_width, gear.body.mesh)
     body = SectorBody(sector, gear.material, *tooth_flank(geometry, gear), rigid_bore=True)
     tables = static_tables(body, [])

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.spec.forms.expand import rewritten
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.planetary import SetGearSpec
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import GearSpec
 
 TORQUES = (37.5, 75.0)  # N·m on the sun: its share at 600 N·m on the carrier, and twice that
 
 
-def sun_planet() -> StageSpec:
+def sun_planet() -> Stage:
     """The pair."""
-    of_set, form = load_stage("planetary54"), load_stage("fzg_c")
+    of_set, pair = load_stage("planetary54").written, load_stage("fzg_c")
+    form = pair.written
     fields = {name: getattr(of_set.set, name) for name in type(form.pair).model_fields if hasattr(of_set.set, name)}
     gears = tuple(_gear(*both) for both in zip(form.gears, (of_set.sun, of_set.planet), strict=True))
-    return form.model_copy(update={"name": "sun_planet", "pair": form.pair.model_copy(update=fields), "gears": gears})
+    return rewritten(pair, name="sun_planet", pair=form.pair.model_copy(update=fields), gears=gears)
 
 
 def _gear(form: GearSpec, gear: SetGearSpec) -> GearSpec:

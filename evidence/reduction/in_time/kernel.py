@@ -26,8 +26,8 @@ from gearfmu.body import reduce_bodies
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.spec.forms.expand import expand_pair
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.nodal import mesh_penalty
 
 HERE = Path(__file__).parent
@@ -37,10 +37,10 @@ SCHEME = Scheme(0.5e-6, 0.25e-3)
 SAMPLE = 1e-6
 
 
-def finite_elements(spec: StageSpec) -> tuple[dict[str, Solid], Assembly, np.ndarray]:
+def finite_elements(spec: Stage) -> tuple[dict[str, Solid], Assembly, np.ndarray]:
     """Both gears unreduced, in the place and with the speeds of START; sign of every joint in the force of the mesh:
     1 drive flanks, −1 coast flanks, 0 a bearing."""
-    mesh = spec.geometry
+    mesh = spec.written.geometry
     r_b = [shape.r_b for shape in mesh.gears]
     turn, back = 2 * np.pi * START.position, 0.5 * START.play / mesh.gears[0].r_b
     angles = (turn / mesh.gears[0].z - back, mesh.wheel_phase - turn / mesh.gears[1].z)
@@ -53,9 +53,9 @@ def finite_elements(spec: StageSpec) -> tuple[dict[str, Solid], Assembly, np.nda
     }
     entries = [(2 * k + i, name, solids[name].index("bore", ("ux", "uy")[i]), 1.0)
                for k, name in enumerate(solids) for i in (0, 1)]  # fmt: skip
-    stiffness = np.repeat([g.bearing.stiffness for g in spec.gears], 2)
+    stiffness = np.repeat([g.bearing.stiffness for g in spec.written.gears], 2)
     bearings = Joints(joint_rows(solids, entries, 4), stiffness, np.zeros(4), np.zeros(4, bool))
-    stage = expand_pair(spec)
+    stage = spec
     penalty = mesh_penalty(stage, stage.engagements[0])
     joints, _ = touching(bearings, np.full(4, "bearing"), solids, points, penalty)
     side = np.concatenate([np.zeros(4), points.side])
@@ -71,7 +71,7 @@ def force_of(assembly: Assembly, side: np.ndarray) -> np.ndarray:
     return -(integrate(assembly, SCHEME).tension @ side)[:: round(SAMPLE / SCHEME.step)]
 
 
-def kernel_force(spec: StageSpec, bodies: list, parameters: dict[str, float]) -> np.ndarray:
+def kernel_force(spec: Stage, bodies: list, parameters: dict[str, float]) -> np.ndarray:
     """The same of the kernel, between whose bores and axes nothing is damped."""
     off = {"effect.tip_relief": 0.0, "effect.tip_contact": 0.0}
     kernel = started(free_pair(spec, bodies), START, off | parameters)

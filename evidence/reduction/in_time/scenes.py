@@ -73,7 +73,10 @@ class Meshes:
 def carrier_planet(meshes: Meshes) -> Scene:
     """Fig. 3: the carrier is driven, the planet hangs on its pin."""
     spec = load_stage("planetary54")
-    solids = {"carrier": _carrier(spec, meshes), "planet": gear("planet", _planet(spec, meshes), spec.planet.material)}
+    solids = {
+        "carrier": _carrier(spec, meshes),
+        "planet": gear("planet", _planet(spec, meshes), spec.written.planet.material),
+    }
     joints, kinds = _supports(spec, solids)
     at_rest = (np.zeros(6), np.zeros(6))
     return Scene("carrier_planet", solids, _driven(solids, joints, at_rest), kinds, _steel(spec))
@@ -82,19 +85,19 @@ def carrier_planet(meshes: Meshes) -> Scene:
 def hammering(meshes: Meshes) -> Scene:
     """Fig. 4: the planet's teeth meet those of the sun."""
     spec = load_stage("planetary54")
-    geometry = set_geometry(spec)
+    geometry = set_geometry(spec.written)
     planet, sun = _planet(spec, meshes), _sun(spec, meshes, geometry)
     mesh = geometry.sun_mesh
     play = (mesh.normal_backlash - nominal_play(mesh)) / 2
     points = contact_points(planet, sun, GRID, {1: play, -1: play})
     solids = {
         "carrier": _carrier(spec, meshes),
-        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
-        "sun": gear("sun", sun, spec.sun.material, points.rows[1]),
+        "planet": gear("planet", planet, spec.written.planet.material, points.rows[0]),
+        "sun": gear("sun", sun, spec.written.sun.material, points.rows[1]),
     }
     joints, kinds = _supports(spec, solids)
     joints, kinds = touching(joints, kinds, solids, points, _penalty(spec, mesh))
-    turning, a = SPEED * np.eye(6)[5], spec.set.center_distance
+    turning, a = SPEED * np.eye(6)[5], spec.written.set.center_distance
     start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
     return Scene("hammering", solids, _driven(solids, joints, start), kinds, _steel(spec), points)
 
@@ -109,8 +112,8 @@ def _driven(solids: dict[str, Solid], joints: Joints, start: tuple[np.ndarray, .
 
 def _steel(spec: Any) -> hex20.Material:
     """The one material of all bodies."""
-    assert spec.carrier.material == spec.planet.material == spec.sun.material
-    return spec.carrier.material
+    assert spec.written.carrier.material == spec.written.planet.material == spec.written.sun.material
+    return spec.written.carrier.material
 
 
 def _ramp(time: float) -> float:
@@ -121,21 +124,21 @@ def _ramp(time: float) -> float:
 def _carrier(spec: Any, meshes: Meshes) -> Solid:
     carrier = carrier_of(spec)
     elements, couplings = carrier_elements(carrier, scaled_sector(carrier, meshes.carrier))
-    full = full_order("carrier", elements, couplings, Judgement(("bore",), spec.set.center_distance))
+    full = full_order("carrier", elements, couplings, Judgement(("bore",), spec.written.set.center_distance))
     return Solid(np.zeros(3), elements, tuple(couplings), full)
 
 
 def _planet(spec: Any, meshes: Meshes) -> Placed:
     """The planet of bolt 0, tooth 0 on +x."""
-    geometry = set_geometry(spec)
-    centre = np.array([spec.set.center_distance, 0.0])
-    return placed_gear(spec.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
+    geometry = set_geometry(spec.written)
+    centre = np.array([spec.written.set.center_distance, 0.0])
+    return placed_gear(spec.written.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
 
 
 def _sun(spec: Any, meshes: Meshes, geometry: PlanetaryGeometry) -> Placed:
     """The sun, turned so that the tooth or space that the planet shows it meets a space or tooth."""
-    angle = 0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth
-    return placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), angle, meshes.gear)
+    angle = 0.0 if spec.written.planet.teeth % 2 else np.pi / spec.written.sun.teeth
+    return placed_gear(spec.written.sun, geometry.sun_mesh.gears[0], np.zeros(2), angle, meshes.gear)
 
 
 def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scale: float) -> Placed:
@@ -161,9 +164,9 @@ def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_arra
 def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
     """Pin of the planet on bolt 0, bearings of carrier and sun on the ground: stiffness as in the stage file."""
     ends = {
-        "pin": (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
-        "carrier bearing": (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
-        "sun bearing": (spec.sun.bearing, (("sun", "bore", 1.0),)),
+        "pin": (spec.written.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
+        "carrier bearing": (spec.written.carrier.bearing, (("carrier", "bore", 1.0),)),
+        "sun bearing": (spec.written.sun.bearing, (("sun", "bore", 1.0),)),
     }
     stiffness, kinds, entries = [], [], []
     for kind, (bearing, sides) in ends.items():
@@ -222,8 +225,13 @@ def nominal_play(mesh: Any) -> float:
 
 def _penalty(spec: Any, mesh: Any) -> float:
     """N/m³, 3π E*/(8 b): an elastic foundation with Hertz's half-width b under TORQUE (theory, eq. 8j)."""
-    a, b = spec.sun.material, spec.planet.material
+    a, b = spec.written.sun.material, spec.written.planet.material
     modulus = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
     roll = mesh.path["C"]
-    load = TORQUE / (1 + spec.ring.teeth / spec.sun.teeth) / mesh.gears[0].r_b / spec.planet.face_width
+    load = (
+        TORQUE
+        / (1 + spec.written.ring.teeth / spec.written.sun.teeth)
+        / mesh.gears[0].r_b
+        / spec.written.planet.face_width
+    )
     return 3 * np.pi * modulus / (8 * half_width(load, roll * (mesh.length - roll) / mesh.length, modulus))

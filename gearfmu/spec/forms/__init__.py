@@ -1,1 +1,1 @@
-"""Forms of a stage file and their checks: pair, planetary set, general; all end in a Stage (`expand.as_general`)."""
+"""Forms of a stage file and their checks: pair, planetary set, general; all end in a Stage (`expand`)."""

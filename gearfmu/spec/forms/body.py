@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.geometry.planetary import HANDS
-from gearfmu.spec.forms.general import GearBody, RingBody
-from gearfmu.spec.forms.members import Form, Member, member_of
+from gearfmu.spec.forms.general import GearBody, RingBody, Stage
+from gearfmu.spec.forms.members import Member, member_of
 from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec
 from gearfmu.spec.tables.flanks import TOOTHING
 from gearfmu.spec.tables.imported import import_inputs
 
 
-def body_inputs(spec: Form, name: str) -> dict[str, Any]:
+def body_inputs(stage: Stage, name: str) -> dict[str, Any]:
     """Everything that shapes the body `name` of a stage, in SI, and nothing else.
 
     Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names, torques and
@@ -25,11 +25,11 @@ def body_inputs(spec: Form, name: str) -> dict[str, Any]:
     The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
-    if isinstance(spec, PlanetarySpec):
-        return _set_inputs(spec, name)
-    member = member_of(spec, name)
+    if isinstance(stage.written, PlanetarySpec):
+        return _set_inputs(stage.written, name)
+    member = member_of(stage, name)
     inputs = _ring_inputs(member.gear) if isinstance(member.gear, RingBody) else _gear_inputs(member.gear)
-    return inputs | _imported_inputs(member, inputs["body"], spec.source)
+    return inputs | _imported_inputs(member, inputs["body"], stage.source)
 
 
 def _gear_inputs(gear: GearBody) -> dict[str, Any]:

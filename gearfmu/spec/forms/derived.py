@@ -9,15 +9,16 @@ from typing import Any
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.planetary import PlanetaryGeometry
-from gearfmu.spec.forms.members import Form, carrier_of
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque, ring_half_width
-from gearfmu.spec.forms.shapes import mesh_shape, set_geometry
+from gearfmu.spec.forms.shapes import carrier_geometry, mesh_shape, set_geometry
 
 
-def derived(spec: Form) -> dict[str, Any]:
+def derived(stage: Stage) -> dict[str, Any]:
     """Working pressure angle, contact ratio, radii; of a general stage under the name of every mesh."""
+    spec = stage.written
     if isinstance(spec, PlanetarySpec):
         return _derived_set(spec)
     if not isinstance(spec, StageSpec):
@@ -57,7 +58,7 @@ def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
     """What follows from the numbers of a planetary set."""
     g = set_geometry(spec)
     shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
-    carrier = carrier_of(spec).geometry
+    carrier = carrier_geometry(spec)
     return {
         "speed_ratio_sun_to_carrier": g.ratio,
         "working_pressure_angle_deg": {

@@ -1,36 +1,71 @@
-"""Builders: a pair file and a planetary set in the terms of any stage."""
+"""A pair file and a planetary set in the terms of any stage, and stages whose files say something else."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.forms.general import (
     CarrierBody,
     EngagementSpec,
+    Form,
+    GearBody,
+    Origin,
     PlacedPort,
+    RingBody,
     RotorSpec,
     Stage,
     SupportSpec,
 )
 from gearfmu.spec.forms.general_checks import with_relief_rolls
-from gearfmu.spec.forms.members import CARRIER, Form, body_names, members, set_gear, set_ring
 from gearfmu.spec.forms.pair import StageSpec
-from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec
+from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque
 from gearfmu.spec.forms.shapes import planet_angles
+from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.tables.bearings import Bearing, RollingMount
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.spec.tables.ports import PortSpec
 
-Body = TypeVar("Body")
+CARRIER = "carrier"
 
 
-def as_general(spec: Form) -> Stage:
-    """The stage in the terms of any stage, whichever way its file is written. SpecError: `expand_set`."""
-    if isinstance(spec, PlanetarySpec):
-        return expand_set(spec)
-    return expand_pair(spec) if isinstance(spec, StageSpec) else spec
+def expand(form: Form | Stage) -> Stage:
+    """The stage that a file says, which keeps what is written there."""
+    if isinstance(form, PlanetarySpec):
+        return expand_set(form)
+    return form if isinstance(form, Stage) else expand_pair(form)
+
+
+def rewritten(stage: Stage, **fields: Any) -> Stage:
+    """The stage as if its file had other fields: those of `stage.written`."""
+    return expand(stage.written.model_copy(update=fields))
+
+
+def with_ports(stage: Stage, ports: Mapping[str, PortSpec]) -> Stage:
+    """The stage with other ports of the same names, at the places where they were."""
+    own = {
+        name: old.model_copy(update=_fields(PortSpec, ports[name])) if name in ports else old
+        for name, old in stage.written.ports.items()
+    }
+    return rewritten(stage, ports=own)
+
+
+def with_bores(stage: Stage, coupling: str) -> Stage:
+    """The stage with the bores of all its gears "averaging" or "rigid"; those of imported bodies too. Rims of rings and
+    shafts stay as they are. SpecError for a planetary set, whose gears keep averaging bores."""
+    form = stage.written
+    if isinstance(form, PlanetarySpec):
+        remedy = "the gears of a planetary set keep averaging bores: leave it away"
+        raise SpecError([Problem(str(stage.source), "bore", coupling, remedy)])
+    if isinstance(form, Stage):
+        gears = {gear.name: _coupled(gear, coupling) for gear in form.gears if not isinstance(gear, RingBody)}
+        return rewritten(stage, bodies=form.bodies | gears)
+    return rewritten(stage, gears=tuple(_coupled(gear, coupling) for gear in form.gears))
 
 
 def expand_pair(spec: StageSpec) -> Stage:
@@ -38,13 +73,13 @@ def expand_pair(spec: StageSpec) -> Stage:
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
     pinion, wheel = spec.gears
-    return Stage(
+    stage = Stage(
         name=spec.name,
         description=spec.description,
         source=spec.source,
         slices=spec.contact.slices,
         nodal=spec.contact.nodal,
-        bodies={name: member.gear for name, member in members(spec).items()},
+        bodies={gear.name: _pair_gear(gear, pair, hand) for gear, hand in zip(spec.gears, (1, -1), strict=True)},
         rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
         engagements=(
             EngagementSpec(
@@ -62,9 +97,11 @@ def expand_pair(spec: StageSpec) -> Stage:
         supports=tuple(_held(gear.name, gear.bearing) for gear in spec.gears),
         bearings=spec.bearings,
         operating=spec.operating,
-        ports={g.name: PlacedPort(**dict(spec.ports[g.name]), body=g.name) for g in spec.gears},
+        ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
+    stage._origin = Origin(spec, {g.name: f"gears.{g.name}" for g in spec.gears}, {}, spec.limits)
+    return stage
 
 
 def expand_set(spec: PlanetarySpec) -> Stage:
@@ -73,46 +110,38 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
     its own the ring turns in them, held by the port.
 
-    SpecError for what a set needs to move and does not say.
+    What a set needs to move and does not say is 0 or left out, and refused by `Stage.require_motion`.
     """
-    if problems := motion_problems(spec):
-        raise SpecError(problems)
-    assert spec.contact is not None
+    missing = tuple(motion_problems(spec))
     planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
-    bodies: dict[str, Any] = {"sun": set_gear(spec.sun, spec.set)}
+    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, spec.set)}
     for k, name in enumerate(planets):
         eccentricity = spec.set.planet_eccentricity.get(k, spec.planet.eccentricity)
-        bodies[name] = set_gear(spec.planet, spec.set, name=name, eccentricity=eccentricity)
-    bodies["ring"] = set_ring(spec.ring, spec.set)
-    carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
-    bodies["carrier"] = CarrierBody(**carrier, name="carrier", kind="carrier")
+        bodies[name] = _set_gear(spec.planet, spec.set, name=name, eccentricity=eccentricity)
+    bodies["ring"] = RingBody(
+        **_fields(RingSpec, spec.ring) | {"mounts": None}, kind="ring", **_angles(spec.set, HANDS["ring"])
+    )
+    bodies[CARRIER] = CarrierBody(**_fields(CarrierSpec, spec.carrier), name=CARRIER, kind="carrier")
+    own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
         name=spec.name,
         description=spec.description,
         source=spec.source,
-        slices=spec.contact.slices,
-        nodal=spec.contact.nodal,
         bodies=bodies,
         rotors=_set_rotors(spec, planets),
         engagements=_set_meshes(spec, planets),
         supports=_set_supports(spec, planets),
         ports={
-            name: PlacedPort(**dict(port), body=name, node="bore" if name == "carrier" else None)
+            name: _placed(port, body=name, node="bore" if name == "carrier" else None)
             for name, port in spec.ports.items()
         },
         levels=spec.levels,
+        **own,
     )
-    return with_relief_rolls(stage)
-
-
-def spread(spec: Form, bodies: Sequence[Body]) -> dict[str, Body]:
-    """One of `bodies` (or of what stands for them, such as their hashes), in the order of `body_names`, for every body
-    of `as_general(spec)` by name: the planets of a set share one."""
-    own = dict(zip(body_names(spec), bodies, strict=True))
-    if isinstance(spec, PlanetarySpec):
-        planets = {f"planet{k + 1}": own["planet"] for k in range(spec.set.planets)}
-        return {"sun": own["sun"], **planets, "ring": own["ring"], CARRIER: own[CARRIER]}
-    return own
+    stage, shared = with_relief_rolls(stage), dict.fromkeys(planets, "planet")
+    places = {name: name for name in bodies} | shared
+    stage._origin = Origin(spec, places, shared, spec.limits, spec.load_sharing, missing)
+    return stage
 
 
 def motion_problems(spec: PlanetarySpec) -> list[Problem]:
@@ -162,25 +191,24 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
 
 
 def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
-    assert spec.contact is not None and spec.speed_max is not None
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
-    contact = {name: getattr(spec.contact, name) for name in ("damping", "friction", "film")}
+    contact = {name: getattr(spec.contact, name, None) for name in ("damping", "friction", "film")}
     common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
-    torque, relative = mesh_torque(spec), spec.speed_max * z_r  # teeth past a planet in the carrier's axes
+    torque, relative = mesh_torque(spec), (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
+    moves = spec.contact is not None and spec.speed_max is not None
+    made = EngagementSpec if moves else partial(EngagementSpec.model_construct, misalignment=None)
     return tuple(
-        EngagementSpec(name=f"sun_{p}", gears=("sun", p), torque_max=torque, speed_max=relative / z_s, **common)
-        for p in planets
+        made(name=f"sun_{p}", gears=("sun", p), torque_max=torque, speed_max=relative / z_s, **common) for p in planets
     ) + tuple(
-        EngagementSpec(
-            name=f"ring_{p}", gears=(p, "ring"), torque_max=torque * z_p / z_s, speed_max=relative / z_p, **common
-        )
+        made(name=f"ring_{p}", gears=(p, "ring"), torque_max=torque * z_p / z_s, speed_max=relative / z_p, **common)
         for p in planets
     )
 
 
 def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec, ...]:
     sun, pin, carrier, mounts = spec.sun.bearing, spec.planet.bearing, spec.carrier.bearing, spec.ring.mounts
-    assert sun and pin and carrier and mounts
+    if not (sun and pin and carrier and mounts):
+        return ()
     all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
     return (
         _held("sun", sun),
@@ -208,3 +236,36 @@ def _held(body: str, bearing: Bearing | RollingMount, **where: Any) -> SupportSp
         name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
         damping_ratio=bearing.damping_ratio, **where,
     )  # fmt: skip
+
+
+def _coupled(gear: Any, coupling: str) -> Any:
+    if gear.imported is None:
+        return gear.model_copy(update={"bore_coupling": coupling})
+    return gear.model_copy(update={"imported": gear.imported.model_copy(update={"bore_coupling": coupling})})
+
+
+def _pair_gear(gear: GearSpec, pair: PairSpec, hand: int) -> GearBody:
+    """A gear of a pair in the terms of any stage; hand : sign of its helix angle over that of the pair."""
+    return GearBody(**_fields(GearSpec, gear) | {"bearing": None}, **_angles(pair, hand))
+
+
+def _set_gear(gear: SetGearSpec, of: SetSpec, **changes: Any) -> GearBody:
+    """Sun or planet in the terms of any stage."""
+    return GearBody(**_fields(SetGearSpec, gear) | {"bearing": None} | changes, **_angles(of, HANDS[gear.name]))
+
+
+def _placed(port: PortSpec, **where: Any) -> PlacedPort:
+    return PlacedPort(**_fields(PortSpec, port), **where)
+
+
+def _fields(kind: type[Spec], spec: Spec) -> dict[str, Any]:
+    return {name: getattr(spec, name) for name in kind.model_fields}
+
+
+def _angles(of: PairSpec | SetSpec, hand: int) -> dict[str, Any]:
+    """Module and angles of a gear of a pair or set."""
+    return {
+        "normal_module": of.normal_module,
+        "pressure_angle": of.pressure_angle,
+        "helix_angle": hand * of.helix_angle + 0.0,
+    }

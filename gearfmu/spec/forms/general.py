@@ -6,12 +6,15 @@ beginning.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, RingSpec
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
 from gearfmu.spec.tables.bearings import Bearings, CatalogueName, LaterFields, OperatingSpec, Side
 from gearfmu.spec.tables.gear import (
@@ -31,6 +34,11 @@ from gearfmu.spec.tables.gear import (
 from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.spec.tables.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, PortSpec
 
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.pair import StageSpec
+
+Form: TypeAlias = "StageSpec | PlanetarySpec"
+Of = TypeVar("Of")
 Place = Annotated[float, Quantity("place")]
 Axis = Annotated[float, Quantity("axis")]
 RadialSpring = Annotated[float, Quantity("bearing_stiffness", words=("rigid",))]
@@ -222,10 +230,33 @@ class PlacedPort(PortSpec):
     node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
 
 
+@dataclass(frozen=True)
+class Origin:
+    """The file of a pair or of a set, which a stage was expanded from; of a general stage nothing.
+
+    form: the file's own tables; places: of bodies, their tables there; files: of bodies that share one reduced body,
+    its name; limits, load_sharing: of the stage as a whole; missing: fields that it needs to move."""
+
+    form: Form | None = None
+    places: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+    limits: Limits = ()
+    load_sharing: float = 1.0
+    missing: tuple[Problem, ...] = ()
+
+
+_OF_FORMS = ("pair", "contact", "geometry", "torque_max", "speed_max", "set", "sun", "planet", "ring", "carrier")
+_OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
+
+
 class Stage(LaterFields):
-    """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file."""
+    """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file.
+
+    Files of kind external_pair and planetary_set are expanded into it (`expand`); `written` is what they say.
+    """
 
     later = ("operating", "bearings")
+    _origin: Origin = PrivateAttr(default_factory=Origin)
 
     name: Name = Field(description="name of the stage, also of its FMU")
     description: Text = Field(default="", description="one line about the stage")
@@ -256,15 +287,62 @@ class Stage(LaterFields):
             for name, body in value.items()
         }
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Stage:
+        """A copy with other fields; where the file of a pair or set could not say them, a general stage without it.
+        AttributeError for a name that is no field (`expand.rewritten` changes fields of the file)."""
+        if unknown := set(update or {}) - set(type(self).model_fields):
+            raise AttributeError(f"a Stage has no {', '.join(sorted(unknown))}: change what is written in its file")
+        found, form = super().model_copy(update=update, deep=deep), self._origin.form
+        if form is not None:
+            said = set(update or {}) <= _OF_BOTH & set(type(form).model_fields)
+            found._origin = replace(self._origin, form=form.model_copy(update=update)) if said else Origin()
+        return found
+
+    if not TYPE_CHECKING:  # as in BaseModel, so that checkers find names that are none
+
+        def __getattr__(self, name: str) -> Any:
+            if name in _OF_FORMS:
+                raise AttributeError(f"a Stage has no {name}: what the file of a pair or set says is in stage.written")
+            return super().__getattr__(name)
+
+    @property
+    def written(self) -> Form | Stage:
+        """What the file says: the tables of a pair or a set, else the stage itself."""
+        return self._origin.form or self
+
     @property
     def limits(self) -> Limits:
-        """None of the stage: every engagement has its own."""
-        return ()
+        """Torque and speed of the input of a pair or set; none of a general stage, whose engagements have their own."""
+        return self._origin.limits
 
     @property
     def load_sharing(self) -> float:
-        """1: every engagement has its own limit."""
-        return 1.0
+        """Torque that every mesh is made for, over its mean at the limit; 1 but for a set."""
+        return self._origin.load_sharing
+
+    def require_motion(self) -> None:
+        """SpecError with everything that a set needs to move and does not say."""
+        if self._origin.missing:
+            raise SpecError(self._origin.missing)
+
+    def file_of(self, body: str) -> str:
+        """Name of the reduced body of a toothed body or carrier: planets of a set share one."""
+        return self._origin.files.get(body, body)
+
+    def table_of(self, body: str) -> str:
+        """The table of a body in the stage file: "bodies.wheel1", "gears.pinion", "sun"."""
+        return self._origin.places.get(body, f"bodies.{body}")
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the reduced bodies: toothed ones, then carriers. Shafts need no reduction."""
+        return tuple(dict.fromkeys(self.file_of(body.name) for body in (*self.gears, *self.carriers)))
+
+    def by_name(self, bodies: Sequence[Of]) -> dict[str, Of]:
+        """One of `bodies` (or of what stands for them, such as their hashes), in the order of `files`, for every
+        toothed body and carrier by name."""
+        own = dict(zip(self.files, bodies, strict=True))
+        return {body.name: own[self.file_of(body.name)] for body in (*self.gears, *self.carriers)}
 
     @property
     def gears(self) -> tuple[ToothedBody, ...]:

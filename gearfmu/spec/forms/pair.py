@@ -55,11 +55,6 @@ class StageSpec(LaterFields):
         """Pinion and wheel at their centre distance. ValueError where the axes are too near."""
         return gears_in_mesh(self.pair, self.gears)
 
-    @property
-    def load_sharing(self) -> float:
-        """1: a single mesh shares no load."""
-        return 1.0
-
     @field_validator("gears", mode="before")
     @classmethod
     def _named(cls, value: Any) -> Any:

@@ -10,7 +10,6 @@ from typing import Any
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
-from gearfmu.spec.tables.ports import PortSpec
 
 
 @dataclass(frozen=True)
@@ -124,18 +123,7 @@ def meshings(stage: Stage) -> dict[str, Meshing]:
     }
 
 
-def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:
-    """The StageSpec or Stage with other ports of the same names, at the places where they were."""
-    own = {
-        name: old.model_copy(update={field: getattr(ports[name], field) for field in PortSpec.model_fields})
-        if name in ports
-        else old
-        for name, old in spec.ports.items()
-    }
-    return spec.model_copy(update={"ports": own})
-
-
-def undriven(stage: Any, driven: Collection[str], remedy: str) -> list[Problem]:
+def undriven(stage: Stage, driven: Collection[str], remedy: str) -> list[Problem]:
     """Every spring port that is not among those `driven`; remedy: what to do about it, {name} stands for the port."""
     return [
         Problem(str(stage.source), f"ports.{name}.kind", '"spring"', remedy.format(name=name))
@@ -144,7 +132,7 @@ def undriven(stage: Any, driven: Collection[str], remedy: str) -> list[Problem]:
     ]
 
 
-def require_driven(stage: Any, driven: Collection[str], by: str) -> None:
+def require_driven(stage: Stage, driven: Collection[str], by: str) -> None:
     """SpecError where a spring port beside those `driven` would have to be, which `by` ("a scene") does not do."""
     remedy = f"{by} drives {' and '.join(driven)} only: make this port one of kind torque or fixed"
     if problems := undriven(stage, driven, remedy):

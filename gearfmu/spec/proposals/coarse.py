@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.files import write_text
+from gearfmu.spec.forms.general import Form, Stage
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -32,7 +33,7 @@ def coarse_stage(stage: str | os.PathLike[str], folder: str | os.PathLike[str] |
 
     Raises SpecError where the stage is not valid.
     """
-    source, spec = find_stage(stage), load_stage(stage)
+    source, spec = find_stage(stage), load_stage(stage).written
     target = (source.parent / FOLDER if folder is None else Path(folder)) / source.name
     base = Path(os.path.relpath(source, target.parent)).as_posix()
     lines = [f'base = "{base}"', f'name = "{spec.name[:33]}_coarse"', f'description = "{_description(spec)}"']
@@ -43,12 +44,12 @@ def coarse_stage(stage: str | os.PathLike[str], folder: str | os.PathLike[str] |
     return target
 
 
-def _description(spec: Any) -> str:
+def _description(spec: Form | Stage) -> str:
     text = spec.description.replace("\\", "\\\\").replace('"', '\\"')
     return f"coarse: {text}" if text else "coarse"
 
 
-def _tables(spec: Any) -> list[tuple[str, dict[str, Any]]]:
+def _tables(spec: Form | Stage) -> list[tuple[str, dict[str, Any]]]:
     """Tables that say what is coarser; of bodies meshed elsewhere the counts of our own mesh mean nothing."""
     prefix = {"planetary_set": "", "external_pair": "gears."}.get(spec.kind, "bodies.")
     found = [(f"{prefix}{gear.name}.body.mesh", {"scale": SCALE * gear.body.mesh.scale}) for gear in spec.gears]

@@ -15,11 +15,12 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.reading.base import Quantity, fields_by_key, inner_model, metadata_of, model_of_table, read_toml
 from gearfmu.spec.reading.layers import read_layers
 from gearfmu.spec.reading.library import find_stage
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
 _DESCRIPTION = "made like {like}; describe it here in one line"
@@ -37,7 +38,7 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
     """
     target = _target(name, folder)
     source = find_stage(like)
-    if load_stage(source).kind == "general":
+    if load_stage(source).written.kind == "general":
         text = _renamed(source, name, str(like))
     else:
         own = {"name": name, "description": _DESCRIPTION.format(like=like)}

@@ -51,6 +51,6 @@ def _shipped_of_name(name: str) -> Path | None:
     return next((path for path in files if read_toml(path).get("name") == name), None)
 
 
-def model_folder(spec: Any) -> Path:
-    """The folder of a StageSpec's file, which also holds its bodies, `<gear name>.h5`."""
-    return Path(spec.source).parent
+def model_folder(stage: Any) -> Path:
+    """The folder of a stage's file, which also holds its bodies, `<gear name>.h5`."""
+    return Path(stage.source).parent

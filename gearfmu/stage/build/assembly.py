@@ -13,9 +13,7 @@ import numpy as np
 
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stored import stored, stored_files
 from gearfmu.spec.tables.ports import PortSpec
@@ -23,10 +21,8 @@ from gearfmu.stage.build.blob import origin, with_guid, write_blob
 from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.build.far import far_sections
 from gearfmu.stage.build.fields import order_sections
-from gearfmu.stage.build.film import film_starts
 from gearfmu.stage.build.flanks import deviation_sections
 from gearfmu.stage.build.free import Flank
-from gearfmu.stage.build.friction import friction_starts
 from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
@@ -34,6 +30,7 @@ from gearfmu.stage.build.meshes import stage_sections, tooth_phases
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.nodal import nodal_sections
 from gearfmu.stage.build.observed import observed_number, observed_sections
+from gearfmu.stage.build.oil import film_starts, friction_starts
 from gearfmu.stage.build.rolling import Settled, Statics, Tangents, settle
 from gearfmu.stage.build.slices import smeared, smeared_tip
 from gearfmu.stage.build.spinning import turn_rates
@@ -49,45 +46,45 @@ FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is h
 
 
 def assemble(
-    spec: Form,
+    stage: Stage,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
 ) -> StageModel:
-    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; of a set its sun, planet,
-    ring and carrier; rolls: of the even grid along a flank; observe: names of gears whose rigid motion and modal
-    amplitudes are outputs.
+    """The general model of a stage. bodies: reduced, in the order of `stage.files`; rolls: of the even grid along a
+    flank; observe: names of gears whose rigid motion and modal amplitudes are outputs.
 
-    ModelError when a body does not belong to its gear, and for a name in `observe` that is no gear of the stage.
+    SpecError where the stage does not say all that it needs to move; ModelError when a body does not belong to its
+    gear, and for a name in `observe` that is no gear of the stage.
     """
+    stage.require_motion()
     hashes = tuple(body.input_hash for body in bodies)
-    made_of = {"made_of": _made_of(spec, bodies, rolls, observe)}
-    found = general_sections(spec, bodies, rolls, observe, tangents_of(spec, bodies))
+    made_of = {"made_of": _made_of(stage, bodies, rolls, observe)}
+    found = general_sections(stage, bodies, rolls, observe, tangents_of(stage, bodies))
     sections = order_sections(with_guid(found | made_of))
-    model = StageModel(spec, write_blob(sections), hashes)
-    starts = friction_starts(model.stage) | film_starts(model.stage)
+    model = StageModel(stage, write_blob(sections), hashes)
+    starts = friction_starts(stage) | film_starts(stage)
     return model.with_starts(starts) if starts else model
 
 
-def _made_of(spec: Form, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
+def _made_of(stage: Stage, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
     """Hash of all that a model is made of but the kinds of its ports."""
-    stage, found = as_general(spec), spread(spec, bodies)
     tables = stored(stage) | {"description": ""}
     for port in tables["ports"].values():
         port.pop("kind", None)
-    hashes = {name: body.input_hash for name, body in found.items()}
+    hashes = {name: body.input_hash for name, body in stage.by_name(bodies).items()}
     return origin(MODEL_VERSION, tables, stored_files(stage), hashes, rolls, list(observe))
 
 
 def general_sections(
-    spec: Form,
+    stage: Stage,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
     tangents: Tangents = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name. tangents: of the rolling bearings."""
-    stage, bodies, carriers = _parted(spec, bodies)
+    bodies, carriers = _parted(stage, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
@@ -130,34 +127,33 @@ def general_sections(
     return sections
 
 
-def stage_group(spec: Form, bodies: Sequence[Any]) -> Group:
+def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
-    tangents = tangents_of(spec, bodies)
-    stage, bodies, carriers = _parted(spec, bodies)
+    tangents = tangents_of(stage, bodies)
+    bodies, carriers = _parted(stage, bodies)
     return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
 
 
-def tangents_of(spec: Form, bodies: Sequence[object]) -> Tangents:
+def tangents_of(stage: Stage, bodies: Sequence[object]) -> Tangents:
     """(d, d) stiffness of every rolling bearing at the operating torque, by the name of its support; bodies as of
     `assemble`. ModelError: `settle`."""
-    return settled(spec, bodies).tangents if as_general(spec).rolling else {}
+    return settled(stage, bodies).tangents if stage.rolling else {}
 
 
-def settled(spec: Form, bodies: Sequence[object], torque: float | None = None) -> Settled:
+def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None) -> Settled:
     """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None. ModelError where
     it has none, and as of `settle`."""
-    stage = as_general(spec)
     if not stage.rolling:
         raise ModelError(
             f"{stage.name} has no rolling bearings: give some of its supports one (docs/howto-bearings.md)"
         )
     assert stage.operating is not None
     at = stage.operating.torque if torque is None else torque
-    key = f"{_made_of(spec, bodies, ROLLS, ())} {at!r}"
+    key = f"{_made_of(stage, bodies, ROLLS, ())} {at!r}"
     if key not in _SETTLED:
 
         def statics_with(tangents: Tangents) -> Statics:
-            found = order_sections(general_sections(spec, bodies, ROLLS, (), tangents))
+            found = order_sections(general_sections(stage, bodies, ROLLS, (), tangents))
             return Statics.of(found, write_blob(found))
 
         while len(_SETTLED) >= _KEPT:
@@ -166,10 +162,10 @@ def settled(spec: Form, bodies: Sequence[object], torque: float | None = None) -
     return _SETTLED[key]
 
 
-def _parted(spec: Form, bodies: Sequence[Any]) -> tuple[Stage, Sequence[Any], dict[str, InterfaceBody]]:
-    """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
-    stage, found = as_general(spec), spread(spec, bodies)
-    return stage, [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
+def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
+    """The bodies of the stage's gears in their order, and its carriers' by name."""
+    found = stage.by_name(bodies)
+    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:

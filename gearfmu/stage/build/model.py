@@ -12,10 +12,9 @@ import numpy as np
 
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Kernel, Variable
-from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import Form, body_names
-from gearfmu.spec.forms.turning import Shafts, shafts_of, with_ports
+from gearfmu.spec.forms.turning import Shafts, shafts_of
 from gearfmu.stage.build.blob import blob_hash, read_blob, with_guid, write_blob
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.build.shown import Card, Shown, grouped
@@ -34,9 +33,9 @@ def integrator_of(level: str, asked: str, clutch: bool) -> str:
 
 @dataclass(frozen=True, repr=False)
 class StageModel(Shown):
-    """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
+    """A stage ready to run: the blob is all the kernel needs; stage and bodies' hashes say where it came from."""
 
-    spec: Form
+    stage: Stage
     blob: bytes
     body_hashes: tuple[str, ...]
 
@@ -47,8 +46,8 @@ class StageModel(Shown):
         meshes = [f"{mesh.name}: {' with '.join(mesh.gears)}" for mesh in self.stage.engagements]
         ports = [f"{name}: {port.kind}" for name, port in self.stage.ports.items()]
         names = {sort: [v.name for v in known if v.causality == sort] for sort in ("input", "parameter", "output")}
-        spec = self.spec
-        most = " and ".join(quantity_text(value, unit) for value, unit in spec.limits if value is not None)
+        limits, kind = self.stage.limits, self.stage.written.kind
+        most = " and ".join(quantity_text(value, unit) for value, unit in limits if value is not None)
         rows = [
             ("ports", ", ".join(ports) + "; input first, then output"),
             ("meshes", ", ".join(meshes)),
@@ -57,16 +56,11 @@ class StageModel(Shown):
               for sort, own in names.items()),
             ("size", f"{len(self.blob) / 1e6:.2f} MB, model {self.hash[:12]}"),
         ]  # fmt: skip
-        return Card(f"Stage {self.name} ({spec.kind}{', up to ' * bool(most)}{most}): {spec.description}", rows, 3)
+        return Card(f"Stage {self.name} ({kind}{', up to ' * bool(most)}{most}): {self.stage.description}", rows, 3)
 
     @property
     def name(self) -> str:
-        return self.spec.name
-
-    @cached_property
-    def stage(self) -> Stage:
-        """The stage in the terms of any stage: a pair file or a set expanded."""
-        return as_general(self.spec)
+        return self.stage.name
 
     @cached_property
     def shafts(self) -> Shafts:
@@ -76,7 +70,7 @@ class StageModel(Shown):
     @property
     def bodies(self) -> dict[str, str]:
         """Hash of every reduced body that the model was made from, by name: of a set sun, planet, ring, carrier."""
-        return dict(zip(body_names(self.spec), self.body_hashes, strict=True))
+        return dict(zip(self.stage.files, self.body_hashes, strict=True))
 
     @property
     def hash(self) -> str:
@@ -106,7 +100,7 @@ class StageModel(Shown):
         if all(port.kind == "spring" and port.chain is None for port in ports.values()):
             return self
         refused = [
-            Problem(str(self.spec.source), f"ports.{name}", port.kind, remedy)
+            Problem(str(self.stage.source), f"ports.{name}", port.kind, remedy)
             for name, port in ports.items()
             if (remedy := port.no_spring)
         ]
@@ -117,7 +111,7 @@ class StageModel(Shown):
         kinds[[list(self.stage.ports).index(name) for name in two], 1] = SPRING
         changed: dict[str, Any] = {name: port.model_copy(update={"kind": "spring"}) for name, port in ports.items()}
         return replace(
-            self, spec=with_ports(self.spec, changed), blob=write_blob(with_guid(sections | {"port_kinds": kinds}))
+            self, stage=with_ports(self.stage, changed), blob=write_blob(with_guid(sections | {"port_kinds": kinds}))
         )
 
     def modes_of_levels(self) -> dict[str, int]:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import as_general, spread
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.free import NODE_MEMBERS
 from gearfmu.stage.build.groups import Group, families
@@ -50,13 +49,12 @@ def observed_sections(index: int, bodies: Sequence[Any], groups: Sequence[Group]
     return found
 
 
-def gear_bodies(spec: Any, bodies: Sequence[Any]) -> dict[str, Any]:
-    """One of `bodies` (or what stands for them, such as their hashes) for every gear of a stage by name: of a set its
-    sun, planet, ring and carrier are given."""
-    found = spread(spec, bodies)
-    return {gear.name: found[gear.name] for gear in as_general(spec).gears}
+def gear_bodies(stage: Stage, bodies: Sequence[Any]) -> dict[str, Any]:
+    """`Stage.by_name` of the gears alone."""
+    found = stage.by_name(bodies)
+    return {gear.name: found[gear.name] for gear in stage.gears}
 
 
 def gear_hashes(model: StageModel) -> dict[str, str]:
     """Hash of the reduced body of every gear of a model."""
-    return gear_bodies(model.spec, model.body_hashes)
+    return gear_bodies(model.stage, model.body_hashes)

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, pass_orders, pass_swing
-from gearfmu.spec.forms.expand import as_general
-from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.assembly import settled
 from gearfmu.stage.build.rolling import BALL_NUMBERS, ROLLER_NUMBERS, filled
 from gearfmu.stage.build.shown import Card, Shown
@@ -87,10 +86,10 @@ class Bearings(Shown):
         return found
 
 
-def stage_bearings(spec: Form, bodies: Sequence[object], torque: float | None = None) -> Bearings:
+def stage_bearings(stage: Stage, bodies: Sequence[object], torque: float | None = None) -> Bearings:
     """The rolling bearings of a stage under a torque on its input, N·m; that of the file when None. ModelError where it
     has none, and where one cannot carry its load."""
-    stage, found = as_general(spec), settled(spec, bodies, torque)
+    found = settled(stage, bodies, torque)
     states = []
     for support in stage.supports:
         if support.bearing is None:

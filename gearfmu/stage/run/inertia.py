@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.forms.turning import turns
 from gearfmu.stage.build.assembly import stage_group
@@ -128,13 +126,13 @@ def largest_forces(stage: Stage) -> dict[str, float]:
     return forces
 
 
-def whirling(spec: Form, bodies: Sequence[Any]) -> tuple[float, float, list[str]]:
+def whirling(stage: Stage, bodies: Sequence[Any]) -> tuple[float, float, list[str]]:
     """At the largest speeds `whirl_shift` below WHIRL_BAND, the largest `GearInertia.whirl`, and gears whose files do
     not tell; bodies as of `assemble`."""
-    stage, toothed = as_general(spec), gear_bodies(spec, bodies)
+    toothed = gear_bodies(stage, bodies)
     coupled = max((gear.whirl for gear in inertia_terms(stage, toothed)), default=0.0)
     silent = sorted({body.name for body in toothed.values() if body.spin is None})
-    return whirl_shift(stage, stage_group(spec, bodies), WHIRL_BAND), coupled, silent
+    return whirl_shift(stage, stage_group(stage, bodies), WHIRL_BAND), coupled, silent
 
 
 def whirl_shift(stage: Stage, group: Group, cut: float) -> float:

@@ -26,7 +26,7 @@ def places_of(model: StageModel) -> list[MeshPlace]:
 def largest_torque(model: StageModel) -> float:
     """Torque on the input (N·m) that brings no engagement beyond its torque_max: of a set the torque_max of its file,
     as its meshes are made for load_sharing times their share."""
-    return min(place.most for place in places_of(model)) / model.spec.load_sharing
+    return min(place.most for place in places_of(model)) / model.stage.load_sharing
 
 
 def engagements_per_turn(model: StageModel) -> list[float]:

@@ -194,7 +194,7 @@ def _meta(model: StageModel, kernel: Kernel) -> dict[str, Any]:
     level = kernel.variables["level"].items[int(kernel.get("level"))]
     return {
         "stage": model.name,
-        "stage_path": str(model.spec.source),
+        "stage_path": str(model.stage.source),
         "meshes": {mesh: known.plain for mesh, known in meshings(model.stage).items()},
         "coupling_error": None,
         "level": level,

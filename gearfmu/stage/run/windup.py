@@ -17,7 +17,7 @@ def wound_starts(model: StageModel, torque: float, speed: float = 0.0) -> dict[s
     ratio i. Torque ports: torques, and parameters w_start. A fixed output gives way by T i/k. SpecError for a fixed
     input and for ports with a clutch, which decides the torque."""
     shafts, ports = model.shafts, model.stage.ports
-    source, ends = str(model.spec.source), (ports[shafts.input], ports[shafts.output])
+    source, ends = str(model.stage.source), (ports[shafts.input], ports[shafts.output])
     if ends[0].kind == "fixed" or any(port.chain is not None for port in ends):
         remedy = "a start under torque needs an input that is no fixed port, and ports without a clutch"
         raise SpecError([Problem(source, "ports", ", ".join(ports), remedy)])

@@ -1,5 +1,5 @@
-"""Squeeze film between open flanks: what a stage file says → starts of the kernel's parameters, and what a film can
-stop."""
+"""Friction and squeeze film of the flanks: what a stage file says → starts of the kernel's parameters; and what a film
+can stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,29 @@ from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.spec.forms.shapes import face_width, mesh_shape
 
 REACH = kernel_number("FILM_REACH")  # m: flanks further apart know no film
+LAWS = ("constant", "benedict_kelley", "iso_tr_14179")  # of friction, in the kernel's order
 NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
+
+
+def friction_starts(stage: Stage) -> dict[str, float]:
+    """Parameter → start. Empty where no engagement says anything about friction; else it is on, and an engagement that
+    says nothing has none."""
+    if not any(mesh.friction for mesh in stage.engagements):
+        return {}
+    starts = {"effect.friction": 1.0}
+    for mesh in stage.engagements:
+        prefix = f"{mesh.name}." if len(stage.engagements) > 1 else ""
+        own = mesh.friction
+        if own is None:
+            starts[f"{prefix}friction_coefficient"] = 0.0
+            continue
+        starts |= {
+            f"{prefix}friction_law": float(LAWS.index(own.law)),
+            f"{prefix}friction_coefficient": own.coefficient,
+            f"{prefix}oil_viscosity": own.viscosity,
+            f"{prefix}flank_roughness": own.roughness,
+        }
+    return starts
 
 
 def film_starts(stage: Stage) -> dict[str, float]:
