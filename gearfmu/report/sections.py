@@ -15,7 +15,6 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
-from gearfmu.spec.forms.expand import as_general
 from gearfmu.stage import assemble
 from gearfmu.stage.run.refinement import left_of_slices
 from gearfmu.stage.run.trace import Trace
@@ -209,7 +208,7 @@ def _left_of_slices(run: Run) -> str:
     torque = run.summary.get("torque")
     if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
         return ""
-    if len(as_general(run.spec).engagements) != 1:
+    if len(run.spec.engagements) != 1:
         return ""
     left = left_of_slices(assemble(run.spec, run.bodies), [torque], slices=int(run.summary.get("slices") or 0))
     return left.text if left else ""
