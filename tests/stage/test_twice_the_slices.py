@@ -14,6 +14,7 @@ from gearfmu.planning.choice import space
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.run import refinement
 from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, left_of_slices, twice
 
 
@@ -51,6 +52,27 @@ def test_te_says_what_the_slices_leave_open(
         cli.main(["te", "helical_demo", "--torque", "100 N*m", "--positions", "4", "--rigid-bearings"])
     said = left_of_slices(helical, [100.0], rigid_bearings=True).text
     assert not ended.value.code and said in capsys.readouterr().out and "14 slices" in said
+
+
+@pytest.mark.parametrize(
+    ("stage", "option", "said"),
+    [
+        ("helical_demo", [], 1),
+        ("helical_demo", ["--once"], 0),
+        ("two_stage", [], 0),
+        ("two_stage", ["--twice-slices"], 2),
+    ],
+)
+def test_te_says_it_of_pairs_and_where_it_is_asked(
+    stage: str, option: list[str], said: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once a mesh; trains and sets, where it takes long, on request alone."""
+    asked: list[str] = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(refinement, "left_of_slices", lambda *of, **parameters: asked.append(stage))
+    with pytest.raises(SystemExit):
+        cli.main(["te", stage, "--torque", "100 N*m", "--positions", "2", *option])
+    assert len(asked) == said
 
 
 @pytest.mark.parametrize(("name", "times"), [("train_runup", 2), ("pair_loaded", 1)])
