@@ -18,7 +18,6 @@ static const double TOLERANCE = 3e-7;          /* of the largest gap and deflect
 static const double AT_REST_TOLERANCE = 2e-8;  /* of statics */
 static const double FRICTION_TOLERANCE = 1e-7; /* of the largest normal force */
 #endif
-static const double ROUGHLY = 1e-4;     /* forces of the first solution, whose others are those of the last step */
 static const double SOON = 1e-4;        /* from here on the next pass may be the last, and reads what stores energy */
 static const double NEGLIGIBLE = 1e-12; /* m, rad: of a gap and deflection that are none */
 
@@ -73,7 +72,6 @@ static double solve_own(const gk_coupled *c, int e, int round)
 {
     gk_engaged *engaged = &c->work->engaged[e];
     engaged->system.dashpots_stand = round >= SETTLED;
-    engaged->system.enough = round || c->sweeps || c->known ? GK_SOLVED : ROUGHLY;
     if (GK_ON(c->setup, friction))
         return gk_friction_solve(engaged->glide, &engaged->system, round, engaged->system.alpha != 0.0);
     gk_solve_contacts(&engaged->system);

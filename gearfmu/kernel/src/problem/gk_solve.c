@@ -11,13 +11,15 @@
 #include "problem/gk_system.h"
 
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40 };
-/* of λ0 + λ1: damper of a contact that closes or opens */
+/* SOLVED: of the last move; what is left after it is some hundredths of that. PART_KNOWN: of λ0 + λ1, damper of a
+ * contact that closes or opens */
 #ifdef GK_DOUBLE_MODES
 enum { DASHPOT_ROUNDS = 24 };
-static const double PART_KNOWN = 1e-12;
+static const double SOLVED = 1e-11, PART_KNOWN = 1e-12;
 #else
 enum { DASHPOT_ROUNDS = 8 };
-static const double PART_KNOWN = 1e-3;
+static const double SOLVED = 1e-7, PART_KNOWN = 1e-3;
+#endif
 #endif
 
 static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
@@ -189,7 +191,7 @@ static int move(gk_system *s, const double *x, double *e, double *change)
     gk_law_apply(s);
     for (int q = 0; q < quads; q++) bent[q] += delta[q];
     *change = gk_largest(&most);
-    return ((GK_HAS(hertz) && s->curved) || gk_film_on(s)) && *change > s->enough * gk_largest(&size);
+    return ((GK_HAS(hertz) && s->curved) || gk_film_on(s)) && *change > SOLVED * gk_largest(&size);
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */

@@ -13,13 +13,6 @@
 /* how much of a damper's force at the end of the last step goes into that of this one (docs/theory.md, 3.2) */
 #define GK_MEMORY 0.25
 
-/* of the last move of a solution: some hundredths of that are left after it */
-#ifdef GK_DOUBLE_MODES
-#define GK_SOLVED 1e-11
-#else
-#define GK_SOLVED 1e-7
-#endif
-
 enum {
     MAX_JOINTS = 2 * JOINTS, /* of one engagement */
     MAX_ROWS = MAX_CONTACTS + MAX_JOINTS,
@@ -82,7 +75,6 @@ typedef struct gk_system {
     double energy_correction;  /* what of it this step should make good */
     double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
     double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
-    double enough;             /* move of forces, of the largest, that is worth no further chord step */
     int coupled, factored;     /* it has neighbours; the tangent's factors are those of its status */
     int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
     int dashpots_stand;                          /* where they are: no search for what limits them */
