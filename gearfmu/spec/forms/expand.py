@@ -140,7 +140,7 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     )
     stage, shared = with_relief_rolls(stage), dict.fromkeys(planets, "planet")
     places = {name: name for name in bodies} | shared
-    stage._origin = Origin(spec, places, shared, spec.limits, spec.load_sharing, missing)
+    stage._origin = Origin(spec, places, shared, spec.limits, spec.set.load_sharing, missing)
     return stage
 
 

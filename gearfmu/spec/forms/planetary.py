@@ -221,11 +221,6 @@ class PlanetarySpec(Spec):
         return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
 
     @property
-    def load_sharing(self) -> float:
-        """Torque that every mesh is made for, over its mean at torque_max."""
-        return self.set.load_sharing
-
-    @property
     def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:
         """Sun, planet, ring."""
         return self.sun, self.planet, self.ring
