@@ -67,7 +67,7 @@ class Touch:
 
 def touch(stage: Stage, mesh: EngagementSpec, load: Load, turned: tuple[float, float]) -> Touch:
     """Of a slice of an engagement whose gears have turned by `turned` (rad) since the drive flanks of tooth 0 touched,
-    tooth 0 of gear A on +x. A slice that has partly left a flank touches, loads and reads what is left of it."""
+    tooth 0 of gear A on +x. A slice is a part of the line of contact: of the width that lies on both flanks."""
     pair = mesh_shape(stage, mesh)
     assert isinstance(pair, PairGeometry)
     a, b = pair.gears
@@ -83,9 +83,9 @@ def touch(stage: Stage, mesh: EngagementSpec, load: Load, turned: tuple[float, f
     other = round(facing / pitch)  # tooth of B
     across = b.r_b * (free[1] + sense * (zero[1] - gamma - math.pi + other * pitch))
     slope = sense * math.tan(a.beta_b)
-    whole = (np.array([load.slice, load.slice + 1]) / stage.slices - 0.5) * width
     ends = sorted([(a.s_tip - middle) / slope, (across - b.s_tip) / slope]) if slope else (-width, width)
-    left = np.clip(whole, *ends)  # of the slice, what lies on both flanks
+    first, last = np.clip([-0.5 * width, 0.5 * width], *ends)  # of the face width, what lies on both flanks
+    left = first + (last - first) * np.array([load.slice, load.slice + 1]) / stage.slices
     touching = float(left.mean())
     normal = np.array([math.sin(pair.alpha_wt), sense * math.cos(pair.alpha_wt)])
     foot = a.r_b * np.array([math.cos(pair.alpha_wt), -sense * math.sin(pair.alpha_wt)])
