@@ -220,7 +220,7 @@ def test_refused_values_name_the_variable_and_what_it_takes(unpacked):
     known = {v.name: v for v in subject.variables}
     for name, setter, value, said in (
         ("pinion.phi", "setReal", 1e12, "allowed are from -1e+09 to 1e+09 rad"),
-        ("slices", "setInteger", 11, "allowed are whole numbers from 1 to 10"),
+        ("slices", "setInteger", 21, "allowed are whole numbers from 1 to 20"),
         ("level", "setInteger", 9, "allowed are 0, 1, ... for rigid|fast|standard|full|paper|explicit"),
         ("mesh.te", "setReal", 0.0, "is an output"),
     ):

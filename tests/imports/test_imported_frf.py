@@ -36,7 +36,7 @@ def store_matrices(folder: Path, whole: bool) -> None:
 
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
-    return gear_full_order(stage(tmp_path_factory.mktemp("native")), "pinion", 1.0)
+    return gear_full_order(member_of(stage(tmp_path_factory.mktemp("native")), "pinion"), 1.0)
 
 
 def places(body: FullOrder) -> np.ndarray:

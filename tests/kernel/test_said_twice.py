@@ -10,7 +10,7 @@ import pytest
 from gearfmu.body import parts
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
-from gearfmu.stage.build import assembly, blob, far, flanks, friction, tables
+from gearfmu.stage.build import assembly, blob, far, flanks, oil, tables
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
@@ -73,4 +73,4 @@ def test_laws_of_friction_are_in_one_order() -> None:
     text = next(p for p in sources() if p.name == "gk_setup.h").read_text(encoding="utf-8")
     laws = re.search(r"enum gk_friction_law \{([^}]*)\}", text)
     assert laws is not None
-    assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == friction.LAWS
+    assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == oil.LAWS

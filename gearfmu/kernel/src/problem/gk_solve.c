@@ -20,7 +20,6 @@ static const double SOLVED = 1e-11, PART_KNOWN = 1e-12;
 enum { DASHPOT_ROUNDS = 8 };
 static const double SOLVED = 1e-7, PART_KNOWN = 1e-3;
 #endif
-#endif
 
 static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
 static int is_clutch(const gk_system *s, int i) { return s->kind[i] == ROW_CLUTCH; }
