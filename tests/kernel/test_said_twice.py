@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -74,3 +75,9 @@ def test_laws_of_friction_are_in_one_order() -> None:
     laws = re.search(r"enum gk_friction_law \{([^}]*)\}", text)
     assert laws is not None
     assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == oil.LAWS
+
+
+def test_a_model_knows_the_table_of_variables() -> None:
+    """Else a kernel with other value references would answer to the GUID of a description made before."""
+    table = next(p for p in sources() if p.name == "gk_variables.inc").read_bytes().replace(b"\r\n", b"\n")
+    assert hashlib.sha256(table).hexdigest().startswith(assembly.VARIABLES)

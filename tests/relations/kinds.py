@@ -17,11 +17,12 @@ import numpy as np
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.general import Stage, SupportSpec, ToothedBody
+from gearfmu.spec.forms.general import Stage, ToothedBody
 from gearfmu.spec.forms.members import members
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
+from gearfmu.spec.tables.supports import SupportSpec
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.run.simulate import Inputs, simulate
 from gearfmu.stage.run.te import statics_of

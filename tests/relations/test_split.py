@@ -24,6 +24,7 @@ BEFORE, AFTER = 12, 8  # communication steps; the load halves two steps before t
 WINDOWED = ("_mean", "_max", "_next", "_power", ".a")  # of a communication or internal step, not of a time
 QUICK = ("pair", "internal", "helical", "set")
 KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 3e-3  # of the family of an output
+AFRESH = 5e-5  # engagements that solve side by side begin each communication step afresh; measured: 2.1e-5
 PROCESS = """
 import sys
 from pathlib import Path
@@ -151,7 +152,7 @@ def test_shorter_communication_steps_are_the_same_run(kind: Kind) -> None:
         found = (np.abs(other - rows[0]).max(axis=0) / size)[sampled]
         worst = int(np.argmax(found))
         print(kind.name, names[sampled[worst]], f"{found[worst]:.1e}")
-        assert found[worst] < KEPT, names[sampled[worst]]
+        assert found[worst] < (AFRESH if kind.name == "set" else KEPT), names[sampled[worst]]
 
 
 def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str, float]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from gearfmu.spec.forms.general import SupportSpec
 from gearfmu.spec.tables.bearings import BallBearing, Bearings, OperatingSpec, RollerBearing, RollingMount
 from gearfmu.spec.tables.gear import GearSpec
+from gearfmu.spec.tables.supports import SupportSpec
 
 Found = Iterator[tuple[str, str, str]]
 SPRINGS = ("radial", "axial", "tilt", "torsion")

@@ -19,7 +19,6 @@ from gearfmu.spec.forms.general import (
     RingBody,
     RotorSpec,
     Stage,
-    SupportSpec,
 )
 from gearfmu.spec.forms.general_checks import with_relief_rolls
 from gearfmu.spec.forms.pair import StageSpec
@@ -30,6 +29,7 @@ from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.tables.bearings import Bearing, RollingMount
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.spec.tables.supports import SupportSpec
 
 CARRIER = "carrier"
 

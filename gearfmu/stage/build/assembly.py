@@ -39,6 +39,7 @@ from gearfmu.stage.build.teeth import gear_section, mismatches
 from gearfmu.stage.build.whirls import whirl_rows
 
 MODEL_VERSION = 5
+VARIABLES = "8f777a572eab"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256
 _KEPT = 16  # stages whose bearings are remembered
 _SETTLED: dict[str, Settled] = {}
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -68,12 +69,12 @@ def assemble(
 
 
 def _made_of(stage: Stage, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
-    """Hash of all that a model is made of but the kinds of its ports."""
+    """Hash of all that a model and the variables of its FMU are made of but the kinds of its ports."""
     tables = stored(stage) | {"description": ""}
     for port in tables["ports"].values():
         port.pop("kind", None)
     hashes = {name: body.input_hash for name, body in stage.by_name(bodies).items()}
-    return origin(MODEL_VERSION, tables, stored_files(stage), hashes, rolls, list(observe))
+    return origin(MODEL_VERSION, VARIABLES, tables, stored_files(stage), hashes, rolls, list(observe))
 
 
 def general_sections(

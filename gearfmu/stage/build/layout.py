@@ -13,8 +13,9 @@ import numpy as np
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.general import ShaftBody, Stage, SupportSpec, ToothedBody
+from gearfmu.spec.forms.general import ShaftBody, Stage, ToothedBody
 from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.tables.supports import SupportSpec
 from gearfmu.stage.build.free import FreeBody, free_carrier, free_gear, free_shaft
 from gearfmu.stage.build.groups import Layout, Support
 from gearfmu.stage.build.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions

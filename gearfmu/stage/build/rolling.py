@@ -22,10 +22,11 @@ from gearfmu.bearing import Balls, Filled, NoRestError, Rest, Rollers, Rolling, 
 from gearfmu.bearing.rest import least, preloaded, scales, state
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.general import Stage, SupportSpec
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import shafts_of, turns
 from gearfmu.spec.tables.bearings import BallBearing, RollerBearing
+from gearfmu.spec.tables.supports import SupportSpec
 
 Tangents = Mapping[str, np.ndarray]
 BALL_NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "inner_groove", "outer_groove")

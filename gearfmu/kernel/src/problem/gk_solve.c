@@ -18,7 +18,7 @@ enum { DASHPOT_ROUNDS = 24 };
 static const double SOLVED = 1e-11, PART_KNOWN = 1e-12;
 #else
 enum { DASHPOT_ROUNDS = 8 };
-static const double SOLVED = 1e-7, PART_KNOWN = 1e-3;
+static const double SOLVED = 1e-7, PART_KNOWN = 1e-5;
 #endif
 
 static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }

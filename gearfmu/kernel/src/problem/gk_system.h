@@ -59,7 +59,8 @@ typedef struct gk_system {
     double part[MAX_STRIDE];  /* of λ0 + λ1 that η_d is where it is limited: 1 where a contact is closed at both ends */
     double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
         held[MAX_STRIDE];    /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
-                             η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), pull = ±part; f_d = late·η_d + rest + held·λ1 */
+                             η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), pull = ±part;
+                             f_d = late·η_d + rest + held·λ1 */
     double jump[MAX_STRIDE]; /* of a given torque, at the start of the step; else 0 */
     int dashpots;            /* any of them */
     double direction[MAX_STRIDE], alpha;
