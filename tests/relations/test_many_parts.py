@@ -8,7 +8,11 @@ from kinds import KINDS
 
 from gearfmu.stage.run.set_te import stage_te
 
-HELICAL = ("helical", "train", "helical_set")
+FAST = (
+    ("helical", "all"),
+    ("helical", "rigid gears"),
+    ("train", "rigid gears"),
+)  # the others take ten seconds and more
 POSITIONS = 3
 YIELDS = {
     "all": {},
@@ -18,9 +22,13 @@ YIELDS = {
 }
 
 
-@pytest.mark.parametrize("yields", YIELDS)
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.full if n == "helical_set" else ()) for n in HELICAL]
+    ("name", "yields"),
+    [
+        pytest.param(name, yields, marks=() if (name, yields) in FAST else pytest.mark.full)
+        for name in ("helical", "train", "helical_set")
+        for yields in YIELDS
+    ],
 )
 def test_any_number_of_parts_finds_equilibrium(name: str, yields: str) -> None:
     """5, 12 and 20 parts, more than any body has width functions: the mean transmission error is that of 12 within

@@ -150,6 +150,7 @@ def test_overlap_smooths_the_transmission_error() -> None:
     assert np.ptp(found.te) < 0.15 * np.ptp(spur.te)
 
 
+@pytest.mark.full
 def test_more_slices_than_width_functions_find_the_same_equilibrium() -> None:
     """Twelve slices of teeth with six width functions: the mean within 1e-3 of that of six, and smoother still."""
     six, twelve = overlapping(SLICES), overlapping(2 * SLICES)
