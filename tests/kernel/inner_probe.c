@@ -25,7 +25,8 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
     return found;
 }
 
-/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, z of its middle, gradient[12], slide[12]} */
+/* pose (12) of the gears of engagement e; out: per place and slice {flank, slice, z of its middle, gradient[12],
+ * slide[12]} */
 GK_API int probe_rows(const gk_model *model, const gk_setup *setup, int e, const double *pose, double reach,
                       double *out)
 {

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refused import refused
 
-from gearfmu.errors import SpecError
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -22,14 +22,7 @@ def problems(folder: Path, like: str, *changes: tuple[str, str]) -> dict[str, st
     text = source.read_text(encoding="utf-8").replace(
         'base = "stage.toml"', f'base = "{source.parent.as_posix()}/stage.toml"'
     )
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    path = folder / "stage.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(SpecError) as error:
-        load_stage(path)
-    return {problem.field: problem.remedy for problem in error.value.problems}
+    return {problem.field: problem.remedy for problem in refused(folder, text, *changes)}
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from refused import refused
 
 from gearfmu.body import reduce_body
-from gearfmu.errors import MeshError, SpecError
+from gearfmu.errors import MeshError
 from gearfmu.spec.forms.body import body_inputs
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -18,16 +19,7 @@ TEXT = find_stage("two_stage").read_text(encoding="utf-8")
 
 def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
     """Field → remedy of everything that is wrong."""
-    text = TEXT
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    path = folder / "stage.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(SpecError) as error:
-        load_stage(path)
-    assert all(problem.file == str(path) for problem in error.value.problems)
-    return {problem.field: problem.remedy for problem in error.value.problems}
+    return {problem.field: problem.remedy for problem in refused(folder, TEXT, *changes)}
 
 
 def test_the_two_stage_train_is_read():
