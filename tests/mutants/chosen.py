@@ -34,7 +34,7 @@ CHOSEN: dict[str, tuple[tuple[str, str], ...]] = {
         ("a[i] += twice * v[m->pairs + i];", "a[i] -= twice * v[m->pairs + i];"),
     ),
     "gk_film.c": (
-        ("return 13.328648814475098 *", "return 12.9 *"),
+        ("= 13.328648814475098 *", "= 12.9 *"),
         ("return film->closes[i] * (sunk + late / mean);", "return 0.0;"),
         ("film->factor[i] * (u * u * u - far * far * far);", "film->factor[i] * (u * u * u + far * far * far);"),
     ),
