@@ -32,7 +32,7 @@ def rim_velocity(
     flanks positive, at the angles (n,) rad, by mesh."""
     flank = 0 if sum(force.mean() for force in forces.values()) >= 0 else 1
     rows = ring.flank_rows[flank, ring.flank_rows.shape[1] // 2, 0]
-    radial, velocity = ring.rim.patch_rows[0], np.zeros(len(next(iter(forces.values()))))
+    radial, velocity = ring.sensors.rows[0], np.zeros(len(next(iter(forces.values()))))
     for k in np.flatnonzero((ring.frequency < NYQUIST_PART * 0.5 / step) & (ring.part != 2)).tolist():
         pair = ring.part[k] == 1
         factors = [(rows[k], -rows[k + 1]), (rows[k + 1], rows[k])] if pair else [(rows[k], 0.0)]

@@ -108,7 +108,7 @@ def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBo
         bore_rows=modes.bore_rows,
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
-        static_ff=kept_offsets(statics.static_ff, whole=False),
+        static_ff=kept_offsets(statics.static_ff),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         tangent=None,

@@ -11,7 +11,7 @@ from gearfmu.body.parts import (
     DRAWN,
     Parts,
     pictured_loads,
-    rim_of,
+    rim_sensor,
     sector_display,
     sector_shapes,
     tooth_flank,
@@ -133,9 +133,8 @@ def _by_sector(found: ImportedGear, member: Member, case: FrfCase, drawing: tupl
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
-    rim = rim_of(body, modes, statics, member.mounts)
     display, shapes = sector_display(surface, body, statics), sector_shapes(surface, modes)
-    return Parts(modes, statics, frf, found.facts, display, body.inertia, rim, shapes)
+    return Parts(modes, statics, frf, found.facts, display, body.inertia, rim_sensor(body, modes), shapes)
 
 
 def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:

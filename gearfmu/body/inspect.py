@@ -10,7 +10,6 @@ import numpy as np
 from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
 from gearfmu.body.interface_body import interface_facts, load_interface_body
 from gearfmu.body.layout import entries_of
-from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.body.reduced import ReducedBody, value_of
 from gearfmu.body.store import load_body
 from gearfmu.hdf5 import format_of
@@ -59,21 +58,7 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "tooth_offsets": f"all {body.teeth}" if body.all_offsets else f"−{offsets // 2} to {offsets // 2}",
         "rows_along_profile": body.knows_profile,
         "tooth_compliance_mid_flank_m_per_N": float(body.static_ff[0, 0, 0, middle, middle, 0, 0]),
-        **_mounts(body),
-    }
-
-
-def _mounts(body: ReducedBody) -> dict[str, Any]:
-    """What holds an internal gear, and its lowest frequencies then."""
-    if body.rim is None:
-        return {}
-    if not body.rim.mounts:
-        return {"internal": True, "mounts": 0}
-    return {
-        "internal": True,
-        "mounts": body.rim.mounts,
-        "mount_stiffness_N_per_m": body.rim.mount_stiffness,
-        "mounted_frequencies_Hz": [float(f) for f in mounted_frequencies(body)[:8]],
+        **({"internal": True} if body.internal else {}),
     }
 
 

@@ -97,8 +97,9 @@ def _static_entries() -> tuple[Entry, ...]:
             (2, 2, "M", "R", "R", "A", "A"),
             "m/N",
             "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, "
-            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … 3, or "
-            "0 … z/2 where all are needed, the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … 3 "
+            "(a small gear's and older rings: 0 … z/2), the others follow: C[f, g, m, i, j, a, b] = "
+            "C[g, f, −m, j, i, b, a]",
             bits=TABLE_BITS,
         ),
         Entry(
@@ -153,22 +154,8 @@ def _surface_entries() -> tuple[Entry, ...]:
 
 def _rim_entries() -> tuple[Entry, ...]:
     return (
-        Entry("rim/patch_point", "rim.patch_point", (3,), "m", "middle of the rim's patch of sector 0"),
-        Entry("rim/patch_rows", "rim.patch_rows", (3, "n"), "kg-1/2", "mean displacement x, y, z of that patch"),
-        Entry("rim/flank_rigid", "rim.flank_rigid", (2, "R", "A", 6), ", m", "flank rows of rigid motion, space 0"),
-        Entry(
-            "rim/c_fp",
-            "rim.static_fp",
-            (2, "z", "R", "A", 3),
-            "m/N",
-            "flank rows of space 0 per unit force x, y, z on the patch of sector m, in its frame",
-            bits=TABLE_BITS,
-        ),
-        Entry("rim/c_pp", "rim.static_pp", ("z", 3, 3), "m/N", "patch of sector 0 per unit force on that of sector m"),
-        Entry(
-            "rim/mounts", "rim.mounts", (), "", "number of mounts, at the sectors nearest to k z/mounts; 0: none", "i8"
-        ),
-        Entry("rim/mount_stiffness", "rim.mount_stiffness", (), "N/m", "stiffness of a mount, in every direction"),
+        Entry("rim/patch_point", "sensors.points", (1, 3), "m", "middle of the rim's patch of sector 0"),
+        Entry("rim/patch_rows", "sensors.rows", (3, "n"), "kg-1/2", "mean displacement x, y, z of that patch"),
     )
 
 

@@ -17,23 +17,15 @@ _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 
 
 @dataclass(frozen=True)
-class Rim:
-    """Where mounts may hold an internal gear: the patch of the rim of each sector, in that sector's frame.
+class Sensors:
+    """Points of a body that are read and never loaded.
 
-    patch_point (3,) m, of sector 0; patch_rows (3, n), kg^-½: its mean displacement x, y, z in the modes; flank_rigid
-    (2, R, A, 6): flank rows of space 0 of the rigid motions about the origin; static_fp (2, z, R, A, 3), m/N: flank
-    row of space 0 per unit force on the patch of sector m; static_pp (z, 3, 3), m/N: patch of sector 0 per unit force
-    on that of sector m. mounts: number of them, at the sectors nearest to k·z/mounts; mount_stiffness: N/m of each, the
-    same in all directions. No mounts: 0 and 0.
+    rows (3S, n), kg^-½: displacement x, y, z of each point in the modes; points (S, 3), m. A ring has one: the mean of
+    the patch of its rim that belongs to sector 0, in that sector's frame.
     """
 
-    patch_point: np.ndarray
-    patch_rows: np.ndarray
-    flank_rigid: np.ndarray
-    static_fp: np.ndarray
-    static_pp: np.ndarray
-    mounts: int
-    mount_stiffness: float
+    rows: np.ndarray
+    points: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -56,7 +48,7 @@ class ReducedBody:
     Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency
     (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, M, R, R, A, A), m/N; static_fb (2, R, A, 6);
     static_bb (6, 6). M is z, or 2K + 1 where only the tooth offsets −K … K are kept: offset m stands at m mod M.
-    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
+    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. sensors: of a ring, whose
     rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one. tangent: rows along
     the profile, None of an imported gear with all its teeth. shapes: surface of a sector and how it moves in every
     mode, None where none was made. spin: what the modes feel when the body turns, None of an imported one.
@@ -90,7 +82,7 @@ class ReducedBody:
     static_bb: np.ndarray
     frf: FrfError
     display: Display
-    rim: Rim | None = None
+    sensors: Sensors | None = None
     tangent: Tangent | None = None
     shapes: Shapes | None = None
     spin: Spin | None = None
@@ -110,7 +102,7 @@ class ReducedBody:
     @property
     def internal(self) -> bool:
         """Whether the body is a ring: its index k counts tooth spaces, its normals point into them."""
-        return self.rim is not None
+        return self.sensors is not None
 
     @property
     def groups(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gearfmu.body.layout import FORMAT, FORMAT_VERSION, GROUPS, TEXTS, Entry, entries_of
 from gearfmu.body.packing import read_entry, write_entry
-from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
+from gearfmu.body.reduced import ReducedBody, Sensors, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError
@@ -55,6 +55,7 @@ def _read(file: h5py.File, entry: Entry) -> Any:
     value = read_entry(file[entry.path], entry)
     if not entry.shape and np.ndim(value) == 0:
         return value.item()
+    value = value[None] if np.ndim(value) < len(entry.shape) else value  # the one sensor of an older ring
     return np.ascontiguousarray(value)
 
 
@@ -83,7 +84,7 @@ def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
     for group, kind in (
         ("frf", FrfError),
         ("display", Display),
-        ("rim", Rim),
+        ("sensors", Sensors),
         ("tangent", Tangent),
         ("shapes", Shapes),
         ("spin", Spin),

@@ -16,7 +16,7 @@ from gearfmu.body.parts import (
     kept_offsets,
     pictured_loads,
     provenance,
-    rim_of,
+    rim_sensor,
     sector_display,
     sector_shapes,
     tangent_of,
@@ -81,12 +81,12 @@ def reduced_gear(member: Member, input_hash: str, progress: Progress | None = No
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
-        static_ff=kept_offsets(statics.static_ff, whole=member.mounts is not None and not geometry.beta),
+        static_ff=kept_offsets(statics.static_ff),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=made.frf,
         display=made.display,
-        rim=made.rim,
+        sensors=made.sensors,
         tangent=tangent_of(modes, statics, points),
         shapes=made.shapes,
         spin=modes.spin,
@@ -109,9 +109,8 @@ def _made_here(member: Member, load_points: tuple[ToothFlank, Points], report: P
     case = FrfCase(gear.modal_damping, FRF_CUT, geometry.r)
     frf = frf_error(body, modes, statics, case, _within(report, 0.8, 1.0))
     display = sector_display(surface, body, statics)
-    rim = rim_of(body, modes, statics, member.mounts)
-    shapes = sector_shapes(surface, modes)
-    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)
+    facts, shapes = _mesh_facts(body, gear), sector_shapes(surface, modes)
+    return Parts(modes, statics, frf, facts, display, body.inertia, rim_sensor(body, modes), shapes)
 
 
 def _named(progress: Progress | None, name: str) -> Progress:

@@ -20,7 +20,6 @@ from gearfmu.body import (
 )
 from gearfmu.body.interface_body import ENTRIES, TEXTS, InterfaceBody, save_interface_body
 from gearfmu.body.layout import RIM_ENTRIES
-from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.spec.forms.expand import rewritten
@@ -64,7 +63,6 @@ def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands(
         assert body_path(spec, gear.name).stat().st_size <= LARGEST
         assert gear.frf.max_error < 0.01 and gear.knows_profile and gear.spin is not None
     assert carrier.max_error < 1e-6
-    assert "mounted_frequencies_Hz" in inspect_file(body_path(spec, "ring"))["facts"]
 
 
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
@@ -81,7 +79,7 @@ def test_masses_and_inertias_are_the_analytic_ones(shipped):
 
 def test_planet_is_the_sun_with_a_larger_bore(shipped):
     sun, planet = shipped["sun"], shipped["planet"]
-    assert sun.mass > planet.mass and sun.internal is planet.internal is False and sun.rim is None
+    assert sun.mass > planet.mass and sun.internal is planet.internal is False and sun.sensors is None
     assert sun.r_b == planet.r_b == pytest.approx(22.5e-3 * np.cos(np.radians(20)))
 
 
@@ -105,22 +103,14 @@ def test_residual_of_the_carrier_is_positive_semidefinite(shipped, dynamic):
     assert values.min() > -1e-9
 
 
-def test_ring_on_its_mounts(shipped):
-    """Six modes that were rigid."""
-    frequency = mounted_frequencies(shipped["ring"])
-    rigid = np.sqrt(6 * SPEC.written.ring.mounts.stiffness / shipped["ring"].mass) / (
-        2 * np.pi
-    )  # axial, on six springs
-    assert len(frequency) == 6 + shipped["ring"].modes and 0.6 * rigid < frequency[0] < rigid
-
-
-def test_ring_file_holds_what_its_mounts_need(shipped, tmp_path):
-    path = tmp_path / "ring.h5"
-    save_body(shipped["ring"], path)
+def test_ring_file_holds_the_sensor_on_its_rim(shipped, tmp_path):
+    path, ring = tmp_path / "ring.h5", shipped["ring"]
+    save_body(ring, path)
     back = load_body(path)
-    assert back.internal and np.array_equal(back.rim.static_fp, shipped["ring"].rim.static_fp)
+    assert back.internal and np.array_equal(back.sensors.rows, ring.sensors.rows)
+    assert np.hypot(*back.sensors.points[0, :2]) == pytest.approx(SPEC.written.ring.rim_diameter / 2, rel=1e-2)
     facts = inspect_file(path)
-    assert facts["facts"]["mounts"] == 6 and len(facts["facts"]["mounted_frequencies_Hz"]) == 8
+    assert facts["facts"]["internal"] and not [name for name in facts["facts"] if "mount" in name]
     assert {entry.path for entry in RIM_ENTRIES} <= {d["path"] for d in facts["datasets"]}
 
 

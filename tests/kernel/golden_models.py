@@ -75,11 +75,8 @@ def _small(body: Any, modes: int, functions: int) -> Any:
         static_fb=body.static_fb[:, :, :a],
         shapes=None,
     )
-    if body.rim is not None:
-        rim = body.rim
-        rim = _with(rim, patch_rows=rim.patch_rows[:, n], flank_rigid=rim.flank_rigid[:, :, :a],
-                    static_fp=rim.static_fp[:, :, :, :a])  # fmt: skip
-        small = _with(small, rim=rim)
+    if body.sensors is not None:
+        small = _with(small, sensors=_with(body.sensors, rows=body.sensors.rows[:, n]))
     if body.tangent is not None:
         of = body.tangent
         of = _with(of, rows=of.rows[:, :, :a][..., n], static_nt=of.static_nt[..., :a, :a],
