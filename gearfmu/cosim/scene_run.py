@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu import fmu
 from gearfmu.body import load_bodies
@@ -39,6 +39,9 @@ from gearfmu.stage.build.observed import gear_hashes
 from gearfmu.stage.run.deformation import FILE_NAME
 from gearfmu.stage.run.trace import Trace
 
+if TYPE_CHECKING:
+    from gearfmu.body import Body
+
 WHOLE = Wiring()
 
 
@@ -57,7 +60,7 @@ class Staged:
         cls,
         scene: SceneSpec,
         stage: Stage | None = None,
-        bodies: Sequence[Any] | None = None,
+        bodies: Sequence[Body] | None = None,
         observe: Sequence[str] = (),
     ) -> Staged:
         """stage : that of the file that the scene names when None; bodies : of `load_bodies(stage)` when None;

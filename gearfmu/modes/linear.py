@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as sl
@@ -30,6 +30,9 @@ from gearfmu.stage.build.assembly import mount_sets, tangents_of
 from gearfmu.stage.build.groups import Group
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.limits import places_of
+
+if TYPE_CHECKING:
+    from gearfmu.body import Body
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 EVERY = {"level": 3.0, "h": 1e-7}  # full, at a step that resolves every oscillator
@@ -56,7 +59,7 @@ class StageModes:
 
 
 def stage_modes(
-    model: StageModel, bodies: Sequence[Any], torque: float, count: int = 20, positions: int = 12
+    model: StageModel, bodies: Sequence[Body], torque: float, count: int = 20, positions: int = 12
 ) -> StageModes:
     """The `count` lowest natural frequencies under `torque` (N·m on the input, not 0; output held, other ports free) at
     positions i/N of one pitch, of that mesh whose pitch is longest. bodies: those that the model is made of.
@@ -137,7 +140,7 @@ def full_kernel(model: StageModel) -> Kernel:
     return kernel
 
 
-def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
+def shaft_rows(model: StageModel, bodies: Sequence[Body]) -> np.ndarray | None:
     """(k, oscillators of the ground group): √2 × the square root of the strain energy of each mode of an elastic shaft,
     beside what its ends yield beyond them; None where the stage has no shafts."""
     if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):

@@ -174,7 +174,7 @@ def _caption(face: _Face, moved: Sequence[np.ndarray]) -> str:
 def _columns(deformation: Deformation, gear: DeformedGear, frames: Sequence[int]) -> dict[str, np.ndarray]:
     """Root-mean-square displacement by nodal diameter, and rigid motion."""
     own, chosen = gear.motion, np.asarray(frames)
-    diameter = gear.body.nodal_diameter[own.modes - 1]
+    diameter = gear.body.toothed.diameter[own.modes - 1]
     table: dict[str, Any] = {"time_[s]": deformation.time[chosen]}
     for nu in np.unique(diameter):
         table[f"rms_nu{nu}_[m]"] = np.sqrt((own.amplitude[chosen][:, diameter == nu] ** 2).sum(axis=1))

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu.files import write_text
 from gearfmu.report import heading, page, sections
@@ -19,6 +19,9 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
 
+if TYPE_CHECKING:
+    from gearfmu.body import Body
+
 NVH = ("spectrum", "orders", "spectrogram")
 RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")
 
@@ -28,14 +31,14 @@ def write(
     summary: Mapping[str, Any],
     out_dir: str | os.PathLike[str],
     spec: Stage | None = None,
-    bodies: Sequence[Any] | None = None,
+    bodies: Sequence[Body] | None = None,
     deformation: Deformation | None = None,
 ) -> Path:
     """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
 
     trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
     summary : fields of docs/file-formats.md; what is missing is shown as "not given".
-    spec : the stage, for tooth numbers; bodies : its ReducedBody objects, for statics and the turning gears;
+    spec : the stage, for tooth numbers; bodies : its Body objects, for statics and the turning gears;
     deformation : of gears at chosen times, drawn where bodies are given too. Raises OSError when the folder cannot be
     written.
     """

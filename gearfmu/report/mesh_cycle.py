@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -25,6 +25,9 @@ from gearfmu.stage.run.te import mesh_harmonics, statics_of
 from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import Trace
 
+if TYPE_CHECKING:
+    from gearfmu.body import Body
+
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
 ROLLS, WIDTHS = 60, 61  # rows and columns of a contact pattern
@@ -33,7 +36,7 @@ STATIC, RUN = "quasi-static", "in the run"
 
 
 def static_loads(
-    trace: Trace, window: Window, meshes: Sequence[str], stage: Stage, bodies: Sequence[Any]
+    trace: Trace, window: Window, meshes: Sequence[str], stage: Stage, bodies: Sequence[Body]
 ) -> tuple[dict[str, FlankLoads], list[str]]:
     """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
     there; those with hardly a load are left out."""

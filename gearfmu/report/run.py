@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
@@ -18,6 +18,9 @@ from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.flank_loads import FlankLoads
 from gearfmu.stage.run.trace import Trace
 
+if TYPE_CHECKING:
+    from gearfmu.body import Body
+
 
 @dataclass(frozen=True)
 class Run:
@@ -27,7 +30,7 @@ class Run:
     trace: Trace
     summary: Mapping[str, Any]
     spec: Stage | None = None
-    bodies: Sequence[Any] | None = None
+    bodies: Sequence[Body] | None = None
     deformation: Deformation | None = None
 
     @cached_property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
@@ -22,6 +22,9 @@ from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
+
+if TYPE_CHECKING:
+    from gearfmu.body import Body
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
 BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution
@@ -197,7 +200,7 @@ def _loudest_bearings(part: Trace) -> list[str]:
     return [name for name in found if name in loud]
 
 
-def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Any]) -> tuple[float, ...]:
+def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Body]) -> tuple[float, ...]:
     """Natural frequencies (Hz) of a pair or train linearised under the run's mean mesh force, those modes that a
     transmission error drives; none where the stage finds no equilibrium with its flanks in contact."""
     model = assemble(stage, bodies)

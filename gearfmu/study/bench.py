@@ -12,7 +12,7 @@ import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from gearfmu.stage import StageModel, Trace, assemble
 from gearfmu.stage.build.model import integrator_of
 from gearfmu.stage.build.tables import ROLLS
 from gearfmu.study.norm import Signals, set_signals, signals_of
+
+if TYPE_CHECKING:
+    from gearfmu.body import Body
 
 CHUNK = 100  # communication steps that are timed at once
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
@@ -131,7 +134,9 @@ class KeptSource:
         return self.unit_made
 
 
-def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any) -> StageModel:
+def models_for(
+    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: Any
+) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of what is written in its file."""
     stage = rewritten(load_stage(scene.stage.name), **changes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
 from gearfmu.stage.run.steady import Drive, parameters, steady_run
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
+
+if TYPE_CHECKING:
+    from gearfmu.body import Body
 
 ORDERS = 5  # of the mesh
 POSITIONS = 41
@@ -51,7 +54,7 @@ def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
     return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
-def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Any]) -> Trace:
+def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Body]) -> Trace:
     """The scene on the stage of these bodies; by the kernel, which has the bits of its FMU."""
     return cosim.run(Staged.of(scene, stage, bodies), unit="kernel")
 

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from scipy.interpolate import BarycentricInterpolator
 from turned_rows import on_tooth
 
-from gearfmu.body import ReducedBody, load_bodies, reduce_body
+from gearfmu.body import Body, load_bodies, reduce_body
 from gearfmu.body.parts import tooth_flank
 from gearfmu.errors import ModelError
 from gearfmu.femesh import sector_mesh
@@ -36,18 +36,18 @@ MESH = MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2)
 FAST, FULL = 1.0, 3.0
 
 
-def amplitudes(kernel: Kernel, gear: str, body: ReducedBody) -> np.ndarray:
+def amplitudes(kernel: Kernel, gear: str, body: Body) -> np.ndarray:
     """(n,), m·kg^½, of all modes of a body; zero of those that nothing excites."""
     found = np.zeros(body.modes)
     for name in kernel.variables:
         if name.startswith(gear + MODE):
-            found[int(name.removeprefix(gear + MODE)) - 1] = math.sqrt(body.mass) * kernel.get(name)
+            found[int(name.removeprefix(gear + MODE)) - 1] = math.sqrt(body.total_mass) * kernel.get(name)
     return found
 
 
 # ---- a pair ----
 @pytest.fixture(scope="module")
-def observed(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def observed(spec: Stage, bodies: list[Body]) -> StageModel:
     return assemble(spec, bodies, observe=("wheel", "pinion"))
 
 
@@ -73,19 +73,17 @@ def test_what_is_not_asked_for_is_not_there(plain: StageModel, observed: StageMo
     assert [without.get(name) for name in outputs] == [asked.get(name) for name in outputs]
 
 
-def test_an_unknown_gear_is_refused(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_an_unknown_gear_is_refused(spec: Stage, bodies: list[Body]) -> None:
     with pytest.raises(ModelError, match="no gear 'ring'.*pinion, wheel"):
         assemble(spec, bodies, observe=("ring",))
 
 
 @pytest.mark.parametrize("gear", [0, 1])
-def test_static_amplitudes_do_not_ask_what_is_dynamic(
-    observed: StageModel, bodies: list[ReducedBody], gear: int
-) -> None:
+def test_static_amplitudes_do_not_ask_what_is_dynamic(observed: StageModel, bodies: list[Body], gear: int) -> None:
     """Above the cut of level fast they come from the forces, at level full from the oscillators (single precision)."""
     body, name = bodies[gear], ("pinion", "wheel")[gear]
     fast, full = (amplitudes(started(observed, level), name, body) for level in (FAST, FULL))
-    turning = body.nodal_diameter > 1
+    turning = body.flank.diameter > 1
     assert np.abs(full[turning]).max() > 0
     assert np.abs(fast - full)[turning].max() < 1e-4 * np.abs(full[turning]).max()
     above = turning & (body.frequency > 1.2 * observed.stage.levels.fast_cut)
@@ -183,12 +181,12 @@ def test_the_ring_at_rest_is_deformed_as_its_unreduced_statics_say(
     of the largest; what the stored modes leave out, and one mean tooth table."""
     ring, z = set_bodies[2], 54
     q = amplitudes(at_rest, "ring", ring)
-    by_modes = np.array([on_tooth(ring, ring.sensors.rows, sector, z) @ q for sector in range(z)])
-    table, exact = BarycentricInterpolator(ring.roll, np.moveaxis(statics.static_fp[0], 1, 0)), np.zeros((z, 3))
+    by_modes = np.array([on_tooth(ring.flank, ring.sensors.rows, sector, z) @ q for sector in range(z)])
+    table, exact = BarycentricInterpolator(ring.flank.roll, np.moveaxis(statics.static_fp[0], 1, 0)), np.zeros((z, 3))
     found = loads(set_spec, set_model, at_rest)
     assert len(found) == 6 and sum(force[0] for *_, force in found) == pytest.approx(7095.0, rel=2e-3)
     for space, roll, force in found:
-        assert ring.roll_range[0] < roll < ring.roll_range[1]
+        assert ring.flank.roll_range[0] < roll < ring.flank.roll_range[1]
         exact -= np.roll(np.einsum("mac,a->mc", table(roll), force), space, axis=0)
     around = np.array([0.0, -at_rest.get("bearing.ring.mz") / (z * ring.sensors.points[0, 0]), 0.0])
     exact += statics.static_pp.sum(axis=0) @ around
@@ -203,6 +201,6 @@ def test_the_rim_turns_as_the_mounts_feel_it(set_bodies: list[Any], at_rest: Ker
     """Rigid motion and modes at the rim's node against the kernel's own readout of the mounts; 2e-3: the residual."""
     ring = set_bodies[2]
     rigid = np.array([at_rest.get(f"ring{MOTION}{motion}") for motion in MOTIONS])
-    rim = rigid + ring.bore_rows @ amplitudes(at_rest, "ring", ring)
+    rim = rigid + ring.rows @ amplitudes(at_rest, "ring", ring)
     assert rim[5] == pytest.approx(at_rest.get("ring.gear.rz"), rel=2e-3)
     assert abs(rim[5] / rigid[5] - 1) > 3e-3  # the modes have a part in it
