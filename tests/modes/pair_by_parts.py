@@ -61,7 +61,7 @@ class Gear:
 def gear_at(spec: Stage, bodies: Sequence[Body], index: int, position: float, contacts: Sequence[Contact]) -> Gear:
     pair, body = spec.written.geometry, bodies[index]
     shape, side = pair.gears[index], (1.0, -1.0)[index]
-    degrees = symmetric_functions(min(b.width_functions for b in bodies))
+    degrees = symmetric_functions(min(b.flank.width_functions for b in bodies))
     chosen = excited_modes(body, degrees)
     angle = (0.0, pair.wheel_phase)[index] + side * 2 * math.pi * position / shape.z
     direction = math.pi / 2 - pair.alpha_wt - angle  # of the line of action in the body's frame
