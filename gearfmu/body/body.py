@@ -50,30 +50,55 @@ class How:
 @dataclass(frozen=True)
 class Node:
     """Where a body is loaded and read. kind: "rigid" (RBE2), "averaging" (RBE3), "nodes", "section" of a beam, "" where
-    its file does not say; components: of `COMPONENTS`, one row of the body each; point (3,) m."""
+    its file does not say; components: of `COMPONENTS`, one row of the body each; point (3,) m; span: from where to
+    where its surface reaches along z, m, where that is known."""
 
     name: str
     kind: str
     components: tuple[str, ...]
     point: np.ndarray
+    span: tuple[float, float] | None = None
 
     @property
     def rigid_rows(self) -> np.ndarray:
         """(k, 6): rigid motion about the origin → components."""
-        x, y, z = self.point
-        rows = np.eye(6)
-        rows[0, 4:], rows[1, 3], rows[1, 5], rows[2, 3:5] = (z, -y), -z, x, (y, -x)
-        return rows[[COMPONENTS.index(component) for component in self.components]]
+        return rigid_rows(self.point)[[COMPONENTS.index(component) for component in self.components]]
+
+
+def rigid_rows(point: np.ndarray) -> np.ndarray:
+    """(6, 6): rigid motion about the origin → motion of a point (3,) m."""
+    x, y, z = point
+    rows = np.eye(6)
+    rows[0, 4:], rows[1, 3], rows[1, 5], rows[2, 3:5] = (z, -y), -z, x, (y, -x)
+    return rows
 
 
 @dataclass(frozen=True)
 class Sensors:
     """S points that are read and never loaded. names; points (S, 3) m; rows (3S, n), kg^-½: displacement x, y, z of
-    each. A ring has one: the mean of the patch of its rim that belongs to sector 0, in that sector's frame."""
+    each; static (3S, m), m/N and 1/N: per unit load on the nodes, None where that is not kept. A ring has one: the
+    mean of the patch of its rim that belongs to sector 0, in that sector's frame."""
 
     names: tuple[str, ...]
     points: np.ndarray
     rows: np.ndarray
+    static: np.ndarray | None = None
+
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """(3S, 6): rigid motion about the origin → displacement of each."""
+        return np.vstack([rigid_rows(point)[:3] for point in self.points])
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A closed surface that radiates: points (P, 3) m; faces (F, 4), normals outward, a triangle repeats its last
+    point; modes (6 + n, P, 3): displacement in rigid motion about the origin (1 and m), then in the oscillators,
+    kg^-½."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    modes: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -166,6 +191,7 @@ class Body:
     exact: Exact | None = None
     picture: Picture | None = None
     sensors: Sensors | None = None
+    skin: Skin | None = None
 
     def __post_init__(self) -> None:
         if problems := body_problems(self):
@@ -216,7 +242,7 @@ class Body:
 
 def body_problems(body: Body) -> list[str]:
     """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
-    sizes = {"K": len(body.nodes), "m": sum(len(node.components) for node in body.nodes)}
+    sizes = {"K": len(body.nodes), "m": sum(len(node.components) for node in body.nodes), "6+n": 6 + body.modes}
     if body.flank is not None:
         sizes["z"] = body.flank.teeth
     problems: list[str] = []
@@ -254,7 +280,8 @@ def _body_checks(body: Body) -> dict[str, bool]:
         or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),
         "damping_ratio must lie between 0 and 1": bool(np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))),
         "sensors/names does not fit the points": body.sensors is None
-        or len(body.sensors.names) == len(body.sensors.points),
+        or len(body.sensors.names) == len(body.sensors.points) == len(body.sensors.rows) / 3,
+        "skin/faces names a point that is not there": body.skin is None or _inside(body.skin.faces, body.skin.points),
         "picture/shapes/quads names a point that is not there": shapes is None or _inside(shapes.quads, shapes.points),
         "picture/loads does not fit the surface": picture is None or picture.loads.shape[1] == len(picture.points),
         "picture/quads names a point that is not there": picture is None or _inside(picture.quads, picture.points),

@@ -157,7 +157,33 @@ SENSORS = (
     Entry("sensors.points", ("S", 3), "m", "where each sensor lies; of a ring: middle of the rim's patch of sector 0"),
     Entry("sensors.rows", ("3S", "n"), "kg-1/2", "displacement x, y, z of each in the modes"),
 )
-GROUPS = (ERROR, CUT, FLANK, TANGENT, SPIN, PICTURE, SHAPES, SURFACE, SENSORS)  # optional, each whole or not at all
+FELT = (Entry("sensors.static", ("3S", "m"), "m/N, 1/N", "displacement of each sensor per unit load on the nodes"),)
+SKIN = (
+    Entry("skin.points", ("V", 3), "m", "points of the closed outer surface", "f4"),
+    Entry("skin.faces", ("W", 4), "", "its faces, normals outward; a triangle repeats its last point", "i8"),
+    Entry(
+        "skin.modes",
+        ("6+n", "V", 3),
+        "1, m, kg-1/2",
+        "displacement of the points: rigid motion x, y, z, rx, ry, rz about the origin, then the modes",
+        "f4",
+        bits=PICTURE_BITS + 2,
+        each=True,
+    ),
+)
+GROUPS = (
+    ERROR,
+    CUT,
+    FLANK,
+    TANGENT,
+    SPIN,
+    PICTURE,
+    SHAPES,
+    SURFACE,
+    SENSORS,
+    FELT,
+    SKIN,
+)  # optional, each whole or not at all
 ENTRIES = (*BODY, *(entry for group in GROUPS for entry in group))
 
 
@@ -177,7 +203,7 @@ def entries_of(body: Any) -> tuple[Entry, ...]:
 
 
 TEXTS = {
-    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section) and components of each node, in row order",
+    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section), components, span along z of each, in row order",
     "sensors": "names of the sensors",
     "ground": "nodes held when the error was measured",
     "method": "method of reduction",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.body import Body, Flank, How, Node, Sensors, Tangent
+from gearfmu.body.body import Body, Flank, How, Node, Sensors, Skin, Tangent
 from gearfmu.body.former import FORMATS, former_values
 from gearfmu.body.layout import BODY, FORMAT, FORMAT_VERSION, GROUPS, TEXTS, entries_of, value_of
 from gearfmu.body.packing import read_entry, write_entry
@@ -30,6 +30,7 @@ PARTS = {  # classes by their path in a body, inner ones first
     "spin": Spin,
     "picture": Picture,
     "sensors": Sensors,
+    "skin": Skin,
 }
 
 
@@ -66,7 +67,10 @@ def load_body(path: str | os.PathLike[str]) -> Body:
 
 def _texts(body: Body) -> dict[str, Any]:
     how, error = body.how, body.error
-    nodes = [{"name": n.name, "kind": n.kind, "components": list(n.components)} for n in body.nodes]
+    nodes = [
+        {"name": n.name, "kind": n.kind, "components": list(n.components)} | ({"span": list(n.span)} if n.span else {})
+        for n in body.nodes
+    ]
     names = {"sensors": list(body.sensors.names)} if body.sensors is not None else {}
     return {
         "nodes": nodes,
@@ -99,7 +103,8 @@ def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any])
 
 
 def _node(text: Mapping[str, Any]) -> dict[str, Any]:
-    return {"name": str(text["name"]), "kind": str(text["kind"]), "components": tuple(text["components"])}
+    lists = {name: tuple(text[name]) for name in ("components", "span") if name in text}
+    return {"name": str(text["name"]), "kind": str(text["kind"])} | lists
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
