@@ -51,7 +51,7 @@ class HousingBody(Spec):
     kind: Literal["housing"] = Field(description="kind of body")
     material: Material = Field(description="material")
     modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    method: Method = Field(default="craig_bampton", description="method of reduction; every one ends in oscillators")
+    method: Method = Field(default="rubin", description="method of reduction; every one ends in oscillators")
     modes: Annotated[Count, Whole("carrier_modes")] = Field(default=200, description="number of oscillators stored")
     dynamic_to: Annotated[float, Quantity("stored_to")] = Field(
         default=10e3, description="oscillators above are compliance in every run"
