@@ -171,19 +171,8 @@ SKIN = (
         each=True,
     ),
 )
-GROUPS = (
-    ERROR,
-    CUT,
-    FLANK,
-    TANGENT,
-    SPIN,
-    PICTURE,
-    SHAPES,
-    SURFACE,
-    SENSORS,
-    FELT,
-    SKIN,
-)  # optional, each whole or not at all
+# optional, each whole or not at all
+GROUPS = (ERROR, CUT, FLANK, TANGENT, SPIN, PICTURE, SHAPES, SURFACE, SENSORS, FELT, SKIN)
 ENTRIES = (*BODY, *(entry for group in GROUPS for entry in group))
 
 
@@ -203,7 +192,7 @@ def entries_of(body: Any) -> tuple[Entry, ...]:
 
 
 TEXTS = {
-    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section), components, span along z of each, in row order",
+    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section), components, span along z, in row order",
     "sensors": "names of the sensors",
     "ground": "nodes held when the error was measured",
     "method": "method of reduction",

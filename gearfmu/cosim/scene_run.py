@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gearfmu import fmu
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drive import Drive
@@ -38,9 +38,6 @@ from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.observed import gear_hashes
 from gearfmu.stage.run.deformation import FILE_NAME
 from gearfmu.stage.run.trace import Trace
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 WHOLE = Wiring()
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.reduction.display import Shapes, turn_sectors, whole_surface
 from gearfmu.stage.run.deformation import DeformationError, GearMotion
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 
 @dataclass(frozen=True)

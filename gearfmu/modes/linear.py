@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as sl
 from scipy.optimize import linear_sum_assignment
 
+from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.spec.forms.general import ShaftBody, Stage
@@ -30,9 +30,6 @@ from gearfmu.stage.build.assembly import mount_sets, tangents_of
 from gearfmu.stage.build.groups import Group
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.limits import places_of
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 EVERY = {"level": 3.0, "h": 1e-7}  # full, at a step that resolves every oscillator

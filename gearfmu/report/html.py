@@ -6,8 +6,9 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from gearfmu.body import Body
 from gearfmu.files import write_text
 from gearfmu.report import heading, page, sections
 from gearfmu.report.chart import Plot
@@ -18,9 +19,6 @@ from gearfmu.report.run import Run
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 NVH = ("spectrum", "orders", "spectrogram")
 RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")

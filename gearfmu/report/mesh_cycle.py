@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
@@ -24,9 +24,6 @@ from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import mesh_harmonics, statics_of
 from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import Trace
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of

@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gearfmu.body import Body
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
@@ -25,9 +26,6 @@ from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 FRAMES, CONTACTS = 160, 4
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.plots_set import PlanetSet, planet_set
@@ -17,9 +18,6 @@ from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.flank_loads import FlankLoads
 from gearfmu.stage.run.trace import Trace
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 
 @dataclass(frozen=True)

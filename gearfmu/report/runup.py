@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
+from gearfmu.body import Body
 from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
@@ -22,9 +22,6 @@ from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
 BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution

@@ -12,11 +12,11 @@ import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
@@ -28,9 +28,6 @@ from gearfmu.stage import StageModel, Trace, assemble
 from gearfmu.stage.build.model import integrator_of
 from gearfmu.stage.build.tables import ROLLS
 from gearfmu.study.norm import Signals, set_signals, signals_of
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 CHUNK = 100  # communication steps that are timed at once
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough

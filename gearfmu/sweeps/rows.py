@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gearfmu import cosim
+from gearfmu.body import Body
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
@@ -19,9 +20,6 @@ from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
 from gearfmu.stage.run.steady import Drive, parameters, steady_run
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 ORDERS = 5  # of the mesh
 POSITIONS = 41

@@ -41,7 +41,7 @@ def unpack(fmu: Path, target: Path) -> str:
 def body(gear, shape) -> Body:
     """A gear whose modes are one pattern of a tooth, by nodal diameter."""
     z = gear.teeth
-    diameters = np.concatenate([[0], np.repeat(np.arange(1, (z + 1) // 2), 2), [z // 2] * (z % 2 == 0)])
+    diameters = np.concatenate([[0], np.repeat(np.arange(1, (z + 1) // 2), 2), [z // 2] * (z % 2 == 0)]).astype(int)
     n = diameters.size
     part = np.array([0] + [1, 2] * ((n - 1) // 2) + [0] * ((n - 1) % 2))
     frequency = TOOTH_FREQUENCY * (1 + 0.02 * diameters)

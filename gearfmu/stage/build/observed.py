@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.ground_part import NODE_MEMBERS
 from gearfmu.stage.build.groups import Group, families
 from gearfmu.stage.build.model import StageModel
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 MOTION, MODE = ".motion.", ".mode_"
 

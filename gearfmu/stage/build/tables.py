@@ -3,12 +3,9 @@ width functions that the stage can excite."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from gearfmu.body import Body
+from gearfmu.body import Body
 
 ROLLS = 48  # error and price of the grid: docs/decisions.md
 MOST_FUNCTIONS = 6

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.forms.turning import turns
@@ -21,9 +21,6 @@ from gearfmu.stage.build.groups import Group
 from gearfmu.stage.build.observed import gear_bodies
 from gearfmu.stage.build.spinning import turn_rates
 from gearfmu.stage.build.whirls import whirl_rows
-
-if TYPE_CHECKING:
-    from gearfmu.body import Body
 
 WHIRL_BAND = 15e3  # Hz
 
