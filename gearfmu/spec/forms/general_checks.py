@@ -47,7 +47,9 @@ def _what_can_be_judged(stage: Stage) -> Stage:
     good = {name for name in stage.bodies if counts[name] == 1} | standing
     gears = {gear.name for gear in stage.gears} & good
     rotors = {
-        name: rotor.model_copy(update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good - standing}})
+        name: rotor.model_copy(
+            update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good - standing}}
+        )
         for name, rotor in stage.rotors.items()
     }
     kept = {

@@ -134,9 +134,14 @@ def general_sections(
 
 def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    return mount(layout_of(stage, bodies))
+
+
+def layout_of(stage: Stage, bodies: Sequence[Any]) -> Layout:
+    """Its free bodies and what holds them."""
     tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)
-    return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
+    return stage_layout(stage, bodies, carriers=carriers, tangents=tangents)
 
 
 def tangents_of(stage: Stage, bodies: Sequence[object]) -> Tangents:
