@@ -176,8 +176,8 @@ def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None)
 def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
     """The bodies of the stage's gears in their order, and those of carriers and housing by name."""
     found = stage.by_name(bodies)
-    others = (*stage.carriers, *stage.housings)
-    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in others}
+    others = [own.name for own in stage.carriers] + [own.name for own in stage.housings]
+    return [found[gear.name] for gear in stage.gears], {name: found[name] for name in others}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
