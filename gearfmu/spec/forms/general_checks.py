@@ -96,10 +96,10 @@ def _rotors(stage: Stage) -> Found:
         for body in rotor.bodies:
             if body not in stage.bodies:
                 yield f"rotors.{name}.bodies.{body}", body, _unknown_body(stage)
-    for name, body in stage.bodies.items():
-        if counts[name] != 1 and not isinstance(body, HousingBody):
+    for own in stage.bodies:
+        if counts[own] != 1 and not isinstance(stage.bodies[own], HousingBody):
             remedy = "a body belongs to one rotor: name it in the bodies of one [rotors.…]"
-            yield f"bodies.{name}", f"in {counts[name]} rotors", remedy
+            yield f"bodies.{own}", f"in {counts[own]} rotors", remedy
 
 
 def _names(stage: Stage) -> Found:

@@ -12,6 +12,7 @@ from gearfmu.spec.tables.imported import FilesSpec
 
 Method = Literal["krylov", "rubin", "craig_bampton", "modal"]
 Coupling = Literal["averaging", "rigid"]
+MOST_SENSORS = 85  # three outputs each, of 255
 LONGEST = 20  # characters of a sensor's name, with which its outputs begin
 
 
@@ -37,6 +38,8 @@ class HousingImportSpec(FilesSpec):
     def _named_apart(self) -> HousingImportSpec:
         if twice := sorted(set(self.seats) & set(self.feet)):
             raise refuse(f"seats and feet share the name {twice[0]}: give every node its own")
+        if len(self.sensors) > MOST_SENSORS:
+            raise refuse(f"{len(self.sensors)} sensors, at most {MOST_SENSORS} are outputs: leave some away")
         if long := [name for name in self.sensors if len(name) > LONGEST]:
             raise refuse(f"the name of the sensor {long[0]} has more than {LONGEST} characters: shorten it")
         return self
