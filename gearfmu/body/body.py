@@ -100,6 +100,11 @@ class Skin:
     faces: np.ndarray
     modes: np.ndarray
 
+    @property
+    def skin_modes(self) -> np.ndarray:
+        """(P, 3, 6 + n): `modes`, by points."""
+        return self.modes.transpose(1, 2, 0)
+
 
 @dataclass(frozen=True)
 class Exact:
