@@ -48,9 +48,9 @@ def reduced_carrier(carrier: CarrierMember, input_hash: str, progress: Progress 
     judging = Judging.over(damping_ratio=part.modal_damping)
     exact = reference(full, judging)
     error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
-    evidence = _Evidence(judging.frequency, error)
+    evidence = Evidence(judging.frequency, error)
     made = {"mesh": mesh, "started": started, "input_hash": input_hash, "material": part.material.model_dump()}
-    return _interface_body(full, model, evidence, made)
+    return interface_body(full, model, evidence, made)
 
 
 def _carrier_facts(carrier: CarrierMember) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def _carrier_facts(carrier: CarrierMember) -> dict[str, Any]:
     return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
 
 
-class _Evidence:
+class Evidence:
     """Error over frequency, and up to where it stays below 1 %."""
 
     def __init__(self, frequency: np.ndarray, error: np.ndarray):
@@ -69,7 +69,8 @@ class _Evidence:
         self.trusted_to = float(frequency[-1] if not len(bad) else frequency[max(bad[0] - 1, 0)])
 
 
-def _interface_body(full: FullOrder, model: Oscillators, evidence: _Evidence, made: dict[str, Any]) -> InterfaceBody:
+def interface_body(full: FullOrder, model: Oscillators, evidence: Evidence, made: dict[str, Any]) -> InterfaceBody:
+    """The body of a reduced FullOrder. made: mesh, material, input_hash, and started, s of processor time."""
     return InterfaceBody(
         name="carrier",
         input_hash=made["input_hash"],

@@ -15,6 +15,7 @@ import numpy as np
 
 from gearfmu.body.layout import ALGORITHM_VERSION, Entry
 from gearfmu.body.packing import write_entry
+from gearfmu.body.sensed import Sensors, Skin, read_sensed, sensed_problems, write_sensed
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 
@@ -52,6 +53,8 @@ class InterfaceBody:
     length: float
     trusted_to: float
     algorithm_version: int = ALGORITHM_VERSION
+    sensors: Sensors | None = None
+    skin: Skin | None = None
 
     def __post_init__(self) -> None:
         if problems := _problems(self):
@@ -120,6 +123,7 @@ def save_interface_body(body: InterfaceBody, path: str | os.PathLike[str]) -> No
             file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
         for entry in ENTRIES:
             write_entry(file, entry, np.asarray(getattr(body, entry.field), dtype=entry.kind))
+        write_sensed(file, body.sensors, body.skin)
 
 
 def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:
@@ -130,7 +134,7 @@ def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:
         texts["interfaces"], texts["ground"] = tuple(texts["interfaces"]), tuple(texts["ground"])
         name, input_hash = (str(file.attrs[name]) for name in ("name", "input_hash"))
         version = int(file.attrs.get("algorithm_version", 1))  # files of the first version do not say it
-        return InterfaceBody(name=name, input_hash=input_hash, algorithm_version=version, **texts, **values)
+        return InterfaceBody(name=name, input_hash=input_hash, algorithm_version=version, **texts, **values, **read_sensed(file))
 
 
 def interface_facts(body: InterfaceBody) -> dict[str, Any]:
@@ -186,4 +190,4 @@ def _problems(body: InterfaceBody) -> list[str]:
             problems.append(f"{entry.path} holds a number that is not finite")
     if not problems and not (np.all(np.diff(body.frequency) >= 0) and body.frequency.min(initial=1.0) > 0):
         problems.append("modes/frequency must be above 0 and ascending")
-    return problems
+    return problems + sensed_problems(body.sensors, body.skin, sizes["m"], len(body.frequency))
