@@ -26,8 +26,8 @@ RAMP = 0.05  # part of the record over which forces fade in and out
 class Housing:
     """A free elastic body on feet. mass (6, 6): of its rigid motion; omega, zeta (n,) of its modes, mass-normalised;
     seats (s, 6 + n), in the order and directions of the rings' forces, feet (f, 6 + n), sensors (r, 6 + n): motion per
-    coordinate, rigid ones first; residual (s + f, s + f) m/N: static compliance of seats and feet beyond the modes;
-    foot, foot_loss (f,): N/m and N·s/m of the springs to the ground, none for a free housing."""
+    coordinate, rigid ones first; residual (s + f + r, s + f) m/N: their static motion beyond the modes per unit force on
+    seats and feet; foot, foot_loss (f,): N/m and N·s/m of the springs to the ground, none for a free housing."""
 
     mass: np.ndarray
     omega: np.ndarray
@@ -49,18 +49,30 @@ class Housing:
         found[:, own, own] = 1 / (self.omega**2 + 2j * self.zeta * self.omega * w - w**2)
         return found
 
-    def answers(self, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the housing on its feet, per unit force on the seats, at ω (L,) > 0 rad/s: receptance of the seats Y
-        (L, s, s), coordinates (L, 6 + n, s), forces on the ground at the feet (L, f, s)."""
+    def answers(self, omega: np.ndarray) -> Answers:
+        """Of the housing on its feet at ω (L,) > 0 rad/s."""
         s, rows = len(self.seats), np.vstack([self.seats, self.feet])
         free = self.free(omega)
-        compliance = rows @ free @ rows.T + self.residual
+        compliance = rows @ free @ rows.T + self.residual[: len(rows)]
         spring = self.foot + 1j * omega[:, None] * self.foot_loss
         held = compliance[:, s:, s:] + np.eye(len(self.foot)) / spring[:, None, :]
         reaction = -np.linalg.solve(held, compliance[:, s:, :s])
         seats = compliance[:, :s, :s] + compliance[:, :s, s:] @ reaction
         coordinates = free @ (self.seats.T + self.feet.T @ reaction)
-        return seats, coordinates, -reaction
+        static = self.residual[len(rows) :]
+        sensors = self.sensors @ coordinates + static[:, :s] + static[:, s:] @ reaction
+        return Answers(seats, coordinates, sensors, -reaction)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Per unit force on each of s seats, at L lines: receptance of the seats Y (L, s, s), coordinates (L, 6 + n, s),
+    displacement of the sensors (L, r, s), forces on the ground at the feet (L, f, s)."""
+
+    seats: np.ndarray
+    coordinates: np.ndarray
+    sensors: np.ndarray
+    mounts: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -77,13 +89,20 @@ class Housed:
 
 def seat_forces(rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
     """(L, s): forces on seats that yield, from those on rigid ones, blocked (L, s), at ω (L,) > 0 rad/s."""
-    seats = housing.answers(omega)[0]
-    coupled = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ seats
-    return np.linalg.solve(coupled, blocked[:, :, None])[:, :, 0]
+    return _coupled(rings, housing.answers(omega), omega, blocked)[:, :, 0]
 
 
-def housed(rings: Rings, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
-    """The housing under forces (T, s) N that a run on rigid ground recorded every `step` (s), up to `highest` (Hz).
+def _coupled(rings: Rings | None, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
+    """(L, s, 1): forces on the seats; those given where there are no rings."""
+    if rings is None:
+        return blocked[:, :, None]
+    yielding = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ answers.seats
+    return np.linalg.solve(yielding, blocked[:, :, None])
+
+
+def housed(rings: Rings | None, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
+    """The housing under forces (T, s) N that a run recorded every `step` (s), up to `highest` (Hz): a run on rigid ground
+    where there are rings, else one in which the housing was, whose forces are those on yielding seats already.
 
     Forces fade in and out over RAMP of the record; its length is doubled with zeros, so that the housing can ring."""
     count = len(forces)
@@ -105,16 +124,15 @@ def _widths(housing: Housing) -> dict[str, int]:
 
 
 def _solve(
-    rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray, found: dict[str, np.ndarray]
+    rings: Rings | None, housing: Housing, omega: np.ndarray, blocked: np.ndarray, found: dict[str, np.ndarray]
 ) -> None:
     """Fill `found` at some lines."""
-    seats, coordinates, mounts = housing.answers(omega)
-    coupled = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ seats
-    force = np.linalg.solve(coupled, blocked[:, :, None])
-    moved = (coordinates @ force)[:, :, 0]
-    found["force"][:], found["mount"][:] = force[:, :, 0], (mounts @ force)[:, :, 0]
+    answers = housing.answers(omega)
+    force = _coupled(rings, answers, omega, blocked)
+    moved = (answers.coordinates @ force)[:, :, 0]
+    found["force"][:], found["mount"][:] = force[:, :, 0], (answers.mounts @ force)[:, :, 0]
     found["coordinates"][:], found["velocity"][:] = moved, 1j * omega[:, None] * moved
-    found["sensor"][:] = -(omega[:, None] ** 2) * (moved @ housing.sensors.T)
+    found["sensor"][:] = -(omega[:, None] ** 2) * (answers.sensors @ force)[:, :, 0]
 
 
 def _faded(values: np.ndarray) -> np.ndarray:
@@ -127,7 +145,6 @@ def _faded(values: np.ndarray) -> np.ndarray:
 
 
 def paths(housing: Housing, omega: float, force: Sequence[complex] | np.ndarray, sensor: int) -> np.ndarray:
-    """(s,): acceleration at one sensor row by each seat direction under its force (s,) at ω; their complex sum is that of
-    the sensor."""
-    coordinates = housing.answers(np.array([omega]))[1][0]
-    return -(omega**2) * (housing.sensors[sensor] @ coordinates) * np.asarray(force)
+    """(s,): acceleration at one sensor row by each seat direction under its force (s,) at ω; their complex sum is that
+    of the sensor."""
+    return -(omega**2) * housing.answers(np.array([omega])).sensors[0, sensor] * np.asarray(force)

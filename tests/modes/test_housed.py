@@ -17,7 +17,7 @@ def point_housing(mass: float, foot: float, loss: float) -> Housing:
     row = np.eye(1, 6)
     rest = np.diag([mass, mass, mass, 1.0, 1.0, 1.0])
     none = np.zeros(0)
-    return Housing(rest, none, none, row, row, row, np.zeros((2, 2)), np.array([foot]), np.array([loss]))
+    return Housing(rest, none, none, row, row, row, np.zeros((3, 2)), np.array([foot]), np.array([loss]))
 
 
 def test_two_masses_and_springs_by_hand() -> None:
@@ -44,8 +44,9 @@ def random_parts(seed: int) -> tuple[Rings, Housing, dict[str, np.ndarray]]:
     body = rng.normal(size=(6, 6))
     omega = np.sort(rng.uniform(200, 4000, modes))
     inertia = body @ body.T + np.eye(6)
-    residual = np.zeros((s + feet, s + feet))
-    housing = Housing(inertia, omega, np.full(modes, 0.01), rows[:s], rows[s:], rng.normal(size=(2, 6 + modes)), residual,
+    residual = np.zeros((s + feet + 2, s + feet))
+    sensors = rng.normal(size=(2, 6 + modes))
+    housing = Housing(inertia, omega, np.full(modes, 0.01), rows[:s], rows[s:], sensors, residual,
                       np.full(feet, 3e6), np.full(feet, 100.0))  # fmt: skip
     own = np.zeros((6 + modes, 6 + modes))
     own[6:, 6:] = np.diag(omega**2)
@@ -75,10 +76,10 @@ def test_blocked_forces_give_what_the_whole_matrices_give(seed: int) -> None:
         exact = -stage[n:] @ join @ moved
         found = seat_forces(rings, housing, np.array([w]), blocked[None])[0]
         assert np.abs(found - exact).max() < 1e-8 * np.abs(exact).max()
-        _, coordinates, mounts = housing.answers(np.array([w]))
-        assert np.abs(coordinates[0] @ found - moved[n:]).max() < 1e-8 * np.abs(moved[n:]).max()
+        answers = housing.answers(np.array([w]))
+        assert np.abs(answers.coordinates[0] @ found - moved[n:]).max() < 1e-8 * np.abs(moved[n:]).max()
         force = (housing.foot + 1j * w * housing.foot_loss) * (housing.feet @ moved[n:])
-        assert np.abs(mounts[0] @ found - force).max() < 1e-8 * np.abs(force).max()
+        assert np.abs(answers.mounts[0] @ found - force).max() < 1e-8 * np.abs(force).max()
         shares = paths(housing, float(w), found, 1)
         assert shares.sum() == pytest.approx(-(w**2) * housing.sensors[1] @ moved[n:], rel=1e-8)
 
