@@ -26,7 +26,7 @@ RAMP = 0.05  # part of the record over which forces fade in and out
 class Housing:
     """A free elastic body on feet. mass (6, 6): of its rigid motion; omega, zeta (n,) of its modes, mass-normalised;
     seats (s, 6 + n), in the order and directions of the rings' forces, feet (f, 6 + n), sensors (r, 6 + n): motion per
-    coordinate, rigid ones first; residual (s + f + r, s + f) m/N: their static motion beyond the modes per unit force on
+    coordinate, rigid ones first; residual (s + f + r, s + f) m/N: their static motion beyond the modes per force on
     seats and feet; foot, foot_loss (f,): N/m and N·s/m of the springs to the ground, none for a free housing."""
 
     mass: np.ndarray
@@ -101,7 +101,7 @@ def _coupled(rings: Rings | None, answers: Answers, omega: np.ndarray, blocked: 
 
 
 def housed(rings: Rings | None, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
-    """The housing under forces (T, s) N that a run recorded every `step` (s), up to `highest` (Hz): a run on rigid ground
+    """The housing under forces (T, s) N that a run recorded every `step` (s), up to `highest` (Hz): on rigid ground
     where there are rings, else one in which the housing was, whose forces are those on yielding seats already.
 
     Forces fade in and out over RAMP of the record; its length is doubled with zeros, so that the housing can ring."""

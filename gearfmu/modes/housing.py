@@ -4,31 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
 from gearfmu.modes.housed import Housing
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.assembly import stage_group
-from gearfmu.stage.build.free import FreeBody
-from gearfmu.stage.build.groups import FORCES, Support
+from gearfmu.stage.build.groups import FORCES
 
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A housing, with the names of its bearing forces (s,), mount forces (f,) and sensor accelerations (r,)."""
+    """A housing, its name, and those of its bearing forces (s,), mount forces (f,) and sensor accelerations (r,)."""
 
+    name: str
     housing: Housing
     seats: tuple[str, ...]
     feet: tuple[str, ...]
     sensors: tuple[str, ...]
 
 
-def placed_housing(stage: Stage, bodies: Sequence[Any], names: Sequence[str] | None = None) -> Placed:
+def placed_housing(stage: Stage, bodies: Sequence[object], names: Sequence[str] | None = None) -> Placed:
     """The housing of `stage`, reduced as one of `bodies`. names: of bearing forces, whose order it takes.
 
     Raises ModelError for a stage without a housing, and for one whose bearings are not those of `names`.
@@ -45,8 +45,9 @@ def placed_housing(stage: Stage, bodies: Sequence[Any], names: Sequence[str] | N
         raise ModelError(f"the bearings of the run and of stage {stage.name} are not the same: {strange}")
     held = [s for s in layout.supports if s.second is None and s.first[0] == number]
     feet = {f"{s.name}.{FORCES[d]}": (s.first[1], d) for s in held for d in s.directions}
-    sensed = stage.by_name(bodies)[name].sensors
-    sensors = _sensors(() if sensed is None else sensed.names, len(free.place))
+    body = stage.by_name(bodies)[name]
+    assert isinstance(body, InterfaceBody)
+    sensors = _sensors(() if body.sensors is None else body.sensors.names, len(free.place))
     order = tuple(seats if names is None else names)
     loaded = [*(seats[own] for own in order), *feet.values()]
     rows, columns = [*loaded, *sensors.values()], [6 * node + d for node, d in loaded]
@@ -65,7 +66,7 @@ def placed_housing(stage: Stage, bodies: Sequence[Any], names: Sequence[str] | N
         foot=1 / np.maximum(springs, 1e-15),
         foot_loss=np.concatenate([own.damping for own in held]) if held else np.zeros(0),
     )
-    return Placed(housing, order, tuple(feet), tuple(sensors))
+    return Placed(name, housing, order, tuple(feet), tuple(sensors))
 
 
 def _on(end: tuple[int, int] | None, body: int) -> bool:

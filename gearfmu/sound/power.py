@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.sound.levels import level, midbands, third_octaves, weighted
-from gearfmu.sound.radiation import Radiation
+from gearfmu.sound.radiation import LINES, Radiation
 from gearfmu.sound.skin import SoundError
 
 OVERLAP = 0.5  # of neighbouring segments
@@ -37,10 +37,9 @@ class SoundPower:
 
     @property
     def bands(self) -> np.ndarray:
-        """(B,) Hz: midbands of the third octaves that lie wholly between the first and the last line."""
-        step = self.frequency[1] - self.frequency[0]
-        every = midbands(20.0, 20e3)
-        return every[(every * 10**-0.05 > step) & (every * 10**0.05 < self.frequency[-1])]
+        """(B,) Hz: midbands of the third octaves from 63 Hz to 8 kHz, less where the record ends earlier."""
+        every = midbands(*LINES)
+        return every[every * 10**0.05 < self.frequency[-1]]
 
     def third_octaves(self, erp: bool = False) -> np.ndarray:
         """(S, B) W."""

@@ -53,8 +53,8 @@ class Skin:
 
 
 def skin_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray, shapes: np.ndarray) -> Skin:
-    """A skin out of triangles and quadrilaterals, F rows of three or four numbers of points; quadrilaterals are cut
-    along their shorter diagonal. points (P, 3) m, shapes (P, 3, N).
+    """A skin out of triangles and quadrilaterals, F rows of three or four numbers of points, the last one
+    repeated in a triangle; quadrilaterals are cut along their shorter diagonal. points (P, 3) m, shapes (P, 3, N).
 
     Raises SoundError, which names every hole with its place and size, for faces that close no volume, and for a skin
     that is turned inside out.
@@ -134,8 +134,9 @@ def patches(skin: Skin, count: int) -> np.ndarray:
 
 def _triangles(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     """(T, 3): triangles as they are, quadrilaterals cut along their shorter diagonal."""
-    whole = np.array([face for face in faces if len(face) == 3], dtype=int).reshape(-1, 3)
-    quads = np.array([face for face in faces if len(face) == 4], dtype=int).reshape(-1, 4)
+    three = [face[:3] for face in faces if len(face) == 3 or face[3] == face[2]]
+    whole = np.array(three, dtype=int).reshape(-1, 3)
+    quads = np.array([face for face in faces if len(face) == 4 and face[3] != face[2]], dtype=int).reshape(-1, 4)
     across = np.linalg.norm(points[quads[:, [0, 1]]] - points[quads[:, [2, 3]]], axis=2)
     turned = np.where(across[:, :1] <= (1 + 1e-9) * across[:, 1:], quads, np.roll(quads, -1, axis=1))
     return np.concatenate([whole, turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
