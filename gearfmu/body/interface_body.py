@@ -134,7 +134,9 @@ def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:
         texts["interfaces"], texts["ground"] = tuple(texts["interfaces"]), tuple(texts["ground"])
         name, input_hash = (str(file.attrs[name]) for name in ("name", "input_hash"))
         version = int(file.attrs.get("algorithm_version", 1))  # files of the first version do not say it
-        return InterfaceBody(name=name, input_hash=input_hash, algorithm_version=version, **texts, **values, **read_sensed(file))
+        return InterfaceBody(
+            name=name, input_hash=input_hash, algorithm_version=version, **texts, **values, **read_sensed(file)
+        )
 
 
 def interface_facts(body: InterfaceBody) -> dict[str, Any]:

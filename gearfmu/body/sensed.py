@@ -102,7 +102,9 @@ def sensed_problems(sensors: Sensors | None, skin: Skin | None, m: int, n: int) 
         wanted.append(("skin/faces", skin.faces, (len(skin.faces), 4)))
     problems = [f"{name} has shape {own.shape}, expected {shape}" for name, own, shape in wanted if own.shape != shape]
     if not problems:
-        problems = [f"{name} holds a number that is not finite" for name, own, _ in wanted if not np.isfinite(own).all()]
+        problems = [
+            f"{name} holds a number that is not finite" for name, own, _ in wanted if not np.isfinite(own).all()
+        ]
     if not problems and skin is not None and not 0 <= skin.faces.min() <= skin.faces.max() < len(skin.points):
         problems.append("skin/faces name points that there are not")
     return problems

@@ -120,7 +120,9 @@ def _load_general(layers: Layers) -> Read:
         return None, problems
     bodies: dict[str, Any] = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
     for own in spec.housings:
-        bodies[own.name] = own.model_copy(update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")})
+        bodies[own.name] = own.model_copy(
+            update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")}
+        )
     return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies})), []
 
 

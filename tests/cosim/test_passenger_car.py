@@ -4,10 +4,12 @@ physics."""
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 from scipy.linalg import eigh
 
 from evidence.pages.drivetrain import page
@@ -17,10 +19,24 @@ from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.spec.forms.turning import Shafts
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.scenes.drivetrain import PassengerCar
+from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
 
 SHAFTS = Shafts("pinion", "wheel", -1.5)
 CAR = PassengerCar()
+
+
+@pytest.mark.parametrize("drive", [PassengerCar, TestRig])
+def test_shafts_are_as_stiff_as_the_cylinders_they_are_said_to_be(drive: type[BaseModel]) -> None:
+    """G π d⁴/(32 l), to two digits."""
+    said = r"computed: (2 × )?solid steel, G = ([\d.]+) GPa, d = (\d+) mm, l = ([\d.]+) m"
+    seen = 0
+    for field in drive.model_fields.values():
+        if found := re.search(said, str(field)):
+            count, shear, diameter, length = 1 + bool(found[1]), *map(float, found.groups()[1:])
+            stiffness = count * 1e9 * shear * math.pi * (1e-3 * diameter) ** 4 / 32 / length
+            assert field.default == pytest.approx(stiffness, rel=0.02)
+            seen += 1
+    assert seen == (3 if drive is PassengerCar else 2)
 
 
 def closure(**changes) -> SceneSpec:

@@ -57,6 +57,7 @@ def test_the_whole_stage(tmp_path: Path) -> None:
     assert all(float(row["lowest_Hz"]) <= float(row["frequency_Hz"]) <= float(row["highest_Hz"]) for row in rows)
 
 
+@pytest.mark.full  # nine seconds
 def test_a_train(tmp_path: Path) -> None:
     """Torque on the input that brings no mesh beyond its torque_max; a column and orders of its own for each mesh."""
     code, out, err = call("modes", "two_stage", "--count", 4, "--out", tmp_path)

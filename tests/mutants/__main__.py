@@ -23,7 +23,6 @@ from dataclasses import replace
 from queue import SimpleQueue
 from threading import Lock
 
-from chosen import chosen
 from copies import Copy
 from draw import drawn
 from judges import judges, known, make_map
@@ -36,11 +35,10 @@ SECONDS = 90.0  # processor time of the tests of one defect
 
 
 def draw(number: int, seed: int) -> None:
-    """Adds defects to the table: those chosen by hand and `number` of those drawn that change the program's code."""
+    """Adds `number` of the drawn defects that change the program's code to the table, which also has those that were
+    once chosen by hand."""
     rows = read()
     known = {(r.file, r.before, r.after) for r in rows}
-    rows += [row_of(d) for d in chosen() if (d.file, d.before, d.after) not in known]
-    write(rows)
     copy, left = Copy("copy0"), number
     copy.build()
     for defect in drawn(seed):

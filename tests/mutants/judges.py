@@ -18,7 +18,7 @@ MAP = KEPT / "map"
 FOLDERS = (
     "geometry relations kernel spec femesh fem cosim reduction body modes planning stage report rexs study".split()
 )
-FOLDERS += ["imports", ".", "sweeps", "fmu"]
+FOLDERS += ["imports", ".", "sweeps", "bearing", "fmu"]
 STORED = "test_golden", "test_quoted", "test_evidence"  # answers of our own: no judges
 OF_TEXTS = "test_c_sources test_said_twice test_builds test_build_without_compiler test_fuzz test_docs test_packages"
 OF_TEXTS += " test_site test_notebooks test_tutorial test_examples test_chain test_mutants test_interrupted"

@@ -77,6 +77,7 @@ def small_train() -> StageModel:
     return assemble(spec, [body(gear, gear_shape(gear)) for gear in gears])
 
 
+@pytest.mark.full  # thirteen seconds
 def test_a_train_is_planned(tmp_path: Path) -> None:
     plan = planned(TRAIN, "two_stage", small_train(), tmp_path)
     assert keeps_the_budget_at_a_longer_step(plan)

@@ -31,6 +31,18 @@ def test_the_two_stage_train_is_read():
     assert sum(support.to is None for support in stage.supports) == 6
 
 
+def test_a_body_that_another_carries_is_not_planar():
+    """Held in the plane alone a spur set still turns with its carrier."""
+    stage = load_stage("planetary54")
+    flat = tuple(s.model_copy(update={"axial": None, "tilt": None, "at": None}) for s in stage.supports)
+    gears = {gear.name: gear for gear in stage.gears}
+    rotors = {name: rotor for name, rotor in stage.rotors.items() if set(rotor.bodies) <= set(gears)}
+    alone = {"supports": tuple(s for s in flat if s.body in gears), "bodies": gears, "rotors": rotors}
+    assert any(s.to for s in alone["supports"])
+    held = tuple(s.model_copy(update={"to": None}) for s in alone["supports"])
+    assert stage.model_copy(update=alone | {"supports": held}).planar and not stage.model_copy(update=alone).planar
+
+
 @pytest.mark.parametrize(
     ("change", "field", "says"),
     [

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from gearfmu.errors import SpecError
@@ -145,3 +147,28 @@ def test_nothing_is_left_of_what_is_refused_and_nothing_is_overwritten(tmp_path:
     new_from_numbers("mine", PAIR, tmp_path)
     with pytest.raises(SpecError, match="exists already"):
         new_from_numbers("mine", SET, tmp_path)
+
+
+@pytest.mark.parametrize("wish", [replace(PAIR, center=None), SET], ids=["pair", "set"])
+def test_twice_the_module_proposes_twice_every_length(wish: Wish) -> None:
+    """But for rounding to two digits: 8 % of the carrier's bore."""
+    small, large = (_lengths(draft_of(size).tables) for size in (wish, twice(wish)))
+    assert len(small) >= 10
+    assert large == pytest.approx({place: 2 * value for place, value in small.items()}, rel=0.1)
+    assert np.median([large[place] / value for place, value in small.items()]) == pytest.approx(2.0, rel=1e-3)
+
+
+def twice(wish: Wish) -> Wish:
+    assert wish.module and wish.width
+    return replace(wish, module=2 * wish.module, width=2 * wish.width)
+
+
+def _lengths(table: dict[str, Any], way: str = "") -> dict[str, float]:
+    """Every value in mm, by its place."""
+    found = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found |= _lengths(value, f"{way}{key}.")
+        elif isinstance(value, str) and value.endswith(" mm"):
+            found[way + key] = float(value.split()[0])
+    return found

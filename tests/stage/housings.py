@@ -12,7 +12,12 @@ from gearfmu.fem.coupling import rigid_fields
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 
-FEET = {"foot0": (-0.05, -0.09, 0.01), "foot1": (0.29, -0.09, 0.01), "foot2": (-0.05, -0.09, 0.12), "foot3": (0.29, -0.09, 0.12)}
+FEET = {
+    "foot0": (-0.05, -0.09, 0.01),
+    "foot1": (0.29, -0.09, 0.01),
+    "foot2": (-0.05, -0.09, 0.12),
+    "foot3": (0.29, -0.09, 0.12),
+}
 SENSORS = {"top": (0.12, 0.25, 0.064), "cover": (0.06, 0.16, 0.13)}
 
 

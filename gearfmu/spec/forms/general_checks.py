@@ -47,7 +47,9 @@ def _what_can_be_judged(stage: Stage) -> Stage:
     good = {name for name in stage.bodies if counts[name] == 1} | standing
     gears = {gear.name for gear in stage.gears} & good
     rotors = {
-        name: rotor.model_copy(update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good - standing}})
+        name: rotor.model_copy(
+            update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good - standing}}
+        )
         for name, rotor in stage.rotors.items()
     }
     kept = {
@@ -94,10 +96,10 @@ def _rotors(stage: Stage) -> Found:
         for body in rotor.bodies:
             if body not in stage.bodies:
                 yield f"rotors.{name}.bodies.{body}", body, _unknown_body(stage)
-    for name, body in stage.bodies.items():
-        if counts[name] != 1 and not isinstance(body, HousingBody):
+    for own in stage.bodies:
+        if counts[own] != 1 and not isinstance(stage.bodies[own], HousingBody):
             remedy = "a body belongs to one rotor: name it in the bodies of one [rotors.…]"
-            yield f"bodies.{name}", f"in {counts[name]} rotors", remedy
+            yield f"bodies.{own}", f"in {counts[own]} rotors", remedy
 
 
 def _names(stage: Stage) -> Found:

@@ -24,7 +24,7 @@ def housing_problems(stage: Stage) -> Found:
         if not any(s.body == housing.name for s in stage.supports):
             feet = ", ".join(housing.imported.feet) or "none in its import: name node sets in feet = {…}"
             remedy = (
-                f"nothing holds it: write [[supports]] with body = \"{housing.name}\" and node one of its feet ({feet}); "
+                f'nothing holds it: write [[supports]] with body = "{housing.name}" and node one of its feet ({feet}); '
                 'one that hangs freely has soft ones, e.g. radial = "1e4 N/m"'
             )
             yield f"bodies.{housing.name}", "no feet", remedy

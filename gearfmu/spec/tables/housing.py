@@ -12,6 +12,7 @@ from gearfmu.spec.tables.imported import FilesSpec
 
 Method = Literal["krylov", "rubin", "craig_bampton", "modal"]
 Coupling = Literal["averaging", "rigid"]
+MOST_SENSORS = 85  # three outputs each, of 255
 LONGEST = 20  # characters of a sensor's name, with which its outputs begin
 
 
@@ -37,6 +38,8 @@ class HousingImportSpec(FilesSpec):
     def _named_apart(self) -> HousingImportSpec:
         if twice := sorted(set(self.seats) & set(self.feet)):
             raise refuse(f"seats and feet share the name {twice[0]}: give every node its own")
+        if len(self.sensors) > MOST_SENSORS:
+            raise refuse(f"{len(self.sensors)} sensors, at most {MOST_SENSORS} are outputs: leave some away")
         if long := [name for name in self.sensors if len(name) > LONGEST]:
             raise refuse(f"the name of the sensor {long[0]} has more than {LONGEST} characters: shorten it")
         return self
@@ -51,7 +54,7 @@ class HousingBody(Spec):
     kind: Literal["housing"] = Field(description="kind of body")
     material: Material = Field(description="material")
     modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    method: Method = Field(default="craig_bampton", description="method of reduction; every one ends in oscillators")
+    method: Method = Field(default="rubin", description="method of reduction; every one ends in oscillators")
     modes: Annotated[Count, Whole("carrier_modes")] = Field(default=200, description="number of oscillators stored")
     dynamic_to: Annotated[float, Quantity("stored_to")] = Field(
         default=10e3, description="oscillators above are compliance in every run"

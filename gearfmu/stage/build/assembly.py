@@ -134,9 +134,14 @@ def general_sections(
 
 def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    return mount(layout_of(stage, bodies))
+
+
+def layout_of(stage: Stage, bodies: Sequence[Any]) -> Layout:
+    """Its free bodies and what holds them."""
     tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)
-    return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
+    return stage_layout(stage, bodies, carriers=carriers, tangents=tangents)
 
 
 def tangents_of(stage: Stage, bodies: Sequence[object]) -> Tangents:
@@ -171,8 +176,8 @@ def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None)
 def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
     """The bodies of the stage's gears in their order, and those of carriers and housing by name."""
     found = stage.by_name(bodies)
-    others = (*stage.carriers, *stage.housings)
-    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in others}
+    others = [own.name for own in stage.carriers] + [own.name for own in stage.housings]
+    return [found[gear.name] for gear in stage.gears], {name: found[name] for name in others}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:

@@ -225,8 +225,11 @@ def _between_flanks(here: np.ndarray, there: np.ndarray) -> np.ndarray:
     """(2, 2, P, P, A, A): Σ_k here there of rows (2, P, A, n), over the modes that `there` has."""
     flanks, rolls, functions, _ = here.shape
     total = np.zeros((flanks, flanks, rolls, rolls, functions, functions))
-    for k in np.flatnonzero(np.any(there, axis=(0, 1, 2))):
-        total += here[:, None, :, None, :, None, k] * there[None, :, None, :, None, :, k]
+    part = np.empty_like(total)
+    used = np.any(there, axis=(0, 1, 2))
+    rows = (np.moveaxis(table[..., used], -1, 0).copy() for table in (here, there))
+    for a, b in zip(*rows, strict=True):
+        total += np.multiply(a[:, None, :, None, :, None], b[None, :, None, :, None, :], out=part)
     return total
 
 
@@ -249,8 +252,9 @@ def _check_bore(body: Any, turning: np.ndarray) -> None:
 def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """left (…, n) · right (m, n)ᵀ, summed in one order whatever the memory (`blend`)."""
     total = np.zeros((*left.shape[:-1], right.shape[0]))
+    part = np.empty_like(total)
     for k in range(right.shape[1]):
-        total += left[..., k, None] * right[:, k]
+        total += np.multiply(left[..., k, None], right[:, k], out=part)
     return total
 
 

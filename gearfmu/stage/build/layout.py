@@ -94,8 +94,8 @@ def stage_layout(
     tangents: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> Layout:
     """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
-    `carriers` and housing. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read; the even
-    grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
+    `carriers` and housing. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read;
+    the even grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     points = even_grids(stage, bodies, ROLLS) if points is None else points
     free: list[FreeBody] = []

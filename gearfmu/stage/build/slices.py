@@ -7,6 +7,7 @@ known; the kernel puts that of the slices themselves in its place."""
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
@@ -24,7 +25,8 @@ def smeared(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray) ->
     """The section "smeared" of a gear: (ROLLS, DISTANCES, A, A) 1/m for the Legendre degrees (A,), at lengths of roll
     from s_form to s_tip and distances across the width from 0 to the face width."""
     arcs = np.linspace(shape.s_form, shape.s_tip, ROLLS) / shape.r_b
-    return between_functions(gear.face_width, gear.body.strip_half_width, shape.beta_b, arcs, degrees)
+    known = (gear.face_width, gear.body.strip_half_width, shape.beta_b, tuple(arcs.tolist()), tuple(degrees.tolist()))
+    return _between(*known)
 
 
 def smeared_tip(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray) -> np.ndarray:
@@ -36,6 +38,14 @@ def smeared_tip(gear: GearSpec | RingBody, shape: GearShape, degrees: np.ndarray
     across = 2 * profile * np.linspace(0.0, 1.0, DISTANCES) ** 2
     strip = gear.body.strip_half_width
     return _turned_alike(np.array([first.T @ _of_strips(away, y, strip) @ second for y in across]), degrees)
+
+
+@lru_cache(maxsize=64)
+def _between(width: float, strip: float, helix: float, arcs: tuple[float, ...], degrees: tuple[int, ...]) -> np.ndarray:
+    """`between_functions`, kept: the same gear is assembled again and again, in sweeps and beside its equals."""
+    found = between_functions(width, strip, helix, np.array(arcs), np.array(degrees))
+    found.flags.writeable = False
+    return found
 
 
 def between_functions(width: float, strip: float, helix: float, arcs: np.ndarray, degrees: np.ndarray) -> np.ndarray:

@@ -46,11 +46,14 @@ def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
     give an equal blob.
     """
     moved = np.moveaxis(values, axis, 0)
-    shape = (-1,) + (1,) * (moved.ndim - 1)
-    total = np.zeros((weights.shape[0], *moved.shape[1:]))
-    for weight, value in zip(weights.T, moved, strict=True):
-        total += weight.reshape(shape) * value
-    return np.moveaxis(total, 0, axis)
+    if np.array_equal(weights, np.eye(len(moved))):
+        return values.astype(float)
+    flat = np.ascontiguousarray(moved, float).reshape(len(moved), -1)
+    total = np.zeros((weights.shape[0], flat.shape[1]))
+    part = np.empty_like(total)
+    for weight, value in zip(weights.T, flat, strict=True):
+        total += np.multiply(weight[:, None], value, out=part)
+    return np.moveaxis(total.reshape(-1, *moved.shape[1:]), 0, axis)
 
 
 def symmetric_functions(count: int) -> np.ndarray:

@@ -16,8 +16,6 @@
 #define GK_HIGH_PORTS 16
 #define GK_LOW_SUPPORTS 0 /* directions in which bodies are held */
 #define GK_HIGH_SUPPORTS 256
-#define GK_LOW_SENSORS 0 /* directions in which points of the housing are felt */
-#define GK_HIGH_SENSORS 255
 #define GK_LOW_TEETH 1
 #define GK_HIGH_TEETH 1000
 #define GK_USUAL_H 1e-4 /* s: communication step of a model description */

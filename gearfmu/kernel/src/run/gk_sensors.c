@@ -20,6 +20,5 @@ void gk_sensors_means(const gk_model *model, const gk_setup *setup, const gk_wor
     double after[MAX_SENSORS], *const moved = work->tally + 4 * setup->base.n, *const speed = moved + setup->base.n;
     gk_supports_motion(setup, work, data, moved, speed);
     gk_sensors_speed(model, setup, speed, after);
-    for (int i = 0; i < model->sensors; i++)
-        GK_OF(data, sensor)[i][V_ACCELERATION] = (after[i] - before[i]) / H;
+    for (int i = 0; i < model->sensors; i++) GK_OF(data, sensor)[i][V_ACCELERATION] = (after[i] - before[i]) / H;
 }

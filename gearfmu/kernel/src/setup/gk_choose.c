@@ -158,8 +158,10 @@ int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
     }
 }
 
+/* do engagements act on each other through what is compliance at level rigid, a gear or a housing? */
 static int shares(const gk_model *model, const gk_setup *setup)
 {
+    if (model->housed && setup->base.set == 0) return model->engagements > 1;
     for (int g = 0; g < model->gears; g++)
         if (setup->engagements_of[g] > 1) return 1;
     return 0;
