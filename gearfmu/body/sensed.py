@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import h5py
 import numpy as np
@@ -59,7 +59,7 @@ SKIN = (
         "1, m, kg-1/2",
         "displacement of the points: rigid motion x, y, z, rx, ry, rz about the origin, then the oscillators",
         "f4",
-        bits=PICTURE_BITS + 2,
+        bits=PICTURE_BITS,
         each=True,
     ),
 )
@@ -69,14 +69,21 @@ def write_sensed(file: h5py.File, sensors: Sensors | None, skin: Skin | None) ->
     """Write the groups that a body has."""
     for part, entries in ((sensors, SENSORS), (skin, SKIN)):
         for entry in entries if part is not None else ():
-            write_entry(file, entry, np.asarray(getattr(part, entry.field), dtype=entry.kind))
+            write_entry(file, entry, np.asarray(vars(part)[entry.field], dtype=entry.kind))
     if sensors is not None:
         file["sensors"].attrs[NAMES] = json.dumps(sensors.names)
 
 
-def read_sensed(file: h5py.File) -> dict[str, Any]:
+class Sensed(TypedDict, total=False):
     """`sensors` and `skin` of a body, as far as its file has them."""
-    found: dict[str, Any] = {}
+
+    sensors: Sensors
+    skin: Skin
+
+
+def read_sensed(file: h5py.File) -> Sensed:
+    """What is there."""
+    found: Sensed = {}
     if "sensors" in file:
         values = {entry.field: read_entry(file[entry.path], entry) for entry in SENSORS}
         found["sensors"] = Sensors(tuple(json.loads(file["sensors"].attrs[NAMES])), **values)

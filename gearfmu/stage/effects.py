@@ -211,7 +211,7 @@ EFFECTS: tuple[Effect, ...] = (
         "housing",
         title="elastic housing",
         formula="one more free body of the ground group: bearings between shafts and seats, feet on the ground",
-        equation="1 (eqs. 2a, 2b), 2d",
+        equation="1 (eq. 2d)",
         matters="forces at bearings and mounts below some kHz: on rigid ground sensors err by 12 dB",
         off="seats stand on the ground: the stage without its housing, bit for bit; sensors and mounts read nothing",
         code="gk_choose.c (gk_choose): another set of ground oscillators; gk_sensors.c",

@@ -9,6 +9,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body import body_path, load_bodies, reduce_bodies
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.reading.library import library_roots, shipped_stages
 from gearfmu.spec.stage import load_stage
@@ -23,6 +24,9 @@ def test_no_shipped_body_is_stale_large_or_incomplete(stage):
     spec = load_stage(stage)
     for body in load_bodies(spec):
         assert body_path(spec, body.name).stat().st_size <= LARGEST
+        if isinstance(body, InterfaceBody):
+            assert body.max_error < 0.1 and body.trusted_to > 6e3 and body.skin is not None and body.sensors is not None
+            continue
         assert body.frf.max_error < 0.01 or spec.written is spec  # those of a train say how far they reach
         assert body.knows_profile and body.spin is not None
 

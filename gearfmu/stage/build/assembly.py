@@ -137,7 +137,7 @@ def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
     return mount(layout_of(stage, bodies))
 
 
-def layout_of(stage: Stage, bodies: Sequence[Any]) -> Layout:
+def layout_of(stage: Stage, bodies: Sequence[object]) -> Layout:
     """Its free bodies and what holds them."""
     tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)

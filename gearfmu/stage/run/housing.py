@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 
+from gearfmu.body.bodies import Body
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
@@ -48,7 +48,7 @@ class HousingAlone:
     pushes: np.ndarray
 
     @classmethod
-    def of(cls, stage: Stage, bodies: Sequence[Any]) -> HousingAlone:
+    def of(cls, stage: Stage, bodies: Sequence[Body]) -> HousingAlone:
         """The housing of a stage; bodies as of `assemble`. ModelError where the stage has none."""
         if not stage.housings:
             raise ModelError(f"{stage.name} has no housing: its bearings stand on rigid ground")
@@ -60,7 +60,9 @@ class HousingAlone:
         own = [(s.name, s.second[1], d) for s in seats if s.second is not None for d in s.directions]
         names = tuple(f"{name}.{FORCES[direction]}_mean" for name, _, direction in own)
         pushes = np.array([group.node_rows(0, node, direction) for _, node, direction in own])
-        return cls(bodies[-1], group, names, pushes)
+        body = bodies[-1]
+        assert isinstance(body, InterfaceBody)
+        return cls(body, group, names, pushes)
 
     def motion(self, trace: Trace) -> HousingMotion:
         """How the housing of a run moved, from rest under its first forces. TraceError where the run did not record
