@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
+from gearfmu.body.housing import reduced_housing
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
@@ -99,12 +100,15 @@ def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = N
 def reduce_body(stage: Stage, name: str, progress: Progress | None = None) -> Body:
     """One body from the numbers of its stage. Raises MeshError with the place of the body in the stage file."""
     toothed, wanted = members(stage), expected_hash(stage, name)
+    housings = {housing.name: housing for housing in stage.housings}
     try:
         if name in toothed:
             return reduced_gear(toothed[name], wanted, progress)
+        if name in housings:
+            return reduced_housing(housings[name], wanted, progress)
         return reduced_carrier(carrier_of(stage), wanted, progress)
     except MeshError as error:
-        place = toothed[name].place if name in toothed else name
+        place = toothed[name].place if name in toothed else stage.table_of(name)
         raise MeshError(f"{stage.source}: {place}: {error}") from error
 
 

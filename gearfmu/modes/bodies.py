@@ -31,6 +31,9 @@ def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = 
 
     scale : factor on all element counts.
     """
+    if name in {housing.name for housing in stage.housings}:
+        why = "shapes are drawn of gears, rings and carriers: `gearfmu inspect` shows a housing's frequencies"
+        raise BodyError(f"{stage.source}: {name} is a housing: {why}")
     part: CarrierSpec | ToothedBody = carrier_of(stage).part if name == CARRIER else member_of(stage, name).gear
     if isinstance(part, CarrierSpec) and part.imported is None:
         found = _carrier(stage, count, progress, scale)

@@ -24,6 +24,7 @@ from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.flanks import deviation_sections
 from gearfmu.stage.build.ground_part import PartFlank
 from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
+from gearfmu.stage.build.housed import Sensed, sensor_sections, widened
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
 from gearfmu.stage.build.meshes import stage_sections, tooth_phases
@@ -39,7 +40,7 @@ from gearfmu.stage.build.teeth import gear_section, mismatches
 from gearfmu.stage.build.whirls import whirl_rows
 
 MODEL_VERSION = 5
-VARIABLES = "8f777a572eab"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256
+VARIABLES = "d2044e61d168"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256
 _KEPT = 16  # stages whose bearings are remembered
 _SETTLED: dict[str, Settled] = {}
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -92,9 +93,11 @@ def general_sections(
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
     flanks = [stored_points(body, s.s_form, s.s_tip, rolls) for body, s in zip(bodies, shapes, strict=True)]
-    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks], tangents)
+    points = [points for points, _ in flanks]
+    layout = stage_layout(stage, bodies, carriers, points, tangents)
+    bare = stage_layout(stage.on_rigid_ground(), bodies, carriers, points, tangents) if stage.housings else None
     nodes = port_nodes(stage, carriers)
-    groups = mount_sets(layout)
+    groups = mount_sets(layout, bare)
     degrees = width_degrees(stage, bodies)
     sections = stage_sections(stage) | nodal_sections(stage) | _port_sections(stage, groups[0], nodes)
     sections |= {
@@ -119,7 +122,8 @@ def general_sections(
             sections[f"smeared_tip{i}"] = smeared_tip(gear, shape, degrees)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
-        sections |= set_sections(s, group, nodes)
+        sections |= widened(set_sections(s, group, nodes), s, len(layout.support_names()))
+    sections |= sensor_sections(_sensed(stage, carriers, layout), groups[0])
     lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
@@ -131,9 +135,14 @@ def general_sections(
 
 def stage_group(stage: Stage, bodies: Sequence[Body]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    return mount(layout_of(stage, bodies))
+
+
+def layout_of(stage: Stage, bodies: Sequence[Body]) -> Layout:
+    """Its free bodies and what holds them."""
     tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)
-    return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
+    return stage_layout(stage, bodies, carriers=carriers, tangents=tangents)
 
 
 def tangents_of(stage: Stage, bodies: Sequence[Body]) -> Tangents:
@@ -143,14 +152,15 @@ def tangents_of(stage: Stage, bodies: Sequence[Body]) -> Tangents:
 
 
 def settled(stage: Stage, bodies: Sequence[Body], torque: float | None = None) -> Settled:
-    """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None. ModelError where
-    it has none, and as of `settle`."""
+    """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None; on rigid ground,
+    so that a housing changes no bearing. ModelError where it has none, and as of `settle`."""
     if not stage.rolling:
         raise ModelError(
             f"{stage.name} has no rolling bearings: give some of its supports one (docs/howto-bearings.md)"
         )
     assert stage.operating is not None
     at = stage.operating.torque if torque is None else torque
+    stage, bodies = stage.on_rigid_ground(), bodies[: len(bodies) - len(stage.housings)]
     key = f"{_made_of(stage, bodies, ROLLS, ())} {at!r}"
     if key not in _SETTLED:
 
@@ -165,9 +175,10 @@ def settled(stage: Stage, bodies: Sequence[Body], torque: float | None = None) -
 
 
 def _parted(stage: Stage, bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Body]]:
-    """The bodies of the stage's gears in their order, and its carriers' by name."""
+    """The bodies of the stage's gears in their order, and those of carriers and housing by name."""
     found = stage.by_name(bodies)
-    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
+    others = [own.name for own in stage.carriers] + [own.name for own in stage.housings]
+    return [found[gear.name] for gear in stage.gears], {name: found[name] for name in others}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
@@ -190,13 +201,25 @@ def _carried_sections(layout: Layout) -> dict[str, Any]:
     }
 
 
-def mount_sets(layout: Layout) -> list[Group]:
-    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there."""
-    held = replace(layout, supports=[support.hold() for support in layout.supports])
+def mount_sets(layout: Layout, bare: Layout | None = None) -> list[Group]:
+    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there. bare:
+    the layout without its housing; the supports that are held are its own then, and it is the third set."""
+    standing = layout if bare is None else bare
+    held = replace(standing, supports=[support.hold() for support in standing.supports])
+    groups = [mount(layout)]
     try:
-        return [mount(layout), mount(held)]
+        groups.append(mount(held))
     except RigidSupportError:
-        return [mount(layout)]
+        groups += [] if bare is None else [mount(bare)]
+    return groups + ([] if bare is None else [mount(bare)])
+
+
+def _sensed(stage: Stage, carriers: Mapping[str, Body], layout: Layout) -> Sensed | None:
+    for housing in stage.housings:
+        if (sensors := carriers[housing.name].sensors) is not None:
+            body = len(layout.bodies) - 1
+            return Sensed(body, len(layout.bodies[body].nodes) - len(sensors.names), sensors.names)
+    return None
 
 
 def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
@@ -285,9 +308,7 @@ def flank_sections(
     assert flank is not None
     port = np.zeros((*flank.node.shape[1:4], len(nodes)))
     port[..., [p for p, (own, _) in enumerate(nodes) if own == index]] = flank.node[0][..., SPIN, None]
-    family = families(layout)[index]
-    reads = [np.flatnonzero(group.owner == family) for group in groups]
-    assert len({read.size for read in reads}) == 1
+    reads = [np.flatnonzero(group.owner == families(group.layout)[index]) for group in groups]
     found = flank_tables(index, flank, degrees) | {
         f"node_support{index}": node_directions(layout, index).T,
         f"port_residual{index}": port,

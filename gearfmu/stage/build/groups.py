@@ -68,7 +68,8 @@ class Support:
 
 @dataclass(frozen=True)
 class Layout:
-    """Bodies, rotors (bodies that spin together, every body in one) and supports; planar: motion x and y alone.
+    """Bodies, rotors (bodies that spin together, every body but a housing in one) and supports; planar: motion x and y
+    alone.
 
     stands: rotors that do not spin; carried: rotor → the rotor in whose axes it stands, and x and y (m) of its axis
     there.
@@ -85,8 +86,8 @@ class Layout:
         """Rigid freedoms of a body among the unknowns: its own rotation too where other bodies share its spin."""
         if self.planar:
             return PLANAR
-        rotor = next(r for r, own in enumerate(self.rotors) if body in own)
-        own_rotation = len(self.rotors[rotor]) > 1 or rotor in self.stands or rotor in self.frames
+        rotor = next((r for r, own in enumerate(self.rotors) if body in own), -1)  # -1: a housing
+        own_rotation = rotor < 0 or len(self.rotors[rotor]) > 1 or rotor in self.stands or rotor in self.frames
         return (*SPATIAL, SPIN) if own_rotation else SPATIAL
 
     @property
@@ -122,8 +123,9 @@ class Layout:
         return float(sum(self.bodies[b].mass[SPIN, SPIN] for b in self.rotors[rotor]) + carried)
 
     def mass(self, body: int, direction: int) -> float:
-        """Mass, or moments of inertia of the single bodies, of the rotor that a body belongs to, kg or kg·m²."""
-        own = next(rotor for rotor in self.rotors if body in rotor)
+        """Mass, or moments of inertia of the single bodies, of the rotor that a body belongs to, kg or kg·m²; of a
+        housing its own."""
+        own = next((rotor for rotor in self.rotors if body in rotor), (body,))
         return float(sum(self.bodies[b].mass[direction, direction] for b in own))
 
     def support_names(self) -> list[str]:

@@ -33,7 +33,7 @@ def observed_number(stage: Stage, name: str) -> int:
 def observed_sections(index: int, bodies: Sequence[Body], groups: Sequence[Group]) -> dict[str, Any]:
     """Sections of the blob that make the motion of gear `index` outputs. bodies: reduced gears of the stage."""
     layout, body = groups[0].layout, bodies[index]
-    flank, family = layout.bodies[index].flank, families(layout)[index]
+    flank = layout.bodies[index].flank
     assert flank is not None
     found: dict[str, Any] = {
         f"observed{index}": layout.bodies[index].name,
@@ -43,7 +43,7 @@ def observed_sections(index: int, bodies: Sequence[Body], groups: Sequence[Group
         f"mode_scale{index}": np.array([1 / math.sqrt(body.total_mass)]),
     }
     for s, group in enumerate(groups):
-        read = np.flatnonzero(group.owner == family)
+        read = np.flatnonzero(group.owner == families(group.layout)[index])
         elastic = group.shapes[group.at[index]][len(layout.freedoms(index)) :]
         rows = np.vstack([group.rigid(index), elastic / math.sqrt(body.total_mass)])
         found[f"own_rows{index}_{s}"] = np.ascontiguousarray(rows[:, read])

@@ -9,6 +9,7 @@ struct gk_tally { /* integrals over a communication step */
     double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
     double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* forces that contacts and joints put on the supports directly;
                                                          last: at the end of the step before */
+    double sensed[MAX_SENSORS];                       /* speeds of the sensors at the beginning */
     double *moved, *speed, *last_moved, *last_speed;  /* (ground oscillators) what moves springs and dashpots of the
                                                         supports */
     double *now[2];                                   /* scratch of the same size */
@@ -37,6 +38,10 @@ GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup,
 GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                                double *out, double *of_spring);
 GK_HOT void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
+/* gk_sensors.c */
+GK_HOT void gk_sensors_speed(const gk_model *model, const gk_setup *setup, const double *speed, double *out);
+GK_HOT void gk_sensors_means(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double H,
+                             const double *before);
 /* gk_tally.c */
 GK_HOT void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                            gk_tally *tally);

@@ -13,6 +13,7 @@ void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work,
     if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
     gk_supports_motion(setup, work, data, tally->last_moved, tally->last_speed);
     gk_supports_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
+    gk_sensors_speed(model, setup, tally->last_speed, tally->sensed);
     double now[MAX_SUPPORTS];
     for (int s = 0; s < model->supports; s++) now[s] = GK_OF(data, support)[s][V_FORCE];
     gk_supports_turn(model, data, -1.0, now);

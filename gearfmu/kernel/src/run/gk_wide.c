@@ -60,6 +60,7 @@
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
 #include "run/gk_supports.c"
+#include "run/gk_sensors.c"
 #include "run/gk_tally.c"
 #include "run/gk_wide.h"
 static const gk_hot AVX2 = GK_HOT_FUNCTIONS;

@@ -92,6 +92,7 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->support_rows = doubles(b, n * (size_t)model->supports);
     base->support_damping = doubles(b, n * (size_t)model->supports);
     base->port_rows = doubles(b, n * (size_t)model->ports);
+    base->sensor_rows = doubles(b, n * (size_t)model->sensors);
     base->carried_rows = doubles(b, 2 * n * (size_t)model->carried);
     const size_t pairs = (size_t)(model->carried + model->whirls);
     base->turn_rotor = take(b, pairs * sizeof *base->turn_rotor);

@@ -163,6 +163,15 @@ static void fill_supports(const gk_model *model, gk_base *base)
     }
 }
 
+/* points of the housing, which stand in a set without it */
+static void fill_sensors(const gk_model *model, gk_base *base)
+{
+    const gk_ground *ground = &model->ground[base->set];
+    memset(base->sensor_rows, 0, (size_t)(model->sensors * base->n) * sizeof *base->sensor_rows);
+    if (ground->sensor_rows) select_rows(base, ground->sensor_rows, model->sensors, ground->n, base->sensor_rows);
+    for (int i = 0; i < model->sensors; i++) base->sensor_span[i] = span_of(base->sensor_rows + i * base->n, base->n);
+}
+
 static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
 {
     gk_base *base = &setup->base;
@@ -179,6 +188,7 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     fill_carried(model, base);
     fill_turns(model, setup, base);
     fill_supports(model, base);
+    fill_sensors(model, base);
     for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
     for (int g = 0; g < model->gears; g++) fill_centre(model, base, gk_directions(setup), g);
 }

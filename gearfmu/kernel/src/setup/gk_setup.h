@@ -53,6 +53,7 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *support_rows;          /* (supports, n): force on the support, kappa included */
     double *support_damping;       /* (supports, n): force on it by the dashpots of all supports per speed */
     double *port_rows;             /* (ports, n) */
+    double *sensor_rows;           /* (sensors, n) */
     double *carried_rows;          /* (2 carried, n) √m x, √m y of carried bodies */
     int turns;                     /* pairs of rows x, y that turn into each other: carried bodies, gyroscopic forces */
     int32_t *turn_rotor;           /* (turns) with whose speed */
@@ -64,7 +65,7 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], support_damping_span[MAX_SUPPORTS],
-        port_span[MAX_PORTS];
+        port_span[MAX_PORTS], sensor_span[MAX_SENSORS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
     int patterns[MAX_GEARS];               /* in which its flanks feel that part, 0: oscillator by oscillator */
     double *pattern[MAX_GEARS];            /* (patterns, width) rigid motions as in a pose, ports, flanks */
