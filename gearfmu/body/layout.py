@@ -167,7 +167,7 @@ SKIN = (
         "1, m, kg-1/2",
         "displacement of the points: rigid motion x, y, z, rx, ry, rz about the origin, then the modes",
         "f4",
-        bits=PICTURE_BITS + 2,
+        bits=PICTURE_BITS,
         each=True,
     ),
 )

@@ -118,7 +118,7 @@ def _load_general(layers: Layers) -> Read:
     problems += found.problems
     if spec is None or problems:
         return None, problems
-    bodies: dict[str, Any] = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
+    bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
     for own in spec.housings:
         bodies[own.name] = own.model_copy(
             update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")}

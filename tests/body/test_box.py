@@ -107,7 +107,7 @@ def test_it_comes_back_from_its_file(body: Body, tmp_path: Path) -> None:
     back = load_body(tmp_path / "box.h5")
     for entry in entries_of(body):
         found, exact = value_of(back, entry.field), value_of(body, entry.field)
-        step = np.abs(exact).max(axis=(1, 2), keepdims=True) * 2.0 ** (1 - entry.bits) if entry.bits else 0.0
+        step = np.abs(exact).max(axis=(1, 2), keepdims=True) / (2.0 ** (entry.bits - 1) - 1) if entry.bits else 0.0
         assert np.all(np.abs(found - exact) <= 0.5 * step), entry.path
     assert back.name == "box" and back.how == body.how and back.sensors.names == tuple(SENSORS)
     assert [node.name for node in back.nodes] == ["seat0", "seat3", "seat1", "seat4", "foot", "seat5"]

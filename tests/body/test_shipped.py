@@ -23,6 +23,9 @@ def test_no_shipped_body_is_stale_large_or_incomplete(stage):
     spec = load_stage(stage)
     for body in load_bodies(spec):
         assert body_path(spec, body.name).stat().st_size <= LARGEST
+        if body.skin is not None:
+            assert body.error.max_error < 0.1 and body.error.trusted_to > 6e3 and body.sensors is not None
+            continue
         assert body.error.max_error < 0.01 or spec.written is spec  # those of a train say how far they reach
         assert body.flank.knows_profile and body.spin is not None
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -36,7 +35,7 @@ class ImportedHousing:
     None where the file names none, and skin (3P, N): displacement of its points by the unknowns."""
 
     full: FullOrder
-    facts: dict[str, Any]
+    facts: dict[str, object]
     spans: dict[str, tuple[float, float]]
     sensors: tuple[Interface, ...]
     surface: Surface | None

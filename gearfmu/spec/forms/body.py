@@ -62,7 +62,7 @@ def _ring_inputs(ring: RingBody) -> dict[str, Any]:
     return inputs | ({"rim_coupling": ring.rim_coupling} if ring.rigid_bore else {})
 
 
-def _housing_inputs(stage: Stage, name: str) -> dict[str, Any]:
+def _housing_inputs(stage: Stage, name: str) -> dict[str, object]:
     """Everything that shapes a housing: not its name, nor what of it is dynamic."""
     housing = next(own for own in stage.housings if own.name == name)
     tables = housing.model_dump(exclude={"name", "imported", "dynamic_to"})

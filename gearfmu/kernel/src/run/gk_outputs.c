@@ -1,6 +1,7 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
 #include "integrate/gk_energy.h"
 #include "run/gk_run.h"
+#include "run/gk_sensors.h"
 
 static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped … */

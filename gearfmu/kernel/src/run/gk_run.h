@@ -38,10 +38,6 @@ GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup,
 GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                                double *out, double *of_spring);
 GK_HOT void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
-/* gk_sensors.c */
-GK_HOT void gk_sensors_speed(const gk_model *model, const gk_setup *setup, const double *speed, double *out);
-GK_HOT void gk_sensors_means(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double H,
-                             const double *before);
 /* gk_tally.c */
 GK_HOT void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                            gk_tally *tally);

@@ -1,5 +1,6 @@
 /* Sensors: points of the housing that nothing loads. A host samples them once a communication step, so each tells its
  * mean acceleration over the step, (v₁ − v₀)/H: what moves faster is averaged and not folded back. */
+#include "run/gk_sensors.h"
 #include "run/gk_run.h"
 
 /* speeds of the sensors by that of the dynamic oscillators */

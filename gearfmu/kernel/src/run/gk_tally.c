@@ -1,5 +1,6 @@
 /* Integrals over a communication step: forces of meshes, ports and supports. */
 #include "run/gk_run.h"
+#include "run/gk_sensors.h"
 
 void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
 {
