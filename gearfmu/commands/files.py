@@ -89,13 +89,12 @@ def _shipped(name: Path) -> Path:
 
 def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body import inspect_file
-    from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
-    from gearfmu.body.layout import FORMAT
+    from gearfmu.body.store import FILE as BODY
     from gearfmu.hdf5 import format_of
     from gearfmu.stage.run.deformation import FILE as DEFORMATION
     from gearfmu.stage.run.trace import Trace
 
-    if format_of(path) in (FORMAT, INTERFACE_FORMAT):
+    if format_of(path) in BODY.names:
         return inspect_file(path)
     if format_of(path) == DEFORMATION.name:
         return _deformation(path)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
@@ -45,7 +45,7 @@ def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = 
     return _damped(found, part.modal_damping)
 
 
-def gear_modes(stage: Stage, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
+def gear_modes(stage: Stage, stored: Body, count: int, progress: Progress | None = None) -> BodyModes:
     """`body_modes` of a gear, as far as its reduced body has them; stored : that body, whose frequencies they must
     have: BodyError where they differ (a file made by another program version)."""
     found = body_modes(stage, stored.name, min(count, stored.modes), progress)

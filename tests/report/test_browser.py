@@ -88,7 +88,7 @@ def test_a_zoomed_curve_shows_the_samples_and_the_other_figures_follow(opened: B
 
 def displaced(body: Any, loads: list[tuple[int, float, float]]) -> np.ndarray:
     """(P, 3) m under forces (N) at rolls (m) of teeth: unit loads between stored rolls, turned from tooth 0."""
-    rolls, unit = _unit_loads(body.display)
+    rolls, unit = _unit_loads(body.picture)
     total = np.zeros(unit.shape[2:])
     for tooth, roll, force in loads:
         place = np.interp(roll, rolls, np.arange(rolls.size))

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.body.sensed import Sensors
+from gearfmu.body.body import Body, How, Node, Sensors
 from gearfmu.fem.coupling import rigid_fields
+from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 
@@ -32,11 +32,10 @@ def points_of(stage: Stage) -> dict[str, np.ndarray]:
     return found | {name: np.array(FEET[name]) for name in housing.imported.feet}
 
 
-def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors: bool = True) -> InterfaceBody:
+def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors: bool = True) -> Body:
     """A housing of that mass, an even cube of 300 mm by its inertia, with its centre off the origin and drawn modes
     between 300 Hz and 6 kHz that give its interfaces some compliance."""
     rng, points = np.random.default_rng(seed), points_of(stage)
-    rigid_rows = np.vstack([_node(point) for point in points.values()])
     frequency = np.sort(rng.uniform(300.0, 6000.0, modes))
     scale = np.tile([1, 1, 1, 8, 8, 8], len(points))[:, None] / np.sqrt(mass)
     rows = scale * rng.standard_normal((6 * len(points), modes))
@@ -49,44 +48,25 @@ def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors
         felt = Sensors(
             tuple(SENSORS),
             at,
-            np.vstack([_node(point)[:3] for point in at]),
             own,
             (own / (2 * np.pi * frequency) ** 2) @ rows.T,
         )
-    return _body(stage, points, felt, mass=mass, rigid_rows=rigid_rows, frequency=frequency, rows=rows, static=static)
+    return _body(stage, points, felt, mass=mass, frequency=frequency, rows=rows, static=static)
 
 
-def _node(point: np.ndarray) -> np.ndarray:
-    rows = np.eye(6)
-    rows[:3] = rigid_fields(np.asarray(point, float))
-    return rows
-
-
-def _body(stage: Stage, points: dict[str, np.ndarray], sensors: Sensors | None, **own: Any) -> InterfaceBody:
+def _body(stage: Stage, points: dict[str, np.ndarray], sensors: Sensors | None, **own: Any) -> Body:
     (housing,) = stage.housings
     centre, mass = np.array([0.1, 0.06, 0.07]), own.pop("mass")
     fields, spin = np.eye(6), mass * 0.3**2 / 6 * np.eye(3)
     fields[:3] = rigid_fields(centre)
     inertia = fields.T @ np.block([[mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), spin]]) @ fields
-    return InterfaceBody(
+    return Body(
         name=housing.name,
-        input_hash="0" * 64,
-        method="drawn",
-        interfaces=tuple(
-            {"name": name, "kind": "rigid", "components": list(COMPONENTS), "span": [p[2] - 0.01, p[2] + 0.01]}
-            for name, p in points.items()
-        ),
-        ground=(),
-        material=housing.material.model_dump(),
-        mesh={},
-        provenance={},
-        rigid_mass=inertia,
-        point=np.array(list(points.values())),
+        how=How("0" * 64, "drawn", housing.material.model_dump()),
+        mass=inertia,
+        nodes=tuple(Node(name, "rigid", COMPONENTS, p, (p[2] - 0.01, p[2] + 0.01)) for name, p in points.items()),
         damping_ratio=np.full(len(own["frequency"]), 0.01),
-        frf_frequency=np.array([50.0, 1e4]),
-        frf_error=np.zeros(2),
-        length=0.4,
-        trusted_to=1e4,
+        error=FrfError.of(np.array([50.0, 1e4]), np.zeros(2), (50.0, 1e4), 0.4, ()),
         sensors=sensors,
         **own,
     )

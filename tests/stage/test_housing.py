@@ -10,15 +10,15 @@ import pytest
 from housings import housing_of
 
 from gearfmu.body import load_bodies
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body.body import Body, Node, rigid_rows
 from gearfmu.errors import ModelError
+from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.build.assembly import mount_sets
-from gearfmu.stage.build.free import FreeBody
+from gearfmu.stage.build.ground_part import GroundPart
 from gearfmu.stage.build.groups import Group, Layout, Support, mount, node_directions
-from gearfmu.stage.build.housed import rigid_arm
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.te import statics_of
@@ -38,7 +38,7 @@ def gears() -> list:
 
 
 @cache
-def drawn() -> InterfaceBody:
+def drawn() -> Body:
     return housing_of(stage(), 13.5, 40)
 
 
@@ -63,14 +63,14 @@ def with_feet(chosen: Stage, **springs: float) -> Stage:
     return chosen.model_copy(update={"supports": tuple(feet)})
 
 
-def block(name: str, mass: float) -> FreeBody:
+def block(name: str, mass: float) -> GroundPart:
     """A rigid body with one node at its origin."""
-    return FreeBody(
+    return GroundPart(
         name=name,
         mass=np.diag([mass] * 3 + [mass * 1e-2] * 3),
         omega=np.zeros(0),
         zeta=np.zeros(0),
-        place=np.zeros(1),
+        nodes=(Node("node", "rigid", COMPONENTS, np.zeros(3)),),
         rows=np.zeros((1, 6, 0)),
         residual=np.zeros((6, 6)),
     )
@@ -98,7 +98,7 @@ def test_two_masses_on_springs_by_hand() -> None:
         assert np.sum(np.abs(omega / wanted - 1) < 1e-12) >= 3  # along x, y and z
 
 
-def drawn_layout(body: InterfaceBody, chosen: Stage | None = None) -> Layout:
+def drawn_layout(body: Body, chosen: Stage | None = None) -> Layout:
     return stage_layout(chosen or stage(), gears(), {"housing": body})
 
 
@@ -154,9 +154,9 @@ def dense_response(layout: Layout, hit: tuple[int, int], seen: list[tuple[int, i
     return np.array(result)
 
 
-def nodes_of(body: FreeBody) -> np.ndarray:
+def nodes_of(body: GroundPart) -> np.ndarray:
     """(6K, 6 + n): motion of all nodes."""
-    return np.vstack([np.hstack([body.rigid_rows(k), body.rows[k]]) for k in range(len(body.place))])
+    return np.vstack([np.hstack([node.rigid_rows, rows]) for node, rows in zip(body.nodes, body.rows, strict=True)])
 
 
 def group_response(group: Group, hit: tuple[int, int], seen: list[tuple[int, int, int]], omega: float) -> np.ndarray:
@@ -174,7 +174,7 @@ def test_the_housed_group_is_the_dense_system() -> None:
     """Force on the bore of a pinion → itself, a seat, sensors. Margin: differences are 1e-9 of the largest."""
     layout = drawn_layout(drawn())
     last = len(layout.bodies) - 1
-    sensors = len(layout.bodies[last].place) - 2
+    sensors = len(layout.bodies[last].nodes) - 2
     seen = [(0, 0, 0), (last, 0, 1), *((last, sensors + k, d) for k in range(2) for d in range(3))]
     group = mount(layout)
     for frequency in (35.0, 420.0, 1730.0, 5210.0):
@@ -187,16 +187,15 @@ def test_the_housed_group_is_the_dense_system() -> None:
 def test_a_bearing_beside_the_middle_of_its_seat_acts_with_a_rigid_arm() -> None:
     """The same housing told by nodes that lie 4 mm aside along the shafts."""
     offset = np.array([0.0, 0.0, 4e-3])
-    body, arms = drawn(), np.eye(len(drawn().rows))
-    for k, interface in enumerate(body.interfaces):
-        if interface["name"].startswith(("input", "output")):
-            arms[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = rigid_arm(offset)
-    told = {"rigid_rows": arms @ body.rigid_rows, "rows": arms @ body.rows, "static": arms @ body.static @ arms.T}
+    body, arms, nodes = drawn(), np.eye(len(drawn().rows)), list(drawn().nodes)
+    for k, node in enumerate(body.nodes):
+        if node.name.startswith(("input", "output")):
+            arms[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = rigid_rows(offset)
+            nodes[k] = replace(node, point=node.point + offset)
+    told = {"nodes": tuple(nodes), "rows": arms @ body.rows, "static": arms @ body.static @ arms.T}
     assert body.sensors is not None
     sensors = replace(body.sensors, static=body.sensors.static @ arms.T)
-    aside = replace(
-        body, sensors=sensors, point=body.point + [offset * (k != 2 and k != 3 and k < 6) for k in range(10)], **told
-    )
+    aside = replace(body, sensors=sensors, **told)
     one, other = (mount(drawn_layout(own)) for own in (body, aside))
     assert np.allclose(one.omega, other.omega, rtol=1e-9)
     last = len(one.layout.bodies) - 1
@@ -288,12 +287,11 @@ def test_what_is_above_its_limit_is_compliance() -> None:
 )
 def test_seats_off_their_bearings_are_told(moved: list[float], words: str) -> None:
     body = drawn()
-    point = body.point.copy()
-    point[0] += moved
-    spans = [dict(i) for i in body.interfaces]
-    spans[0]["span"] = [z + moved[2] for z in spans[0]["span"]]
+    seat = body.nodes[0]
+    low, high = seat.span
+    other = replace(seat, point=seat.point + moved, span=(low + moved[2], high + moved[2]))
     with pytest.raises(ModelError) as error:
-        drawn_layout(replace(body, point=point, interfaces=tuple(spans)))
+        drawn_layout(replace(body, nodes=(other, *body.nodes[1:])))
     assert words in str(error.value)
 
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body.body import Body, Node, rigid_rows
 from gearfmu.errors import ModelError
+from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.supports import SupportSpec
-from gearfmu.stage.build.free import NOISE, FreeBody
+from gearfmu.stage.build.ground_part import NOISE, GroundPart
 from gearfmu.stage.build.groups import Group
 
 AXES = "xyz"
@@ -34,17 +35,18 @@ class Meeting:
     point: np.ndarray
 
 
-def meetings(stage: Stage, housing: HousingBody, body: InterfaceBody) -> list[Meeting]:
+def meetings(stage: Stage, housing: HousingBody, body: Body) -> list[Meeting]:
     """Every support of a stage that meets its reduced housing, in order. ModelError that lists seats that do not lie
     where their bearings are."""
     found, problems = [], []
-    places = {str(i["name"]): (i, point) for i, point in zip(body.interfaces, body.point, strict=True)}
+    nodes = {node.name: node for node in body.nodes}
     for support in stage.supports:
         if housing.name not in (support.body, support.to):
             continue
-        interface, point = places[str(support.node)]
+        node = nodes[str(support.node)]
+        point = node.point
         if support.to == housing.name:
-            problems += _misplaced(stage, support, body, (point, interface["span"]))
+            problems += _misplaced(stage, support, body, node)
             point = _acts_at(stage, support)
         found.append(Meeting(support.name, str(support.node), np.asarray(point, float)))
     if problems:
@@ -58,39 +60,39 @@ def _acts_at(stage: Stage, support: SupportSpec) -> np.ndarray:
     return np.array([*axis, stage.place(support.body, None) if support.at is None else support.at])
 
 
-def _misplaced(
-    stage: Stage, support: SupportSpec, body: InterfaceBody, seat: tuple[np.ndarray, tuple[float, float]]
-) -> list[str]:
+def _misplaced(stage: Stage, support: SupportSpec, body: Body, seat: Node) -> list[str]:
     """What is wrong with the place of a seat: its master point, and from where to where it reaches along z."""
-    point, (low, high) = seat
+    assert body.error is not None and seat.span is not None
+    point, (low, high), far = seat.point, seat.span, OFF_AXIS * body.error.length
     wanted = _acts_at(stage, support)
     whose = f"seat {support.node} of {body.name} and the bearing {support.name}"
-    if np.linalg.norm(point[:2] - wanted[:2]) > OFF_AXIS * body.length:
+    if np.linalg.norm(point[:2] - wanted[:2]) > far:
         where = " and ".join(f"({1e3 * x:.4g}, {1e3 * y:.4g})" for x, y in (point[:2], wanted[:2]))
         return [f"the axes of {whose} lie apart, at x, y = {where} mm"]
-    if not low - OFF_AXIS * body.length <= wanted[2] <= high + OFF_AXIS * body.length:
+    if not low - far <= wanted[2] <= high + far:
         span = f"{1e3 * low:.4g} … {1e3 * high:.4g} mm"
         return [f"{whose} lie apart along z: at {span} and {1e3 * wanted[2]:.4g} mm"]
     return []
 
 
-def free_housing(body: InterfaceBody, found: list[Meeting], dynamic_to: float) -> FreeBody:
-    """The FreeBody of a reduced housing: nodes of the supports, then of the sensors. dynamic_to: Hz."""
+def housing_part(body: Body, found: list[Meeting], dynamic_to: float) -> GroundPart:
+    """The GroundPart of a reduced housing: nodes of the supports, then of the sensors. dynamic_to: Hz."""
     first, at = {}, 0
-    for interface in body.interfaces:
-        first[str(interface["name"])] = at
-        at += len(interface["components"])
-    points = dict(zip(first, body.point, strict=True))
+    for node in body.nodes:
+        first[node.name] = at
+        at += len(node.components)
+    points = dict(zip(first, body.points, strict=True))
     arms = np.zeros((6 * len(found), at))
     for k, meeting in enumerate(found):
         start = first[meeting.node]
-        arms[6 * k : 6 * k + 6, start : start + 6] = rigid_arm(meeting.point - points[meeting.node])
+        arms[6 * k : 6 * k + 6, start : start + 6] = rigid_rows(meeting.point - points[meeting.node])
     dynamic = np.flatnonzero(body.frequency <= dynamic_to)
     omega = 2 * np.pi * body.frequency[dynamic]
     rows, residual = arms @ body.rows[:, dynamic], arms @ body.static @ arms.T
     residual -= (rows / omega**2) @ rows.T
     places = [meeting.point for meeting in found]
     if body.sensors is not None:
+        assert body.sensors.static is not None
         own, felt = body.sensors.rows[:, dynamic], body.sensors.static @ arms.T
         felt -= (own / omega**2) @ rows.T
         residual, rows = _with_sensors(residual, felt), np.vstack([rows, _six(own)])
@@ -99,25 +101,16 @@ def free_housing(body: InterfaceBody, found: list[Meeting], dynamic_to: float) -
     loaded = slice(0, len(scale))
     keep = np.abs(residual[loaded, loaded]) > NOISE * np.outer(scale, scale)
     residual[loaded, loaded] = np.where(keep, 0.5 * (residual[loaded, loaded] + residual[loaded, loaded].T), 0.0)
-    place = np.array(places).reshape(-1, 3)
-    return FreeBody(
+    nodes = tuple(Node(f"node{k}", "rigid", COMPONENTS, np.asarray(point, float)) for k, point in enumerate(places))
+    return GroundPart(
         name=body.name,
-        mass=body.rigid_mass,
+        mass=body.mass,
         omega=omega,
         zeta=body.damping_ratio[dynamic],
-        place=place[:, 2],
-        rows=rows.reshape(len(place), 6, -1),
+        nodes=nodes,
+        rows=rows.reshape(len(nodes), 6, -1),
         residual=residual,
-        across=place[:, :2],
     )
-
-
-def rigid_arm(offset: np.ndarray) -> np.ndarray:
-    """(6, 6): motion of a node → that of a point at an offset (3,) m from it, of one rigid piece."""
-    x, y, z = offset
-    arm = np.eye(6)
-    arm[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-    return arm
 
 
 def _six(rows: np.ndarray) -> np.ndarray:

@@ -18,8 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sl
 
-from gearfmu.body.bodies import Body
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.assembly import layout_of
@@ -42,7 +41,7 @@ class HousingAlone:
     """A housing on its feet. group: its oscillators; channels: forces of the bearings on it; pushes (s, k): what a unit
     of each does to the oscillators; body: as it was reduced."""
 
-    body: InterfaceBody
+    body: Body
     group: Group
     channels: tuple[str, ...]
     pushes: np.ndarray
@@ -60,9 +59,7 @@ class HousingAlone:
         own = [(s.name, s.second[1], d) for s in seats if s.second is not None for d in s.directions]
         names = tuple(f"{name}.{FORCES[direction]}_mean" for name, _, direction in own)
         pushes = np.array([group.node_rows(0, node, direction) for _, node, direction in own])
-        body = bodies[-1]
-        assert isinstance(body, InterfaceBody)
-        return cls(body, group, names, pushes)
+        return cls(bodies[-1], group, names, pushes)
 
     def motion(self, trace: Trace) -> HousingMotion:
         """How the housing of a run moved, from rest under its first forces. TraceError where the run did not record
