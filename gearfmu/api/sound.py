@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import numpy as np
 from gearfmu.api.models import PathLike, assemble, load, reduce
 from gearfmu.api.results import stage_and_bodies, trace_file
 from gearfmu.api.settings import Quantity, checked
+from gearfmu.body.body import Body
+from gearfmu.body.body import Skin as BodySkin
 from gearfmu.modes.housed import Housed, housed
 from gearfmu.modes.housing import Placed, placed_housing
 from gearfmu.modes.rings import stage_rings
@@ -18,6 +21,7 @@ from gearfmu.sound import Radiation, Skin, SoundError, SoundPower, power_of, rad
 from gearfmu.sound.store import load_radiation, save_radiation
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.observed import MODE, MOTION
+from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.trace import Channel, Trace
 
 HIGHEST = 10e3  # Hz, of the housing's motion; less where the run's step does not resolve it
@@ -70,14 +74,13 @@ def sound_power(
     run = _trace(trace)
     stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing or stage_and_bodies(run.meta)[0]
     bodies = reduce(stage)
-    placed = placed_housing(stage, bodies)
-    body = stage.by_name(bodies)[stage.housings[0].name]
-    if body.skin is None:
-        raise SoundError(f"the housing of {stage.name} has no skin: name its outer surface in [import], skin = …")
-    count = 6 + len(placed.housing.omega)
-    skin = skin_of(body.skin.points, body.skin.faces, body.skin.skin_modes[:, :, :count])
+    body, own = _skinned(stage, bodies)
+    known = _recorded(run, body)
+    coordinates = HousingAlone.of(stage, bodies).motion(run).velocity if known is None else known
+    count = coordinates.shape[1]
+    skin = skin_of(own.points, own.faces, own.skin_modes[:, :, :count])
     sound = _matrix(skin, patches, matrix, f"{body.how.hash} {count}")
-    pieces = segments(run.time, _coordinates(run, placed, body.name, body.total_mass))
+    pieces = segments(run.time, coordinates, moved=known is not None)
     steady = speed is None
     turning = None if speed is None else np.interp(pieces.middle, run.time, run[speed])
     return power_of(pieces, sound, turning, steady)
@@ -129,13 +132,24 @@ def _channels(found: Housed, placed: Placed, run: Trace) -> dict[str, Channel]:
     return channels
 
 
-def _coordinates(run: Trace, placed: Placed, name: str, mass: float) -> np.ndarray:
-    """(T, 6 + n): motion of the housing, recorded or from the bearing forces of a run in which it was."""
-    names = [f"{name}{MODE}{i + 1}" for i in range(len(placed.housing.omega))]
-    if all(own in run for own in names):
-        rigid = np.stack([run[f"{name}{MOTION}{own}"] for own in MOTIONS], axis=1)
-        return np.hstack([rigid, math.sqrt(mass) * np.stack([run[own] for own in names], axis=1)])
-    return housed(None, placed.housing, *_forces(run, placed.seats)).coordinates
+def _skinned(stage: Stage, bodies: Sequence[Body]) -> tuple[Body, BodySkin]:
+    """The reduced housing of a stage and its skin. SoundError where it has none, or no skin."""
+    if not stage.housings:
+        raise SoundError(f"stage {stage.name} has no housing: name one, or put it under the run with `gearfmu house`")
+    body = stage.by_name(bodies)[stage.housings[0].name]
+    if body.skin is None:
+        raise SoundError(f"the housing of {stage.name} has no skin: name its outer surface in [import], skin = …")
+    return body, body.skin
+
+
+def _recorded(run: Trace, body: Body) -> np.ndarray | None:
+    """(T, 6 + n): motion of the housing, where a trace of `house` has it."""
+    rigid = [f"{body.name}{MOTION}{own}" for own in MOTIONS]
+    modes = [name for i in range(body.modes) if (name := f"{body.name}{MODE}{i + 1}") in run]
+    if not all(name in run for name in rigid):
+        return None
+    moved, root = [run[name] for name in rigid], math.sqrt(body.total_mass)
+    return np.stack([*moved, *(root * run[name] for name in modes)], axis=1)
 
 
 def _matrix(skin: Skin, patches: int, matrix: PathLike | None, made_of: str) -> Radiation:

@@ -92,17 +92,14 @@ def seat_forces(rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.n
     return _coupled(rings, housing.answers(omega), omega, blocked)[:, :, 0]
 
 
-def _coupled(rings: Rings | None, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
-    """(L, s, 1): forces on the seats; those given where there are no rings."""
-    if rings is None:
-        return blocked[:, :, None]
+def _coupled(rings: Rings, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
+    """(L, s, 1): forces on the seats."""
     yielding = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ answers.seats
     return np.linalg.solve(yielding, blocked[:, :, None])
 
 
-def housed(rings: Rings | None, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
-    """The housing under forces (T, s) N that a run recorded every `step` (s), up to `highest` (Hz): on rigid ground
-    where there are rings, else one in which the housing was, whose forces are those on yielding seats already.
+def housed(rings: Rings, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
+    """The housing under forces (T, s) N that a run on rigid ground recorded every `step` (s), up to `highest` (Hz).
 
     Forces fade in and out over RAMP of the record; its length is doubled with zeros, so that the housing can ring."""
     count = len(forces)
@@ -124,7 +121,7 @@ def _widths(housing: Housing) -> dict[str, int]:
 
 
 def _solve(
-    rings: Rings | None, housing: Housing, omega: np.ndarray, blocked: np.ndarray, found: dict[str, np.ndarray]
+    rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray, found: dict[str, np.ndarray]
 ) -> None:
     """Fill `found` at some lines."""
     answers = housing.answers(omega)

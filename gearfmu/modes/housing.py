@@ -11,7 +11,7 @@ from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.modes.housed import Housing
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.assembly import stage_group
+from gearfmu.stage.build.assembly import layout_of
 from gearfmu.stage.build.groups import FORCES
 
 AXES = "xyz"
@@ -35,7 +35,7 @@ def placed_housing(stage: Stage, bodies: Sequence[Body], names: Sequence[str] | 
     """
     if not stage.housings:
         raise ModelError(f"stage {stage.name} has no housing: give a stage file with [bodies.NAME] of kind 'housing'")
-    layout, name = stage_group(stage, bodies).layout, stage.housings[0].name
+    layout, name = layout_of(stage, bodies), stage.housings[0].name
     number = [body.name for body in layout.bodies].index(name)
     free = layout.bodies[number]
     seats = {f"{s.name}.{FORCES[d]}": (s.second[1], d) for s in layout.supports if _on(s.second, number) and s.second
