@@ -112,11 +112,12 @@ typedef struct gk_side {
 
 typedef struct gk_line {    /* of contact of a tooth pair, z (m) in the engagement's width */
     double end[2], edge[2]; /* its ends; tip edges */
+    double moves[2];        /* 1: an end moves along the path of contact, with the faces; 0: it stays, at a tip edge */
     double missing;         /* of the least length, 0 … 1: the pair has left its flanks, or is about to reach them */
 } gk_line;
 
 typedef struct gk_part { /* of a line of contact, or a slice of the width; z (m) */
-    double end[2], middle;
+    double end[2], middle, moves;
     double flank; /* its place on both flanks that is nearest to its middle, else the one next to them */
 } gk_part;
 
