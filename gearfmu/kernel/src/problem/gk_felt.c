@@ -62,18 +62,6 @@ void gk_felt_rows(const gk_setup *setup, gk_work *work, int e, int w)
     }
 }
 
-/* y += forces x by the columns of a matrix (rows, columns) */
-GK_INLINE void add_columns(const gk_real *matrix, const gk_real *x, int rows, int columns, gk_real *y, const int halves)
-{
-    gk_half sum[MOST_PATTERNS * 2 / LANES];
-    for (int k = 0; k < halves; k++) sum[k] = ((gk_half *)y)[k];
-    for (int i = 0; i < rows; i++) {
-        const gk_half *row = (const gk_half *)(matrix + i * columns);
-        for (int k = 0; k < halves; k++) sum[k] += x[i] * row[k];
-    }
-    for (int k = 0; k < halves; k++) ((gk_half *)y)[k] = sum[k];
-}
-
 typedef struct between { /* from the patterns of one gear to those of another */
     const gk_real *matrix;
     int rows, columns;
@@ -86,12 +74,7 @@ static between between_of(const gk_setup *setup, const gk_work *work, int to, in
 
 static void add_between(between b, const gk_real *x, int kind, gk_real *y)
 {
-    const gk_real *m = b.matrix + (size_t)(kind * b.rows * b.columns);
-    switch (2 * b.columns / LANES) {
-    case 4: add_columns(m, x, b.rows, b.columns, y, 4); break;
-    case 5: add_columns(m, x, b.rows, b.columns, y, 5); break;
-    default: add_columns(m, x, b.rows, b.columns, y, 2 * b.columns / LANES);
-    }
+    gk_sum_rows(b.matrix + (size_t)(kind * b.rows * b.columns), 2 * b.columns / LANES, x, b.rows, y);
 }
 
 /* what forces on the patterns of all gears do to those of each: in the step, at once */

@@ -58,6 +58,8 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int32_t *turn_rotor;           /* (turns) with whose speed */
     double *turn_rows;             /* (2 turns, n) */
     gk_span *turn_span;            /* (turns) the part of both that is not zero */
+    gk_span crowd;                 /* oscillators that many pairs turn; width 0: none */
+    int crowd_pairs, crowd_dampers; /* that have just these */
     double *outward;               /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
     double *outward_support;       /* (rotors, supports) what it does at once to the forces on supports */
     double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
@@ -70,6 +72,11 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *pattern[MAX_GEARS];            /* (patterns, width) rigid motions as in a pose, ports, flanks */
     int port_slot[MAX_GEARS][MAX_PORTS];   /* a port's place among them, −1: none */
 } gk_base;
+/* is it a turning pair or a dashpot of the crowd, by its span? */
+static inline int gk_in_crowd(const gk_base *base, gk_span span)
+{
+    return base->crowd.width && span.from == base->crowd.from && span.width == base->crowd.width;
+}
 
 /* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
  * against the direction in which gear A slides past B, so that rows stand beside those of the normal displacement. */
@@ -184,13 +191,24 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
     int yields, softest;         /* the first lanes of each half: κ ≠ 0; padded, and as they are */
 } gk_flow;
 
+/* Turning pairs and dashpots of the crowd as matrices, in whole halves: rows by oscillators, what these do to speeds,
+ * and to the rows. Rows x of all pairs stand before their rows y. */
+enum { LEAST_CROWD = 16, MOST_CROWD = 128 };
+typedef struct gk_crowd_flow {
+    gk_real *turns, *turned, *turning;      /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
+    gk_real *damps, *holds, *pulls, *pulled; /* (width, dashpots) twice, (dashpots, width), (dashpots, dashpots) */
+} gk_crowd_flow;
+static inline int gk_whole_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2) * (LANES / 2); }
+
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *unit, *lead, *hold;
+    double *press;              /* half a step's kick by a load that at rest displaces by load/ω² */
     double *pulls;              /* (supports, n) s²e/n of a dashpot */
     double *turns, *turned;     /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;           /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
     double *holds;              /* (supports, n) e times `hold` */
+    gk_crowd_flow crowd;
     double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
     double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
