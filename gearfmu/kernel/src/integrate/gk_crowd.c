@@ -4,7 +4,7 @@
 #include "integrate/gk_integrate.h"
 
 enum { MOST_ROWS = 2 * MOST_CROWD, MOST_WIDE = MAX_GROUND + 4 * MAX_ROTORS + LANES, ROUNDS = 30 };
-static const double TURNED = 1e-9; /* of the largest speed along a row: what is left of a turn */
+static const double TURNED = sizeof(gk_real) == sizeof(float) ? 3e-8 : 1e-15; /* of the largest reading: left of it */
 
 /* sums of rows by oscillators */
 static void read_crowd(const gk_base *base, const gk_real *rows, int lanes, const double *x, gk_real *read)

@@ -95,33 +95,22 @@ void gk_felt_move(const gk_coupled *c, int whole, int at_once)
     }
 }
 
-/* adds forces on the patterns of a gear to those on its oscillators, `wide` quads of these from `first` on */
-GK_INLINE void scatter_quads(const gk_base *base, int g, const double (*by)[MAX_GEARS][MOST_PATTERNS], int first,
-                             gk_quad *const to[2], const int wide)
-{
-    gk_quad sum[2][4];
-    for (int t = 0; t < 2; t++)
-        for (int q = 0; q < wide; q++) sum[t][q] = to[t][first + q];
-    for (int i = 0; i < base->patterns[g]; i++) {
-        const gk_quad *pattern = (const gk_quad *)(base->pattern[g] + i * base->width[g]) + first;
-        for (int t = 0; t < 2; t++)
-            for (int q = 0; q < wide; q++) sum[t][q] += by[t][g][i] * pattern[q];
-    }
-    for (int t = 0; t < 2; t++)
-        for (int q = 0; q < wide; q++) to[t][first + q] = sum[t][q];
-}
-
-/* forces that were pushed on patterns act on the oscillators */
+/* Forces that were pushed on patterns act on the oscillators: those of flanks in single precision, rigid motion and
+ * ports, few of which are loaded, in double */
 void gk_felt_scatter(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     const gk_base *base = &setup->base;
-    for (int g = 0; g < model->gears; g++) {
-        const int from = base->from[g], quads = base->patterns[g] ? base->width[g] / 4 : 0;
-        gk_quad *const to[2] = {(gk_quad *)(work->ground_force + from), (gk_quad *)(work->ground_next + from)};
-        const double (
-            *by)[MAX_GEARS][MOST_PATTERNS] = (const double (*)[MAX_GEARS][MOST_PATTERNS])work->scatter_pattern;
-        int q = 0;
-        for (; q + 4 <= quads; q += 4) scatter_quads(base, g, by, q, to, 4);
-        for (; q < quads; q++) scatter_quads(base, g, by, q, to, 1);
-    }
+    for (int g = 0; g < model->gears; g++)
+        for (int t = 0; t < 2 && base->patterns[g]; t++) {
+            const int width = base->width[g], wide = gk_whole_halves(width), flanks = base->patterns[g] - FIRST_PATTERN;
+            const double *by = work->scatter_pattern[t][g];
+            double *to = (t ? work->ground_next : work->ground_force) + base->from[g];
+            gk_real sum[MAX_GROUND + 4 * MAX_ROTORS + LANES], x[MOST_PATTERNS];
+            for (int i = 0; i < flanks; i++) x[i] = (gk_real)by[FIRST_PATTERN + i];
+            memset(sum, 0, (size_t)wide * sizeof *sum);
+            gk_sum_rows(base->flanks[g], 2 * wide / LANES, x, flanks, sum);
+            for (int q = 0; q < width / 4; q++) ((gk_quad *)to)[q] += GK_WIDENED(((const gk_four *)sum)[q]);
+            for (int i = 0; i < FIRST_PATTERN; i++)
+                if (by[i] != 0.0) gk_axpy(by[i], base->pattern[g] + i * width, to, 0, width / 4);
+        }
 }

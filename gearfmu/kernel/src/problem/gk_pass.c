@@ -71,44 +71,49 @@ static void push_spins(const gk_coupled *c, int e, int first, int last)
         }
 }
 
-typedef struct acting { /* rows whose forces are not zero, those of contacts first */
-    int count, contacts, row[MAX_ROWS];
+typedef struct acting { /* forces of rows, those of contacts first; kinds that are not pushed are not read */
+    int count, contacts, any;
     gk_real by[PUSHES][MAX_ROWS];
 } acting;
 
 static void list_acting(const double (*by)[MAX_STRIDE], int kinds, const gk_system *s, acting *p)
 {
-    int n = 0;
-    for (int i = 0; i < (kinds == PUSHES ? s->n : s->contacts); i++) {
-        const double x = by[STEP][i], y = by[ONCE][i], u = kinds == PUSHES ? by[AT_ONCE][i] : 0.0;
-        if (i == s->contacts) p->contacts = n;
-        p->row[n] = i, p->by[STEP][n] = (gk_real)x, p->by[ONCE][n] = (gk_real)y, p->by[AT_ONCE][n] = (gk_real)u;
-        n += x != 0.0 || y != 0.0 || u != 0.0;
-    }
-    p->count = n;
-    if (kinds < PUSHES || s->n == s->contacts) p->contacts = n;
+    p->contacts = s->contacts, p->count = kinds == PUSHES ? s->n : s->contacts, p->any = 0;
+    for (int t = 0; t < kinds; t++)
+        for (int i = 0; i < p->count; i++) p->by[t][i] = (gk_real)by[t][i], p->any |= by[t][i] != 0.0;
 }
 
-typedef struct half_block { /* `count` of the rows that act, on some oscillators, `width` halves each */
+/* the first halves of a gear's lanes, of each part, that κ reaches; one more is cheaper pushed with them */
+static int yielding(const gk_coupled *c, int g)
+{
+    const int half = GK_LANES(c->setup, g) / LANES, yields = gk_halves(c->k->flow[g].softest);
+    return yields && yields + 1 == half ? half : yields;
+}
+
+typedef struct half_block { /* the first `count` rows on some oscillators, `width` halves each */
     const gk_half *row;
     int width, count;
     const acting *by;
 } half_block;
 
-/* sums of rows over `wide` halves from `at` on, with forces of the kinds `first` … `last` */
+/* sums of rows over `wide` halves from `at` on, with forces of the kinds `first` … `last`, two rows at once */
 GK_INLINE void sum_halves(half_block of, int at, gk_half *const out[PUSHES], const int wide, const int first,
                           const int last)
 {
     gk_half sum[PUSHES][8];
+    const gk_half *row = of.row + at, *next = row + of.width;
+    int r = 0;
     for (int t = first; t <= last; t++)
         for (int k = 0; k < wide; k++) sum[t][k] = (gk_half){0};
-    for (int r = 0; r < of.count; r++) {
-        const gk_half *row = of.row + of.by->row[r] * of.width + at;
+    for (; r + 2 <= of.count; r += 2, row += 2 * of.width, next += 2 * of.width)
         for (int t = first; t <= last; t++)
-            for (int k = 0; k < wide; k++) sum[t][k] += of.by->by[t][r] * row[k];
-    }
+            for (int k = 0; k < wide; k++)
+                sum[t][k] = (sum[t][k] + of.by->by[t][r] * row[k]) + of.by->by[t][r + 1] * next[k];
     for (int t = first; t <= last; t++)
-        for (int k = 0; k < wide; k++) out[t][at + k] = sum[t][k];
+        for (int k = 0; k < wide; k++) {
+            if (r < of.count) sum[t][k] += of.by->by[t][r] * row[k];
+            out[t][at + k] = sum[t][k];
+        }
 }
 
 GK_INLINE void sum_blocks(half_block of, gk_span halves, gk_half *const out[PUSHES], const int first, const int last)
@@ -139,7 +144,7 @@ static void move_modes(const gk_coupled *c, int e, int w, gk_half *const sum[PUS
     const int g = c->setup->mesh[e].side[w].gear;
     const gk_modal *m = &c->setup->modal[g];
     const gk_flow *flow = &c->k->flow[g];
-    const int half = m->n / LANES, yields = gk_halves(flow->softest), tooth = c->work->engaged[e].position[w].tooth;
+    const int half = m->n / LANES, yields = yielding(c, g), tooth = c->work->engaged[e].position[w].tooth;
     const gk_half *cosine = (const gk_half *)m->cosine + tooth * half, *sine = (const gk_half *)m->sine + tooth * half;
     const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
     gk_half *to = (gk_half *)c->work->move_modes[WHOLE][g], *once = (gk_half *)c->work->move_modes[YIELDED][g];
@@ -165,7 +170,7 @@ static void push_rows(const gk_coupled *c, const gk_engaged *engaged, const acti
     int at = 0;
     for (int w = 0; w < 2; w++) {
         const int g = c->setup->mesh[engaged->index].side[w].gear, half = GK_LANES(c->setup, g) / LANES;
-        const int yields = gk_halves(c->k->flow[g].softest);
+        const int yields = yielding(c, g);
         const half_block modes = {(const gk_half *)basis[w], 2 * half, p->contacts, p};
         if (!half || c->k->timeless || (parts == 2 && !yields)) continue;
         for (int from = 0; from < 2 * half; from += half) {
@@ -209,10 +214,10 @@ static void push_engagement(const gk_coupled *c, int e, int parts)
         if (parts & (1 << t)) push_bores(c, engaged, t);
     gk_far_push(c->setup, engaged, f->of[AT_ONCE]);
     list_acting(f->of, PUSHES, &engaged->system, &p);
-    if (p.count) push_rows(c, engaged, &p, 0, parts);
+    if (p.any) push_rows(c, engaged, &p, 0, parts);
     if (!GK_ON(c->setup, friction) || !(parts & 1)) return;
     list_acting(f->along, AT_ONCE, &engaged->system, &p);
-    if (p.count) push_rows(c, engaged, &p, 1, 1);
+    if (p.any) push_rows(c, engaged, &p, 1, 1);
 }
 
 /* ---- what moves -------------------------------------------------------------------------------------------------- */
@@ -257,8 +262,11 @@ GK_INLINE void read_some(const seen *parts, int count, int i, double *read, cons
     for (int p = 0; p < count; p++) {
         const int width = parts[p].width;
         const gk_half *rows = parts[p].row + i * width, *y = parts[p].y;
-        for (int k = 0; k < parts[p].halves; k++)
-            for (int l = 0; l < each; l++) sum[l] += rows[l * width + k] * y[k];
+        int k = 0;
+        for (; k + 2 <= parts[p].halves; k += 2)
+            for (int l = 0; l < each; l++)
+                sum[l] = (sum[l] + rows[l * width + k] * y[k]) + rows[l * width + k + 1] * y[k + 1];
+        for (int l = 0; l < each && k < parts[p].halves; l++) sum[l] += rows[l * width + k] * y[k];
     }
     for (int l = 0; l < each; l++) read[i + l] += gk_across(&sum[l]);
 }

@@ -102,6 +102,8 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
     for (int g = 0; g < model->gears; g++)
         base->pattern[g] = doubles(b, model->engagements > 1 ? MOST_PATTERNS * n : 0);
+    for (int g = 0; g < model->gears; g++)
+        base->flanks[g] = reals(b, model->engagements > 1 ? MOST_PATTERNS * (n + LANES) : 0);
 }
 
 /* may flanks feel the ground group by patterns? */

@@ -70,6 +70,7 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
     int patterns[MAX_GEARS];               /* in which its flanks feel that part, 0: oscillator by oscillator */
     double *pattern[MAX_GEARS];            /* (patterns, width) rigid motions as in a pose, ports, flanks */
+    gk_real *flanks[MAX_GEARS];            /* those of flanks, in whole halves: the same numbers */
     int port_slot[MAX_GEARS][MAX_PORTS];   /* a port's place among them, −1: none */
 } gk_base;
 /* is it a turning pair or a dashpot of the crowd, by its span? */
@@ -237,6 +238,8 @@ static inline const gk_scheme *gk_scheme_of(gk_integrator integrator)
 typedef struct gk_tally gk_tally;
 typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
                                double h, gk_tally *tally);
+typedef void gk_supports_function(const gk_model *model, const gk_setup *setup, const double *moved,
+                                  const double *speed, double *out);
 typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
@@ -273,6 +276,7 @@ struct gk_setup {
     gk_step_function *step;              /* of the integrator, in the widest vectors of this processor */
     gk_tally_function *count;            /* what is summed after every step, likewise */
     gk_moves_function *moves;            /* tables of a step's length, likewise */
+    gk_supports_function *supports;      /* forces on supports by motion, likewise */
     size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
