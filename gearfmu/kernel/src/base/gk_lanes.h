@@ -199,7 +199,8 @@ static inline void gk_sum_rows(const gk_real *rows, int width, const gk_real *x,
     int k = 0;
     for (; k + 8 <= width; k += 8) gk_sum_some(from + k, width, x, count, to + k, 8);
     for (; k + 4 <= width; k += 4) gk_sum_some(from + k, width, x, count, to + k, 4);
-    for (; k + 2 <= width; k += 2) gk_sum_some(from + k, width, x, count, to + k, 2);
+    if (width - k == 3) gk_sum_some(from + k, width, x, count, to + k, 3), k += 3;
+    if (k + 2 <= width) gk_sum_some(from + k, width, x, count, to + k, 2), k += 2;
     if (k < width) gk_sum_some(from + k, width, x, count, to + k, 1);
 }
 

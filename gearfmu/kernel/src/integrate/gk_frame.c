@@ -34,12 +34,14 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
 {
     GK_ASSERT(k->h > 0.0 && v);
     const gk_base *base = &setup->base;
-    if (base->crowd.width) gk_crowd_turn(base, k, data, v);
+    if (base->crowd.width && !back) gk_crowd_turn(base, k, data, v);
     for (int j = 0; j < base->turns; j++) {
         const int i = back ? base->turns - 1 - j : j;
         const double speed = GK_OF(data, v)[base->turn_rotor[i]];
-        if (speed != 0.0 && !gk_in_crowd(base, base->turn_span[i])) turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
+        if (speed != 0.0 && !gk_in_crowd(base, base->turn_span[i]))
+            turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
     }
+    if (base->crowd.width && back) gk_crowd_turn(base, k, data, v);
 }
 
 /* ---- gear groups ------------------------------------------------------------------------------------------------- */

@@ -11,7 +11,7 @@ static const double BALANCE = 1e-9; /* relative defect of energy left after a ch
 static const double STEADY_BALANCE = 1e-9, COUPLED_BALANCE = 1e-9, COUPLED_CHANGE = 1e-9;
 #else
 static const double STEADY_BALANCE = 1e-7;  /* rows in float are good to 1e-7 */
-static const double COUPLED_CHANGE = 3e-7;  /* what engagements exchange is in single precision */
+static const double COUPLED_CHANGE = 1e-7;  /* what engagements exchange is in single precision */
 static const double COUPLED_BALANCE = 1e-6; /* engagements know each other's gaps to 1e-7; what is left waits */
 #endif
 

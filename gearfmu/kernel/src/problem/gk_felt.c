@@ -84,7 +84,8 @@ void gk_felt_move(const gk_coupled *c, int whole, int at_once)
     gk_work *work = c->work;
     for (int to = 0; to < c->model->gears; to++) {
         gk_real *moved[MOVES] = {work->move_pattern[WHOLE][to], work->move_pattern[YIELDED][to]};
-        for (int t = 0; t < MOVES; t++) memset(moved[t], 0, (size_t)base->patterns[to] * sizeof(gk_real));
+        for (int t = 0; t < MOVES; t++)
+            for (int k = 0; k < gk_halves(base->patterns[to]); k++) ((gk_half *)moved[t])[k] = (gk_half){0};
         for (int from = 0; from < c->model->gears; from++) {
             const between b = between_of(c->setup, work, to, from);
             if (!base->patterns[to] || !gk_patterns_meet(base, to, from)) continue;

@@ -44,6 +44,11 @@ static gk_real *ground_of(const gk_coupled *c, const gk_engaged *engaged, int w,
     return engaged->by_patterns[w] ? patterns[t][mesh->side[w].gear] : oscillators[t] + mesh->part[w].from;
 }
 
+static void clear_halves(gk_real *x, int n)
+{
+    for (int k = 0; k < gk_halves(n); k++) ((gk_half *)x)[k] = (gk_half){0};
+}
+
 /* gear by gear: nothing has been pushed yet */
 static void clear_gear(const gk_coupled *c, int g)
 {
@@ -51,10 +56,10 @@ static void clear_gear(const gk_coupled *c, int g)
     const gk_base *base = &c->setup->base;
     for (int t = 0; t < PUSHES; t++)
         if (work->by_tables && base->patterns[g])
-            memset(work->push_pattern[t][g], 0, (size_t)base->patterns[g] * sizeof(gk_real));
+            clear_halves(work->push_pattern[t][g], base->patterns[g]);
         else
             memset(work->push_ground[t] + base->from[g], 0, (size_t)base->width[g] * sizeof(gk_real));
-    for (int t = 0; t < MOVES; t++) memset(work->move_modes[t][g], 0, (size_t)GK_LANES(c->setup, g) * sizeof(gk_real));
+    for (int t = 0; t < MOVES; t++) clear_halves(work->move_modes[t][g], GK_LANES(c->setup, g));
 }
 
 static void push_spins(const gk_coupled *c, int e, int first, int last)
@@ -123,7 +128,8 @@ GK_INLINE void sum_blocks(half_block of, gk_span halves, gk_half *const out[PUSH
     if (first == last)
         for (; at + 8 <= end; at += 8) sum_halves(of, at, out, 8, first, last);
     for (; at + 4 <= end; at += 4) sum_halves(of, at, out, 4, first, last);
-    for (; at + 2 <= end; at += 2) sum_halves(of, at, out, 2, first, last);
+    if (end - at == 3) sum_halves(of, at, out, 3, first, last), at += 3;
+    if (at + 2 <= end) sum_halves(of, at, out, 2, first, last), at += 2;
     if (at < end) sum_halves(of, at, out, 1, first, last);
 }
 
@@ -365,6 +371,7 @@ void gk_pass(const gk_coupled *c, int whole, int at_once)
 {
     GK_ASSERT(whole || at_once);
     const gk_base *base = &c->setup->base;
+    GK_LAP(c->work, PHASE_SOLVE);
     push_all(c, whole + 2 * at_once);
     move_spins(c);
     for (int g = 0; g < c->model->gears; g++)
@@ -379,6 +386,7 @@ void gk_pass(const gk_coupled *c, int whole, int at_once)
         if (at_once) read_rows(c, e, YIELDED, far);
         if (whole && GK_ON(c->setup, friction)) read_along(c, e);
     }
+    GK_LAP(c->work, PHASE_PASS);
 }
 
 void gk_pass_unit(const gk_coupled *c, int from, int row)

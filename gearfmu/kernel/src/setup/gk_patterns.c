@@ -6,8 +6,8 @@
 #include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 
-static const double TOLD = 5e-6;    /* of the longest row: what patterns leave out */
-static const double SHORT = 1e-5;   /* s: of the step that weighs oscillators */
+static const double TOLD = 3e-4;    /* of the longest row: what patterns leave out */
+static const double SHORT = 1e-4;   /* s: of the motion that weighs oscillators */
 enum { WORTH = 2 * MOST_PATTERNS }; /* least oscillators of a gear */
 
 static int same(gk_span a, int from, int width) { return a.from == from && a.width == width; }

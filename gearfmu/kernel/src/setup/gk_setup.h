@@ -60,9 +60,9 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     gk_span *turn_span;            /* (turns) the part of both that is not zero */
     gk_span crowd;                 /* oscillators that many pairs turn; width 0: none */
     int crowd_pairs, crowd_dampers; /* that have just these */
-    double *outward;               /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
-    double *outward_support;       /* (rotors, supports) what it does at once to the forces on supports */
-    double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
+    double *outward;                /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
+    double *outward_support;        /* (rotors, supports) what it does at once to the forces on supports */
+    double *centre[MAX_GEARS];      /* (6, n): rigid motion of every gear at its mid-width */
     const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], support_damping_span[MAX_SUPPORTS],
@@ -196,7 +196,7 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
  * and to the rows. Rows x of all pairs stand before their rows y. */
 enum { LEAST_CROWD = 16, MOST_CROWD = 128 };
 typedef struct gk_crowd_flow {
-    gk_real *turns, *turned, *turning;      /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
+    gk_real *turns, *turned, *turning;       /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
     gk_real *damps, *holds, *pulls, *pulled; /* (width, dashpots) twice, (dashpots, width), (dashpots, dashpots) */
 } gk_crowd_flow;
 static inline int gk_whole_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2) * (LANES / 2); }
@@ -204,13 +204,13 @@ static inline int gk_whole_halves(int n) { return (n + LANES / 2 - 1) / (LANES /
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *unit, *lead, *hold;
-    double *press;              /* half a step's kick by a load that at rest displaces by load/ω² */
-    double *pulls;              /* (supports, n) s²e/n of a dashpot */
-    double *turns, *turned;     /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
-    double *products;           /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double *holds;              /* (supports, n) e times `hold` */
+    double *press;          /* half a step's kick by a load that at rest displaces by load/ω² */
+    double *pulls;          /* (supports, n) s²e/n of a dashpot */
+    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
+    double *holds;          /* (supports, n) e times `hold` */
     gk_crowd_flow crowd;
-    double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
+    double decay[MAX_SUPPORTS];                    /* 1 − e^(−dh/2) */
     double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
 
