@@ -126,6 +126,9 @@ typedef gk_real gk_four __attribute__((vector_size(4 * sizeof(gk_real)), may_ali
 #define GK_WIDENED(four) __builtin_convertvector(four, gk_quad)
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
                                        aligned(sizeof(gk_real)))); /* states start anywhere */
+/* halves that hold n numbers; numbers in them */
+static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
+static inline int gk_whole_halves(int n) { return gk_halves(n) * (LANES / 2); }
 /* x, or 0 where it is less than `least` in magnitude: numbers that fade end at 0 before products of them are denormal,
  * which many processors compute slowly; by the same bits on all */
 typedef gk_whole gk_half_bits

@@ -2,6 +2,7 @@
  * as if alone and in closed form. Predicted with the forces of the last step, corrected with those that were found.
  * Around both, half a step each, what turns speeds or damps supports (Strang). */
 #include "integrate/gk_advance.h"
+#include "integrate/gk_crowd.h"
 #include "integrate/gk_integrate.h"
 #include "problem/gk_exchange.h"
 

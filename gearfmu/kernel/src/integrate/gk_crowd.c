@@ -1,7 +1,8 @@
 /* Half steps of what turns or damps the speeds of the ground group, where many turning pairs and dashpots have the same
  * oscillators, as those of a flexible carrier: all pairs at once, by the rows of all (docs/theory.md, 3.10). Their
  * products are in single precision; what they change is added in double. */
-#include "integrate/gk_integrate.h"
+#include "integrate/gk_crowd.h"
+#include "model/gk_data.h"
 
 enum { MOST_ROWS = 2 * MOST_CROWD, MOST_WIDE = MAX_GROUND + 4 * MAX_ROTORS + LANES, ROUNDS = 30 };
 static const double TURNED = sizeof(gk_real) == sizeof(float) ? 3e-8 : 1e-15; /* of the largest reading: left of it */

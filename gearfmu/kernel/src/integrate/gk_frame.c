@@ -3,6 +3,7 @@
  * elastic bodies (17l): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
  * by Cayley's form, without energy; one after the other, in the other half step in the other order. Centrifugal load
  * m Ω² a (17g). */
+#include "integrate/gk_crowd.h"
 #include "integrate/gk_integrate.h"
 
 static int carries(const gk_model *model, int rotor)

@@ -7,10 +7,6 @@
 
 /* gk_step.c */
 GK_HOT gk_step_function gk_step_once;
-/* gk_crowd.c */
-GK_HOT void gk_crowd_turn(const gk_base *base, const gk_coefficients *k, const gk_data *data, double *v);
-GK_HOT double gk_crowd_damp(const gk_model *model, const gk_base *base, const gk_coefficients *k, const double *f,
-                            double *v);
 /* gk_frame.c */
 GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
 GK_HOT void gk_frame_predict(const gk_modal *m, const gk_flow *w, double angle, const gk_real *state, gk_work *work,

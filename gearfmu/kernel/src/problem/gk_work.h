@@ -78,9 +78,7 @@ typedef struct gk_forces { /* of an engagement; along: the same along the profil
     double of[PUSHES][MAX_STRIDE], along[2][MAX_STRIDE];
 } gk_forces;
 
-/* halves of LANES that hold n */
 enum { MAX_NEAR = (MAX_GROUND + 4 * MAX_ROTORS) / 8 + 1 };
-static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
 
 typedef struct gk_far_tooth { /* load on a tooth by patterns, and what others move of it */
     gk_real load[LANES], moved[LANES];

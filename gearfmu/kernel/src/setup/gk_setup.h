@@ -199,16 +199,14 @@ typedef struct gk_crowd_flow {
     gk_real *turns, *turned, *turning;       /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
     gk_real *damps, *holds, *pulls, *pulled; /* (width, dashpots) twice, (dashpots, width), (dashpots, dashpots) */
 } gk_crowd_flow;
-static inline int gk_whole_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2) * (LANES / 2); }
 
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *unit, *lead, *hold;
     double *press;          /* half a step's kick by a load that at rest displaces by load/ω² */
-    double *pulls;          /* (supports, n) s²e/n of a dashpot */
+    double *pulls, *holds;  /* (supports, n) s²e/n of a dashpot; e times `hold` */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
     double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double *holds;          /* (supports, n) e times `hold` */
     gk_crowd_flow crowd;
     double decay[MAX_SUPPORTS];                    /* 1 − e^(−dh/2) */
     double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
