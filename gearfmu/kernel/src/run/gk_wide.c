@@ -54,6 +54,7 @@
 #include "problem/gk_couple.c"
 #include "problem/gk_nodal.c"
 #include "problem/gk_engage.c"
+#include "integrate/gk_crowd.c"
 #include "integrate/gk_frame.c"
 #include "integrate/gk_advance.c"
 #include "integrate/gk_energy.c"
