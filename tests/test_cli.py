@@ -366,4 +366,4 @@ def test_bad_input_is_one_clear_error_and_nothing_half_written(line: str, wrecka
 
 def test_run_lists_the_shipped_scenes() -> None:
     code, out, _ = call("run", "--list")
-    assert code == 0 and "planetary_shift" in out and "clutch_closure_train  Clutch closure on a two-stage" in out
+    assert code == 0 and "planetary_shift" in out and "clutch_closure_train   Clutch closure on a two-stage" in out

@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from gearfmu.api.models import PathLike, assemble, load, reduce
 from gearfmu.api.results import stage_and_bodies, trace_file
 from gearfmu.api.settings import Quantity, checked
-from gearfmu.body.body import Body
-from gearfmu.body.body import Skin as BodySkin
 from gearfmu.modes.housed import Housed, housed
 from gearfmu.modes.housing import Placed, placed_housing
 from gearfmu.modes.rings import stage_rings
-from gearfmu.sound import Radiation, Skin, SoundError, SoundPower, power_of, radiation, segments, skin_of
-from gearfmu.sound.store import load_radiation, save_radiation
+from gearfmu.sound import SoundError, SoundPower
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.observed import MODE, MOTION
-from gearfmu.stage.run.housing import HousingAlone
+from gearfmu.stage.run.sound import MOTIONS, Sounding, radiated_power
 from gearfmu.stage.run.trace import Channel, Trace
 
 HIGHEST = 10e3  # Hz, of the housing's motion; less where the run's step does not resolve it
-MOTIONS, UNITS = ("x", "y", "z", "rx", "ry", "rz"), ("m", "m", "m", "rad", "rad", "rad")
+UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 
 def house(trace: Trace | PathLike, housing: PathLike | Stage, torque: Quantity | None = None) -> Trace:
@@ -60,6 +55,7 @@ def sound_power(
     matrix: PathLike | None = None,
     patches: int = 1000,
     speed: str | None = None,
+    start: Quantity = 0.0,
 ) -> SoundPower:
     """Sound power that the housing of a run radiates into free air, over frequency, in W; beside it equivalent radiated
     power (ERP). `total()`, `total_a()`, `third_octaves()` give levels and bands.
@@ -68,22 +64,15 @@ def sound_power(
     matrix : file of the radiation matrix, made when it is not there and kept, and made anew for another housing.
     patches : of the boundary elements; their edge is to be a sixth of a wave's length, above that power is ERP.
     speed : name of a channel for a waterfall, as "input.gear.w": one spectrum a segment; their mean when None.
+    start : time from which sound counts; what the housing did before it is known still.
 
     Raises SoundError for a stage without a skin and a record without equal steps.
     """
     run = _trace(trace)
     stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing or stage_and_bodies(run.meta)[0]
-    bodies = reduce(stage)
-    body, own = _skinned(stage, bodies)
-    known = _recorded(run, body)
-    coordinates = HousingAlone.of(stage, bodies).motion(run).velocity if known is None else known
-    count = coordinates.shape[1]
-    skin = skin_of(own.points, own.faces, own.skin_modes[:, :, :count])
-    sound = _matrix(skin, patches, matrix, f"{body.how.hash} {count}")
-    pieces = segments(run.time, coordinates, moved=known is not None)
-    steady = speed is None
-    turning = None if speed is None else np.interp(pieces.middle, run.time, run[speed])
-    return power_of(pieces, sound, turning, steady)
+    return radiated_power(
+        run, stage, reduce(stage), Sounding(matrix, patches, speed, checked("duration", start, "start"))
+    )
 
 
 def _trace(trace: Trace | PathLike) -> Trace:
@@ -130,36 +119,3 @@ def _channels(found: Housed, placed: Placed, run: Trace) -> dict[str, Channel]:
             said = "root-mean-square displacement of the housing, by mass, in one mode"
             channels[f"{placed.name}{MODE}{i - 5}"] = Channel(values / root, "m", said)
     return channels
-
-
-def _skinned(stage: Stage, bodies: Sequence[Body]) -> tuple[Body, BodySkin]:
-    """The reduced housing of a stage and its skin. SoundError where it has none, or no skin."""
-    if not stage.housings:
-        raise SoundError(f"stage {stage.name} has no housing: name one, or put it under the run with `gearfmu house`")
-    body = stage.by_name(bodies)[stage.housings[0].name]
-    if body.skin is None:
-        raise SoundError(f"the housing of {stage.name} has no skin: name its outer surface in [import], skin = …")
-    return body, body.skin
-
-
-def _recorded(run: Trace, body: Body) -> np.ndarray | None:
-    """(T, 6 + n): motion of the housing, where a trace of `house` has it."""
-    rigid = [f"{body.name}{MOTION}{own}" for own in MOTIONS]
-    modes = [name for i in range(body.modes) if (name := f"{body.name}{MODE}{i + 1}") in run]
-    if not all(name in run for name in rigid):
-        return None
-    moved, root = [run[name] for name in rigid], math.sqrt(body.total_mass)
-    return np.stack([*moved, *(root * run[name] for name in modes)], axis=1)
-
-
-def _matrix(skin: Skin, patches: int, matrix: PathLike | None, made_of: str) -> Radiation:
-    """The radiation matrix of a file where it is of this skin, else made, and kept in the file."""
-    key = f"{made_of} {patches}"
-    if matrix is not None and Path(matrix).exists():
-        found, known = load_radiation(matrix)
-        if known == key:
-            return found
-    found = radiation(skin, count=patches)
-    if matrix is not None:
-        save_radiation(found, matrix, key)
-    return found

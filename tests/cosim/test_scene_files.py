@@ -13,6 +13,7 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 def test_shipped_scenes():
     pairs = [
         "clutch_closure",
+        "clutch_closure_housed",
         "clutch_closure_train",
         "clutch_dump",
         "pair_light",
@@ -27,9 +28,11 @@ def test_shipped_scenes():
         scene = load_scene(name)
         assert (scene.name, scene.stage.name, scene.stage.level) == (name, stage, "fast")
     for name in pairs:
-        scene, train = load_scene(name), "train" in name
+        scene, housed = load_scene(name), "housed" in name
+        train = "train" in name or housed
         assert scene.name == name
-        assert scene.stage.name == ("two_stage" if train else "fzg_c/stage_relief")
+        own = "two_stage/stage_housed" if housed else "two_stage" if train else "fzg_c/stage_relief"
+        assert scene.stage.name == own
         level = "fast" if "runup" in name or train else "standard"
         assert (scene.stage.level, scene.stage.slices) == (level, 7 if train else 5)
 
@@ -182,5 +185,5 @@ def test_whatever_stands_in_a_field_it_loads_or_lists_problems(tmp_path, name):
 
 
 def test_unknown_scene_names_the_shipped_ones():
-    with pytest.raises(SpecError, match="clutch_closure, clutch_closure_train, clutch_dump"):
+    with pytest.raises(SpecError, match="clutch_closure_housed, clutch_closure_train, clutch_dump"):
         load_scene("nothing")
