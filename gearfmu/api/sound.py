@@ -70,9 +70,8 @@ def sound_power(
     """
     run = _trace(trace)
     stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing or stage_and_bodies(run.meta)[0]
-    return radiated_power(
-        run, stage, reduce(stage), Sounding(matrix, patches, speed, checked("duration", start, "start"))
-    )
+    how = Sounding(matrix, patches, speed, checked("start", start, "time"))
+    return radiated_power(run, stage, reduce(stage), how)
 
 
 def _trace(trace: Trace | PathLike) -> Trace:

@@ -63,7 +63,7 @@ class Span:
 @dataclass(frozen=True)
 class Panel:
     """One pair of axes. label: what the vertical axis shows, with its unit; height: px; limits: of the vertical axis;
-    dots (x, y): circles on a map."""
+    dots (x, y): circles on a map; ticks: names of 0, 1, 2 … of the horizontal axis."""
 
     label: str
     curves: tuple[Curve, ...] = ()
@@ -75,6 +75,7 @@ class Panel:
     height: int = 180
     x_label: str = ""
     x_limits: tuple[float, float] | None = None
+    ticks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
-from gearfmu.report import mesh_cycle, plots, plots_nvh, plots_runup, plots_set
+from gearfmu.report import housing, mesh_cycle, plots, plots_nvh, plots_runup, plots_set
 from gearfmu.report.chart import Plot
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
@@ -99,7 +99,7 @@ def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
     makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in run.angles.items()]
     if run.run_up is None:
         makers.append(lambda: plots_nvh.force_spectrogram(trace, run.angles))
-    return makers
+    return makers + housing.figures(run)
 
 
 def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
@@ -122,6 +122,7 @@ def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
         lambda: plots.axial_and_tilting(trace),
         lambda: plots_set.energy(trace),
         *over_frequency,
+        *housing.figures(run),
     ]
 
 

@@ -82,6 +82,8 @@ def _panel_numbers(chart: Chart, panel: Panel, pack: Pack) -> dict[str, Any]:
         values = pack.add_map(heat.values, heat.low, heat.high)
         found["heat"] = {"x": pack.add(heat.x), "y": pack.add(heat.y), "z": values, "unit": heat.unit}
         found["heat"] |= {"low": heat.low, "high": heat.high, "scale": heat.scale}
+    if panel.ticks:
+        found["ticks"] = list(panel.ticks)
     if panel.dots is not None:
         found["dots"] = [pack.add(values) for values in panel.dots]
     return found

@@ -10,7 +10,7 @@ from typing import Any
 
 from gearfmu.body import Body
 from gearfmu.files import write_text
-from gearfmu.report import heading, page, sections
+from gearfmu.report import heading, housing, page, sections
 from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.plan import plan_sections
@@ -55,7 +55,8 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
     about = [run.title, *(str(summary[key]) for key in ("description", "started") if summary.get(key))]
     over_speed = [plot for plot in made if plot.name in RUN_UP]
     over_frequency = [plot for plot in made if plot.name.startswith(NVH) and plot.name not in RUN_UP]
-    others = [plot for plot in made if not plot.name.startswith(NVH)]
+    of_housing = [plot for plot in made if plot.name.startswith(housing.NAME)]
+    others = [plot for plot in made if not plot.name.startswith((*NVH, housing.NAME))]
     octaves = sections.octaves(run)
     view = turning(run)
     body = [
@@ -63,7 +64,7 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
         page.tiles(sections.tiles(run)),
         page.facts(sections.facts(summary)),
         *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],
-        page.contents(_links(over_speed, others, over_frequency)),
+        page.contents(_links(over_speed, others, over_frequency, of_housing)),
         *([page.section("Not shown", *[page.note(reason) for reason in missing])] if missing else []),
         *(sections.warned(run.trace) if over_speed else []),
         *[page.figure(plot) for plot in over_speed],
@@ -74,6 +75,7 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
         *([] if over_speed else sections.warned(run.trace)),
         *([page.section("Octave bands", octaves, name="octaves")] if octaves else []),
         *[page.figure(plot) for plot in over_frequency],
+        *[page.figure(plot) for plot in of_housing],
         page.section("Accuracy and cost", *sections.accuracy(run), name="accuracy"),
         page.details(
             "Where it comes from", page.pairs_table(sections.provenance(summary)), sections.channels(run.trace)
@@ -82,7 +84,9 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
     return page.page(f"{run.title} – {run.stage_name}", body, made, view)
 
 
-def _links(over_speed: Sequence[Plot], others: Sequence[Plot], over_frequency: Sequence[Plot]) -> dict[str, str]:
+def _links(
+    over_speed: Sequence[Plot], others: Sequence[Plot], over_frequency: Sequence[Plot], of_housing: Sequence[Plot]
+) -> dict[str, str]:
     """Links to the first of the parts of the page that there are."""
     found = {over_speed[0].name: "Run-up"} if over_speed else {}
     found |= {"results": "Results"}
@@ -94,4 +98,6 @@ def _links(over_speed: Sequence[Plot], others: Sequence[Plot], over_frequency: S
         found |= {first: words} if first is not None else {}
     if over_frequency:
         found[over_frequency[0].name] = "Spectra and orders"
+    if of_housing:
+        found[of_housing[0].name] = "Housing and sound"
     return found | {"accuracy": "Accuracy and cost"}

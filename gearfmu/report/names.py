@@ -60,6 +60,10 @@ def _plain(channel: str) -> str:
     if found:
         kind, part, what, axis, mean = found.groups()
         return f"{kind.capitalize()} {DIRECTIONS[what]} {axis}, {part}{', mean over the step' if mean else ''}"
+    if found := re.fullmatch(r"(sensor|mount)\.([^.]+)\.([af])([xyz])(_mean)?", channel):
+        kind, part, what, axis, mean = found.groups()
+        word = {"a": "Acceleration", "f": "Force"}[what]
+        return f"{word} {axis}, {kind} {part}{', mean over the step' if mean else ''}"
     first, _, last = channel.partition(".")
     if last in MESH:
         return MESH[last] if first == "mesh" else f"{MESH[last]}, {mesh_words(first)}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,8 +19,32 @@ ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 LOOKS = ("dashed", "dotted")  # of the orders of one mesh and the next
 MOST_ROWS, MOST_COLUMNS = 400, 700  # of a map in the page
+SENSOR = "sensor."
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Of signals: what the names of their figures begin with, title of their spectra, unit, reference of levels."""
+
+    prefix: str
+    spectra: str
+    unit: str = "N"
+    reference: float = 1.0
+
+    @property
+    def label(self) -> str:
+        """Of a level."""
+        return metrics.level_label(self.unit, self.reference)
+
+    def level(self, amplitude: np.ndarray) -> np.ndarray:
+        """Level in dB."""
+        return metrics.level(amplitude, self.reference)
+
+
+FORCES = Kind("", "Spectra of the forces")
+ACCELERATIONS = Kind("housing_", "Spectra of the accelerations of the housing", "m/s2", 1e-6)  # ISO 1683
 
 
 def force_channels(trace: Trace) -> list[str]:
@@ -34,8 +59,8 @@ def force_channels(trace: Trace) -> list[str]:
 
 
 def averaging(trace: Trace, name: str) -> float:
-    """Time (s) over which a sample of the channel is a mean: the communication step of "…_mean", else 0."""
-    return metrics.sample_step(trace.time) if name.endswith("_mean") else 0.0
+    """Time (s) over which a sample of the channel is a mean: the communication step of "…_mean" and sensors, else 0."""
+    return metrics.sample_step(trace.time) if name.endswith("_mean") or name.startswith(SENSOR) else 0.0
 
 
 def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spectrum:
@@ -45,20 +70,32 @@ def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spec
 
 
 def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
-    """Level of every bearing and mesh force over frequency, mesh orders marked; None without forces. angles: mesh angle
-    (n,) rad by engagement."""
-    names = force_channels(trace)
+    """Level of every bearing and mesh force over frequency: `spectra`."""
+    return spectra(trace, window, angles, force_channels(trace), FORCES)
+
+
+def loudest_sensors(trace: Trace) -> list[str]:
+    """Of every sensor the direction that moves most."""
+    names = [name for name in trace.channels if name.startswith(SENSOR) and np.any(trace[name])]
+    return [max(own, key=lambda name: float(np.std(trace[name]))) for own in _by_part(names)]
+
+
+def spectra(
+    trace: Trace, window: Window, angles: Mapping[str, np.ndarray], names: Sequence[str], kind: Kind
+) -> Plot | None:
+    """Level of channels over frequency, mesh orders marked; None without channels. angles: mesh angle (n,) rad by
+    engagement."""
     if not names:
         return None
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
-    spectra = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
+    own = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
     top = min(SHOWN_TO, 0.5 / step)
     found = {mesh: _order_marks(part.time, trace, (mesh, angle), top) for mesh, angle in angles.items()}
     marked, marks = [mesh for mesh in found if found[mesh]], tuple(mark for own in found.values() for mark in own)
-    panels = [_levels({name: spectra[name] for name in group}, top, marks) for group in _by_part(names)]
+    panels = [_levels({name: own[name] for name in group}, top, marks, kind) for group in _by_part(names)]
     chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
-    first = next(iter(spectra.values()))
+    first = next(iter(own.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
         f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). "
@@ -69,7 +106,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
             else "Mesh orders are not marked: the speed is not known or not steady, or they lie above the spectrum."
         )
     )
-    return Plot("spectrum", "Spectra of the forces", caption, chart, _spectrum_columns(spectra))
+    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, chart, _spectrum_columns(own, kind))
 
 
 def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
@@ -78,20 +115,27 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
     others = tuple(f"{other}." for other in meshes(trace) if other != mesh)
     names = [name for name in force_channels(trace) if not name.startswith(others)]
     names = [name for name in names if ".fx" not in name or len(bearings(trace)) < 2]
+    return cuts(trace, (mesh, mesh_angle), names, FORCES)
+
+
+def cuts(trace: Trace, of: tuple[str, np.ndarray], names: Sequence[str], kind: Kind) -> Plot | None:
+    """Level of the first orders of an engagement (name, mesh angle (n,) rad) in channels along the run; None without
+    channels."""
+    mesh, mesh_angle = of
     if not names:
         return None
-    file = "orders" if not others else f"orders_{mesh}"
-    cuts = {
+    file = f"{kind.prefix}orders" if len(meshes(trace)) < 2 else f"{kind.prefix}orders_{mesh}"
+    found = {
         name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS, averaged=averaging(trace, name))
         for name in names
     }
-    _require_order(next(iter(cuts.values())), mesh, metrics.sample_step(trace.time))
+    _require_order(next(iter(found.values())), mesh, metrics.sample_step(trace.time))
     panels = []
-    for name, cut in cuts.items():
+    for name, cut in found.items():
         rows = [(k, row) for k, row in zip(cut.orders, cut.amplitude, strict=True) if np.any(np.isfinite(row))]
-        curves = tuple(Curve(cut.time, metrics.level(row), f"order {k}", "dB re 1 N") for k, row in rows)
-        panels.append(Panel(f"{shown(name)}, dB re 1 N", curves, limits=level_limits(curves)))
-    first = next(iter(cuts.values()))
+        curves = tuple(Curve(cut.time, kind.level(row), f"order {k}", kind.label) for k, row in rows)
+        panels.append(Panel(f"{shown(name)}, {kind.label}", curves, limits=level_limits(curves)))
+    first = next(iter(found.values()))
     low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
     caption = (
         f"Mesh order k = k × mesh frequency, which runs from {low:.0f} to {high:.0f} Hz; Hann window of 8 mesh "
@@ -99,8 +143,8 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
         "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are "
         "left out."
     )
-    title = of_mesh(trace, mesh, "Mesh orders along the run")
-    return Plot(file, title, caption, over_time(panels), _order_columns(cuts))
+    title = of_mesh(trace, mesh, f"Mesh orders {'of the housing ' if kind is ACCELERATIONS else ''}along the run")
+    return Plot(file, title, caption, over_time(panels), _order_columns(found, kind))
 
 
 def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | None:
@@ -148,7 +192,7 @@ def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
     return {name: metrics.octave_levels(spectrum_of(part, name)) for name in force_channels(trace)}
 
 
-def _by_part(names: list[str]) -> list[list[str]]:
+def _by_part(names: Sequence[str]) -> list[list[str]]:
     """The channels of one bearing, or of the mesh, share a panel."""
     groups: dict[str, list[str]] = {}
     for name in names:
@@ -211,17 +255,17 @@ def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarr
     return np.fmax.reduceat(levels, starts, axis=0), np.add.reduceat(at, starts) / counts
 
 
-def _levels(spectra: Mapping[str, metrics.Spectrum], top: float, marks: tuple[Mark, ...]) -> Panel:
+def _levels(spectra: Mapping[str, metrics.Spectrum], top: float, marks: tuple[Mark, ...], kind: Kind) -> Panel:
     """A panel of levels over frequency (kHz) up to `top` (Hz)."""
-    curves = tuple(spectrum_curve(name, own, top) for name, own in spectra.items())
-    return Panel("level in dB re 1 N", curves, marks=marks, limits=level_limits(curves))
+    curves = tuple(spectrum_curve(name, own, top, kind) for name, own in spectra.items())
+    return Panel(f"level in {kind.label}", curves, marks=marks, limits=level_limits(curves))
 
 
-def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float) -> Curve:
+def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float, kind: Kind = FORCES) -> Curve:
     """Level of a spectrum over frequency (kHz) up to `top` (Hz), without its mean."""
     inside = (spectrum.frequency > 0) & (spectrum.frequency <= top)
-    level = metrics.level(spectrum.amplitude[inside])
-    return Curve(spectrum.frequency[inside] / 1e3, level, name, "dB re 1 N")
+    level = kind.level(spectrum.amplitude[inside])
+    return Curve(spectrum.frequency[inside] / 1e3, level, name, kind.label)
 
 
 def _order_marks(time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray], top: float) -> tuple[Mark, ...]:
@@ -252,18 +296,18 @@ def _order_curves(trace: Trace, mesh: tuple[str, np.ndarray], look: str, limit: 
     return found
 
 
-def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum]) -> dict[str, np.ndarray]:
+def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum], kind: Kind) -> dict[str, np.ndarray]:
     found = {"frequency_[Hz]": next(iter(spectra.values())).frequency}
     for name, spectrum in spectra.items():
-        found[f"{name}_rms_[N]"] = spectrum.amplitude
-        found[f"{name}_[dB re 1 N]"] = metrics.level(spectrum.amplitude)
+        found[f"{name}_rms_[{kind.unit}]"] = spectrum.amplitude
+        found[f"{name}_[{kind.label}]"] = kind.level(spectrum.amplitude)
     return found
 
 
-def _order_columns(cuts: Mapping[str, metrics.OrderCuts]) -> dict[str, np.ndarray]:
+def _order_columns(cuts: Mapping[str, metrics.OrderCuts], kind: Kind) -> dict[str, np.ndarray]:
     first = next(iter(cuts.values()))
     found = {"time_[s]": first.time, "mesh_frequency_[Hz]": first.mesh_frequency}
     for name, cut in cuts.items():
         for row, order in enumerate(cut.orders):
-            found[f"{name}_order_{order}_rms_[N]"] = cut.amplitude[row]
+            found[f"{name}_order_{order}_rms_[{kind.unit}]"] = cut.amplitude[row]
     return found

@@ -14,6 +14,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
+from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, loudest_sensors
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
 from gearfmu.report.signals import GEAR_SPEED, Window, bearings
 from gearfmu.spec.forms.general import Stage
@@ -52,7 +53,7 @@ class Signal:
     @property
     def label(self) -> str:
         """Of a level."""
-        return f"dB re {self.reference:g} {self.unit}"
+        return metrics.level_label(self.unit, self.reference)
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window)
     else:
         others, shown = {gear: turn / turned[first] for gear, turn in turned.items() if gear != first}, TRAIN_ORDERS
         names = _loudest_bearings(part)
-    names += [f"{mesh}.force" for mesh in known]
+    names += [*(f"{mesh}.force" for mesh in known), *loudest_sensors(part)]
     signals = {name: _force(part, name) for name in names if name in part or f"{name}_mean" in part}
     return RunUp(part, first, turning, families, signals, orders_shown=shown, others=others) if signals else None
 
@@ -214,7 +215,10 @@ def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Body]) -> t
 
 
 def _force(part: Trace, name: str) -> Signal:
-    """A force, its mean over the step where that was recorded."""
+    """A force, its mean over the step where that was recorded, or a sensor's acceleration, which is such a mean."""
+    if name.startswith(SENSOR):
+        own = ACCELERATIONS
+        return Signal(part[name], own.unit, own.reference, {}, metrics.sample_step(part.time))
     step = metrics.sample_step(part.time) if f"{name}_mean" in part else 0.0
     return Signal(mean_or_sample(part, name), "N", 1.0, {}, step)
 

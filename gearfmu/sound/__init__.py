@@ -1,7 +1,7 @@
 """Radiated sound: skin of a body, boundary elements, radiation matrix, sound power, third octaves."""
 
 from gearfmu.sound.boundary import memory_needed
-from gearfmu.sound.levels import a_weighting, level, midbands, third_octaves, weighted
+from gearfmu.sound.levels import a_weighting, level, midbands, nominal, third_octaves, weighted
 from gearfmu.sound.power import Segments, SoundPower, power_of, radiated, segments
 from gearfmu.sound.radiation import Air, Radiation, radiation
 from gearfmu.sound.skin import Skin, SoundError, envelope, refined, skin_of
@@ -18,6 +18,7 @@ __all__ = [
     "level",
     "memory_needed",
     "midbands",
+    "nominal",
     "power_of",
     "radiated",
     "radiation",

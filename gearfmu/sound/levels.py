@@ -6,6 +6,7 @@ import numpy as np
 
 REFERENCE = 1e-12  # W
 RATIO = 10**0.3  # an octave, IEC 61260-1, 5.2.1
+SERIES = np.array([1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8])
 NONE = -999.0  # dB, of no power at all
 
 
@@ -14,6 +15,12 @@ def midbands(low: float = 20.0, high: float = 20e3) -> np.ndarray:
     may be nominal frequencies; IEC 61260-1, 5.4."""
     first, last = (round(3 * np.log(f / 1000) / np.log(RATIO)) for f in (low, high))
     return 1000 * RATIO ** (np.arange(first, last + 1) / 3)
+
+
+def nominal(bands: np.ndarray) -> np.ndarray:
+    """Hz: nominal frequencies of third octaves `bands` (B,), as 63 or 3150; IEC 61260-1, annex E."""
+    number = np.round(10 * np.log10(bands)).astype(int)
+    return SERIES[number % 10] * 10.0 ** (number // 10)
 
 
 def third_octaves(frequency: np.ndarray, power: np.ndarray, bands: np.ndarray) -> np.ndarray:

@@ -135,6 +135,21 @@ def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path
     assert marked[0] == (1, 800.0, pytest.approx(3000.0)) and [order for order, *_ in marked] == [1, 2, 3, 4, 5, 6]
 
 
+def test_a_run_up_shows_the_orders_of_the_loudest_direction_of_every_sensor() -> None:
+    """√2 m/s² at order 3 of the mesh are 120 dB re 1 µm/s²; the sensor records means over the step."""
+    trace = pair_sweep()
+    speed = np.sqrt(2) / (48 * 2.0 * SPEED) * np.sin(48 * 2.0 * ANGLE)
+    loud = np.diff(speed, prepend=speed[0]) / STEP
+    sensors = {f"sensor.lid.a{axis}": Channel(share * loud, "m/s2") for axis, share in (("x", 0.1), ("z", 1.0))}
+    housed = Trace(TIME, trace.channels | sensors, trace.meta)
+    own = run_up_of_meshes(housed, known_meshings(housed), Window(0.0, DURATION, "here"))
+    assert own is not None and list(own.signals)[-1] == "sensor.lid.az" and "sensor.lid.ax" not in own.signals
+    signal, found = own.signals["sensor.lid.az"], own.orders["sensor.lid.az"]
+    assert signal.label == "dB re 1 µm/s²"
+    levels = signal.level(found.amplitude[:, found.order == 48.0].ravel())
+    assert levels[np.isfinite(levels)] == pytest.approx(120.0, abs=0.2)
+
+
 def test_the_rotation_of_a_shaft_is_its_angle_without_the_swing_of_a_mesh_resonance() -> None:
     trace = pair_sweep(0.3)
     assert np.diff(trace["pinion.gear.w"]).min() < -0.02 * 2.0 * SPEED.mean(), "the recorded speed swings"

@@ -92,7 +92,7 @@
   function traceOf(panel, curve, range, columns) {
     const [x, y] = thinned(curve, range[0], range[1], columns), line = colour(`--c${curve.colour}`);
     const hover = `${curve.name}: %{y:.5~g} ${curve.unit}<extra></extra>`;
-    if (curve.look === "bars") return { type: "bar", x, y, name: curve.name, marker: { color: line }, hovertemplate: hover };
+    if (curve.look === "bars") return { type: "bar", x: panel.ticks || x, y, name: curve.name, marker: { color: line }, hovertemplate: hover };
     const dash = { dashed: "dash", dotted: "dot" }[curve.look] || "solid", over = panel.heat ? 0.8 : 1.3;
     return { type: "scatter", mode: curve.look === "points" ? "markers" : "lines", x, y, name: curve.name, hovertemplate: hover,
       marker: { color: line, size: 5 }, hoverinfo: panel.heat ? "skip" : undefined,
@@ -135,7 +135,7 @@
       font: { family: getComputedStyle(document.body).fontFamily, size: 11.5, color: colour("--ink") }, showlegend: false,
       hovermode: panel.heat ? "closest" : "x unified", hoverlabel: { bgcolor: colour("--card"), bordercolor: colour("--line"), font: { size: 11.5, color: colour("--ink") }, align: "left", namelength: -1 },
       xaxis: { ...axis, range: range.slice(), title: { text: panel.x, font: { size: 11.5 }, standoff: 4 }, showgrid: !panel.heat, hoverformat: ".6~g",
-        dtick: panel.curves.some(curve => curve.look === "bars") ? 1 : undefined, spikemode: "across", spikethickness: 1, spikecolor: colour("--muted"), spikedash: "solid" },
+        type: panel.ticks ? "category" : undefined, dtick: !panel.ticks && panel.curves.some(curve => curve.look === "bars") ? 1 : undefined, spikemode: "across", spikethickness: 1, spikecolor: colour("--muted"), spikedash: "solid" },
       yaxis: { ...axis, range: panel.yLimits ? panel.yLimits.slice() : undefined, showgrid: !panel.heat, nticks: 6 },
       shapes: shapesOf(panel), annotations: text, dragmode: touch ? false : "zoom", bargap: 0.35, uirevision: 1 };
   }
