@@ -12,8 +12,8 @@ import numpy as np
 from gearfmu.api.models import PathLike, assemble, load, reduce
 from gearfmu.api.results import stage_and_bodies, trace_file
 from gearfmu.api.settings import Quantity, checked
-from gearfmu.body import sensed
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body import Body
+from gearfmu.body.body import Skin as BodySkin
 from gearfmu.modes.housed import Housed, housed
 from gearfmu.modes.housing import Placed, placed_housing
 from gearfmu.modes.rings import stage_rings
@@ -79,7 +79,7 @@ def sound_power(
     coordinates = HousingAlone.of(stage, bodies).motion(run).velocity if known is None else known
     count = coordinates.shape[1]
     skin = skin_of(own.points, own.faces, own.skin_modes[:, :, :count])
-    sound = _matrix(skin, patches, matrix, f"{body.input_hash} {count}")
+    sound = _matrix(skin, patches, matrix, f"{body.how.hash} {count}")
     pieces = segments(run.time, coordinates, moved=known is not None)
     steady = speed is None
     turning = None if speed is None else np.interp(pieces.middle, run.time, run[speed])
@@ -132,24 +132,23 @@ def _channels(found: Housed, placed: Placed, run: Trace) -> dict[str, Channel]:
     return channels
 
 
-def _skinned(stage: Stage, bodies: Sequence[object]) -> tuple[InterfaceBody, sensed.Skin]:
+def _skinned(stage: Stage, bodies: Sequence[Body]) -> tuple[Body, BodySkin]:
     """The reduced housing of a stage and its skin. SoundError where it has none, or no skin."""
     if not stage.housings:
         raise SoundError(f"stage {stage.name} has no housing: name one, or put it under the run with `gearfmu house`")
     body = stage.by_name(bodies)[stage.housings[0].name]
-    assert isinstance(body, InterfaceBody)
     if body.skin is None:
         raise SoundError(f"the housing of {stage.name} has no skin: name its outer surface in [import], skin = …")
     return body, body.skin
 
 
-def _recorded(run: Trace, body: InterfaceBody) -> np.ndarray | None:
+def _recorded(run: Trace, body: Body) -> np.ndarray | None:
     """(T, 6 + n): motion of the housing, where a trace of `house` has it."""
     rigid = [f"{body.name}{MOTION}{own}" for own in MOTIONS]
     modes = [name for i in range(body.modes) if (name := f"{body.name}{MODE}{i + 1}") in run]
     if not all(name in run for name in rigid):
         return None
-    moved, root = [run[name] for name in rigid], math.sqrt(body.mass)
+    moved, root = [run[name] for name in rigid], math.sqrt(body.total_mass)
     return np.stack([*moved, *(root * run[name] for name in modes)], axis=1)
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body import Body
+from gearfmu.body.body import rigid_rows
 from gearfmu.errors import ModelError
 from gearfmu.modes.housed import Housing
 from gearfmu.spec.forms.general import Stage
@@ -28,7 +29,7 @@ class Placed:
     sensors: tuple[str, ...]
 
 
-def placed_housing(stage: Stage, bodies: Sequence[object], names: Sequence[str] | None = None) -> Placed:
+def placed_housing(stage: Stage, bodies: Sequence[Body], names: Sequence[str] | None = None) -> Placed:
     """The housing of `stage`, reduced as one of `bodies`. names: of bearing forces, whose order it takes.
 
     Raises ModelError for a stage without a housing, and for one whose bearings are not those of `names`.
@@ -46,12 +47,11 @@ def placed_housing(stage: Stage, bodies: Sequence[object], names: Sequence[str] 
     held = [s for s in layout.supports if s.second is None and s.first[0] == number]
     feet = {f"{s.name}.{FORCES[d]}": (s.first[1], d) for s in held for d in s.directions}
     body = stage.by_name(bodies)[name]
-    assert isinstance(body, InterfaceBody)
-    sensors = _sensors(() if body.sensors is None else body.sensors.names, len(free.place))
+    sensors = _sensors(() if body.sensors is None else body.sensors.names, len(free.nodes))
     order = tuple(seats if names is None else names)
     loaded = [*(seats[own] for own in order), *feet.values()]
     rows, columns = [*loaded, *sensors.values()], [6 * node + d for node, d in loaded]
-    moved = np.array([np.concatenate([free.rigid_rows(node)[d], free.rows[node, d]]) for node, d in rows])
+    moved = np.array([np.concatenate([rigid_rows(free.nodes[node].point)[d], free.rows[node, d]]) for node, d in rows])
     residual = free.residual[np.ix_([6 * node + d for node, d in rows], columns)]
     s, f = len(order), len(feet)
     springs = np.concatenate([np.diag(own.compliance) for own in held]) if held else np.zeros(0)

@@ -38,20 +38,20 @@ def test_a_housing_stands_beside_the_rotors() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "field", "words"),
     [
-        ('node = "input_left"', 'node = "input_lef"', "supports.input_left.node", "its seats are input_left, input_right"),
+        ('node = "input_left"', 'node = "input_lef"', "supports.input_left.node", "its seats are input_left"),
         ('to = "housing"\nnode = "input_left"', 'to = "housing"', "supports.input_left.node", "no node of housing"),
         (FOOT, '\nbody = "housing"\nnode = "input_left"\n', "supports.foot0.node", "its feet are foot0, foot1"),
         (FOOT, f'{FOOT}at = "10 mm"\n', "supports.foot0.at", "leave it away"),
         (FOOT, f'{FOOT}to = "input_shaft"\n', "supports.foot0.to", "stands on the ground"),
-        ('seats = { input_left', 'seats = { foot0 = "FOOT0", input_left', "bodies.housing.import", "share the name foot0"),
-        ('top = "SENSOR_TOP"', 'a_name_that_is_far_too_long = "SENSOR_TOP"', "bodies.housing.import", "at most|more than 20"),
+        ('seats = { input_left', 'seats = { foot0 = "FOOT0", input_left', "bodies.housing.import", "name foot0"),
+        ('top = "SENSOR_TOP"', 'a_name_that_is_too_long = "SENSOR_TOP"', "bodies.housing.import", "more than 20"),
         ('file = "housing.inp"', 'file = "house.inp"', "bodies.housing.import.file", "no file"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, field: str, words: str) -> None:
     found = problems(tmp_path, (old, new))
     told = next((text for place, text in found.items() if place.startswith(field)), f"only {sorted(found)}")
-    assert any(word in told for word in words.split("|")), told
+    assert words in told, told
 
 
 def test_without_feet_it_is_told_how_to_hang_it_up(tmp_path: Path) -> None:
