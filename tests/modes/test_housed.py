@@ -140,7 +140,7 @@ def test_rings_that_move_together_meet_the_stages_mass_and_no_stiffness(
     omega = 2 * np.pi * np.array([5.0])
     found = rings.dynamic_stiffness(omega)[0]
     assert np.abs(found - found.T).max() < 1e-9 * np.abs(found).max()
-    mass = sum(body.mass for body in stage.by_name(gf.reduce(stage)).values())
+    mass = sum(body.total_mass for body in stage.by_name(gf.reduce(stage)).values())
     for direction in directions:
         along = np.array([float(own.endswith(f".f{direction}")) for own in rings.names])
         assert -(along @ found @ along).real / omega[0] ** 2 == pytest.approx(mass, rel=1e-3)
