@@ -75,14 +75,14 @@ def reading(path: str | os.PathLike[str], kind: Format) -> Iterator[h5py.File]:
         raise kind.error(f"{source}: no sound {kind.noun} file ({error}); {kind.remedy}") from error
 
 
-def format_of(path: str | os.PathLike[str]) -> str:
-    """Name of the format of one of our HDF5 files. Raises GearfmuError for a file that is none, or damaged."""
+def format_of(path: str | os.PathLike[str]) -> tuple[str, int]:
+    """Name and version of the format of one of our HDF5 files. GearfmuError for a file that is none, or damaged."""
     try:
         _check_seal(Path(path), "gearfmu HDF5")
     except GearfmuError as error:
         raise GearfmuError(f"{path}: {error}") from None
     with h5py.File(path, "r") as file:
-        return str(file.attrs["format"])
+        return str(file.attrs["format"]), int(file.attrs["format_version"])
 
 
 def seal(path: str | os.PathLike[str]) -> None:

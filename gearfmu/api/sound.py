@@ -12,7 +12,7 @@ import numpy as np
 from gearfmu.api.models import PathLike, assemble, load, reduce
 from gearfmu.api.results import stage_and_bodies, trace_file
 from gearfmu.api.settings import Quantity, checked
-from gearfmu.body import Body
+from gearfmu.body.body import Body
 from gearfmu.body.body import Skin as BodySkin
 from gearfmu.modes.housed import Housed, housed
 from gearfmu.modes.housing import Placed, placed_housing

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.body import Body, Flank
-from gearfmu.body.layout import FORMAT_VERSION, entries_of, value_of
+from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import load_body
+from gearfmu.hdf5 import format_of
 
 
 def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -20,7 +21,7 @@ def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         "kind": "body",
         "name": body.name,
         "input_hash": body.how.hash,
-        "format_version": FORMAT_VERSION,
+        "format_version": format_of(path)[1],
         "algorithm_version": body.how.algorithm,
         "facts": _facts(body),
         "frf": _error(body),

@@ -94,9 +94,10 @@ def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.stage.run.deformation import FILE as DEFORMATION
     from gearfmu.stage.run.trace import Trace
 
-    if format_of(path) in BODY.names:
+    name, _ = format_of(path)
+    if name in BODY.names:
         return inspect_file(path)
-    if format_of(path) == DEFORMATION.name:
+    if name == DEFORMATION.name:
         return _deformation(path)
     trace = Trace.load(path)
     channels = {

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.body.body import rigid_rows
 from gearfmu.errors import ModelError
 from gearfmu.modes.housed import Housing
 from gearfmu.spec.forms.general import Stage
@@ -51,7 +50,7 @@ def placed_housing(stage: Stage, bodies: Sequence[Body], names: Sequence[str] | 
     order = tuple(seats if names is None else names)
     loaded = [*(seats[own] for own in order), *feet.values()]
     rows, columns = [*loaded, *sensors.values()], [6 * node + d for node, d in loaded]
-    moved = np.array([np.concatenate([rigid_rows(free.nodes[node].point)[d], free.rows[node, d]]) for node, d in rows])
+    moved = np.array([np.concatenate([free.nodes[node].rigid_rows[d], free.rows[node, d]]) for node, d in rows])
     residual = free.residual[np.ix_([6 * node + d for node, d in rows], columns)]
     s, f = len(order), len(feet)
     springs = np.concatenate([np.diag(own.compliance) for own in held]) if held else np.zeros(0)

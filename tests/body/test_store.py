@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies, reduce_body
+from gearfmu.body.body import _FORMER
 from gearfmu.body.layout import ENTRIES, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
@@ -264,3 +265,14 @@ def test_the_layout_is_documented():
     for entry in ENTRIES:
         assert f"`/{entry.path}`" in text
         assert entry.meaning in text
+
+
+def test_former_names_say_what_they_are_now(made):
+    """Every one of them is there, of a gear or of a carrier."""
+    gear, carrier = made[1][0], load_bodies(load_stage("planetary54"))[3]
+    with pytest.raises(AttributeError, match="a body has no 'flank_rows': it is 'flank.rows' now"):
+        _ = gear.flank_rows
+    with pytest.raises(AttributeError, match="a body has no 'nonsense'$"):
+        _ = gear.nonsense
+    for path in _FORMER.values():
+        assert value_of(gear, path) is not None or value_of(carrier, path) is not None or path == "sensors", path

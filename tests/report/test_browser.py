@@ -94,8 +94,8 @@ def displaced(body: Any, loads: list[tuple[int, float, float]]) -> np.ndarray:
         place = np.interp(roll, rolls, np.arange(rolls.size))
         low = min(int(place), rolls.size - 2)
         own = unit[0 if force > 0 else 1, low : low + 2]
-        field = (own[0] + (place - low) * (own[1] - own[0])).reshape(body.teeth, -1, 3)
-        turn = rotated(np.roll(field, tooth, axis=0).reshape(-1, 3), 2 * np.pi * tooth / body.teeth)
+        field = (own[0] + (place - low) * (own[1] - own[0])).reshape(body.flank.teeth, -1, 3)
+        turn = rotated(np.roll(field, tooth, axis=0).reshape(-1, 3), 2 * np.pi * tooth / body.flank.teeth)
         total -= abs(force) * turn
     return total
 

@@ -9,17 +9,17 @@ the other nodes alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfmu.body.body import Body, Node, rigid_rows
+from gearfmu.body.body import Body, Node, Sensors, rigid_rows
 from gearfmu.errors import ModelError
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.supports import SupportSpec
-from gearfmu.stage.build.ground_part import NOISE, GroundPart
+from gearfmu.stage.build.ground_part import GroundPart, ground_part
 from gearfmu.stage.build.groups import Group
 
 AXES = "xyz"
@@ -77,56 +77,40 @@ def _misplaced(stage: Stage, support: SupportSpec, body: Body, seat: Node) -> li
 
 def housing_part(body: Body, found: list[Meeting], dynamic_to: float) -> GroundPart:
     """The GroundPart of a reduced housing: nodes of the supports, then of the sensors. dynamic_to: Hz."""
-    first, at = {}, 0
-    for node in body.nodes:
-        first[node.name] = at
-        at += len(node.components)
-    points = dict(zip(first, body.points, strict=True))
-    arms = np.zeros((6 * len(found), at))
+    names, arms = [node.name for node in body.nodes], np.zeros((6 * len(found), len(body.rows)))
     for k, meeting in enumerate(found):
-        start = first[meeting.node]
-        arms[6 * k : 6 * k + 6, start : start + 6] = rigid_rows(meeting.point - points[meeting.node])
-    dynamic = np.flatnonzero(body.frequency <= dynamic_to)
-    omega = 2 * np.pi * body.frequency[dynamic]
-    rows, residual = arms @ body.rows[:, dynamic], arms @ body.static @ arms.T
-    residual -= (rows / omega**2) @ rows.T
-    places = [meeting.point for meeting in found]
-    if body.sensors is not None:
-        assert body.sensors.static is not None
-        own, felt = body.sensors.rows[:, dynamic], body.sensors.static @ arms.T
-        felt -= (own / omega**2) @ rows.T
-        residual, rows = _with_sensors(residual, felt), np.vstack([rows, _six(own)])
-        places += list(body.sensors.points)
-    scale = np.sqrt(np.abs(np.diag(arms @ body.static @ arms.T)))
-    loaded = slice(0, len(scale))
-    keep = np.abs(residual[loaded, loaded]) > NOISE * np.outer(scale, scale)
-    residual[loaded, loaded] = np.where(keep, 0.5 * (residual[loaded, loaded] + residual[loaded, loaded].T), 0.0)
-    nodes = tuple(Node(f"node{k}", "rigid", COMPONENTS, np.asarray(point, float)) for k, point in enumerate(places))
-    return GroundPart(
-        name=body.name,
-        mass=body.mass,
-        omega=omega,
-        zeta=body.damping_ratio[dynamic],
-        nodes=nodes,
-        rows=rows.reshape(len(nodes), 6, -1),
-        residual=residual,
+        own = names.index(meeting.node)
+        arms[6 * k : 6 * k + 6, 6 * own : 6 * own + 6] = rigid_rows(meeting.point - body.nodes[own].point)
+    n = int(np.searchsorted(body.frequency, dynamic_to, "right"))
+    moved = replace(
+        body,
+        nodes=tuple(Node(meeting.support, "rigid", COMPONENTS, meeting.point) for meeting in found),
+        frequency=body.frequency[:n],
+        damping_ratio=body.damping_ratio[:n],
+        rows=arms @ body.rows[:, :n],
+        static=arms @ body.static @ arms.T,
+        sensors=None,
+        skin=None,
     )
+    part = ground_part(moved)
+    return part if body.sensors is None else _with_sensors(part, body.sensors, arms)
 
 
-def _six(rows: np.ndarray) -> np.ndarray:
-    """Rows (3S, n) of sensors with three empty ones for rotation behind those of each."""
-    count = len(rows) // 3
-    return np.concatenate([rows.reshape(count, 3, -1), np.zeros((count, 3, rows.shape[1]))], axis=1).reshape(
-        6 * count, -1
+def _with_sensors(part: GroundPart, sensors: Sensors, arms: np.ndarray) -> GroundPart:
+    """The part with sensors behind its nodes, without rotation: their residual is that by the nodes alone."""
+    assert sensors.static is not None
+    own, size = sensors.rows[:, : part.omega.size], len(part.residual)
+    felt = sensors.static @ arms.T - (own / part.omega**2) @ part.rows.reshape(size, -1).T
+    moves = (6 * np.arange(len(sensors.names))[:, None] + np.arange(3)).ravel()
+    rows, residual = np.zeros((6 * len(sensors.names), own.shape[1])), np.zeros((6 * len(sensors.names), size))
+    rows[moves], residual[moves] = own, felt
+    seen = zip(sensors.names, sensors.points, strict=True)
+    return replace(
+        part,
+        nodes=(*part.nodes, *(Node(name, "nodes", COMPONENTS, point) for name, point in seen)),
+        rows=np.concatenate([part.rows, rows.reshape(len(sensors.names), 6, own.shape[1])]),
+        residual=np.block([[part.residual, residual.T], [residual, np.zeros((len(rows), len(rows)))]]),
     )
-
-
-def _with_sensors(residual: np.ndarray, felt: np.ndarray) -> np.ndarray:
-    """Residual (6K, 6K) of the loaded nodes, and (3S, 6K) of the sensors by them, in one matrix."""
-    felt, size = _six(felt), len(residual)
-    whole = np.zeros(2 * (size + len(felt),))
-    whole[:size, :size], whole[size:, :size], whole[:size, size:] = residual, felt, felt.T
-    return whole
 
 
 @dataclass(frozen=True)

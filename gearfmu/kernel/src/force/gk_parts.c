@@ -167,6 +167,7 @@ static void section_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[
     p->gap = gap;
     memcpy(p->end, part->end, sizeof p->end);
     p->share = (part->end[1] - part->end[0]) * q->setup->slices / q->e->width;
+    p->moves = part->moves;
 }
 
 int gk_parts_find(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance, gk_place *place)

@@ -12,6 +12,7 @@ typedef struct gk_point { /* of a strip */
     double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
     double share;              /* of a slice's length: that of a part of a line of contact */
     double end[2];             /* of a part: its ends, z (m) */
+    double moves;              /* of a part: its speed along the path of contact over that of a fixed z */
     double opens[GAPS - 1];    /* of a part: what its further gaps are more than the least, `gap`, m (gk_law.c) */
 } gk_point;
 

@@ -149,6 +149,7 @@ static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_wor
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
         GK_LAP(work, PHASE_SYSTEM);
     }
+    if (GK_ON(setup, friction)) gk_glide_ride(model, setup, data, k, work);
     if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_SOLVE);
     data->energy.dissipated += damped;

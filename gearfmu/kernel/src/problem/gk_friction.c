@@ -1,6 +1,7 @@
 /* Friction of the flanks within a step (docs/theory.md, 3.12). Along the profile of gear A every contact has a mean
  * force p̄ against the sliding Δs in the step. Gears that roll on: p̄ = c λ̄,
- *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path.
+ *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path,
+ * and c at the end follows it as that of a spring and a dashpot in series does, to ±µ at most.
  * Gears that stand or swing about rest: an elastic contact with a slider; it sticks, Δs = 0, as long as friction at the
  * end of the step, |p₁| ≤ µ (λ₁ + f_d), can hold it, and p̄ is the mean of both ends. Either way −p̄ Δs ≥ 0. Solved by
  * active sets, together with the normal forces. */
@@ -9,6 +10,7 @@
 static const double FADES = 0.02;  /* of the largest sliding speed: below it friction fades */
 static const double STEADY = 2.0;  /* mean speed over its deviation: above it gears roll */
 static const double RECENT = 1e-3; /* s: of these means */
+static const double ALMOST = 1e-7; /* of a limit */
 enum { PATIENT = 8 };              /* rounds */
 
 /* ---- the start of the step --------------------------------------------------------------------------------------- */
@@ -25,12 +27,10 @@ static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing
         glide->mean[i] = glide->step[i] = glide->last[i] = glide->start[i];
         glide->end[i] = glide->start_end[i];
         glide->ratio[i] = ratio;
-        glide->limit[i] = 0;
+        glide->limit[i] = glide->full[i] = 0;
         glide->others[i] = glide->others_start[i] = 0.0;
     }
 }
-
-static double slid_in_step(const gk_glide *glide, int j) { return glide->slid[j] - glide->lead[j]; }
 
 /* limit at which friction works against a sliding that is more than `creep` */
 static signed char against(double sliding, double creep)
@@ -79,18 +79,17 @@ double gk_friction_local_yield(const gk_system *s, int i)
     return s->law[i / 4].slope_high[i % 4] * s->per_width[i];
 }
 
-/* energy that friction holds in what is quasi-static, with normal forces `force` + `more` */
-static double held(const gk_glide *glide, const gk_system *s, const double *force, const double *more,
-                   const double *friction)
+/* Weight θ of the end of the step in the mean coefficient, c̄ = (1 − θ) c₀ + θ c₁. What a contact yields along the
+ * profile and (8l) are a spring and a dashpot in series: towards a constant sliding c goes as e^(−t/τ), τ = Y µλ/ε,
+ * and θ = 1/(1 − e^(−x)) − 1/x, x = h/τ, holds for that exactly: ½ where it is slow, 1 where it is over in the step.
+ */
+static double weight_of_end(const gk_glide *glide, const gk_system *s, int i)
 {
-    double sum = 0.0;
-    for (int j = 0; j < s->contacts; j++) {
-        double deflection = 0.0;
-        for (int i = 0; i < s->n; i++) deflection += glide->gap_yields[j * s->stride + i] * (force[i] + more[i]);
-        for (int i = 0; i < s->contacts; i++) deflection += 0.5 * glide->yields[j * s->stride + i] * friction[i];
-        sum += friction[j] * deflection;
-    }
-    return sum;
+    static const double SLOW = 1e-2, OVER = 40.0;
+    const double springs = glide->most[i] * s->force0[i] * glide->yields[i * s->stride + i];
+    if (!(s->force0[i] > 0.0) || !(glide->creep[i] < OVER * springs)) return 1.0;
+    const double x = glide->creep[i] / springs;
+    return x < SLOW ? 0.5 + x / 12.0 : 1.0 / (1.0 - gk_exp(-x)) - 1.0 / x;
 }
 
 /* The friction of engagement e in the step k; its problem has been formed */
@@ -112,14 +111,9 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
         const double yields = gk_friction_local_yield(s, i);
         glide->yields[i * s->stride + i] += yields;
         glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
+        glide->by_end[i] = glide->rolls && setup->mesh[e].rides ? weight_of_end(glide, s, i) : 1.0;
     }
-    glide->held0 = held(glide, s, s->force0, s->end0, glide->start_end);
-}
-
-double gk_friction_held(const gk_glide *glide, const gk_system *s)
-{
-    GK_ASSERT(glide && s);
-    return held(glide, s, s->force, s->end, glide->end);
+    glide->held0 = gk_friction_held0(glide, s);
 }
 
 /* ---- the step ---------------------------------------------------------------------------------------------------- */
@@ -160,8 +154,8 @@ static void solve_small(double *a, double *x, int width, int n)
 /* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
  * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
  * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears
- * that roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the
- * last round. */
+ * that roll on coefficients have the mean c̄ = (1 − θ) c₀ + θ c₁. What forces at the end of the step are more than z is
+ * taken from the last round. */
 /* would the mean of both ends push along the sliding? Then there is none. */
 static int turns_round(const gk_glide *glide, int j)
 {
@@ -172,20 +166,24 @@ static void express_limits(gk_glide *glide, const gk_system *s)
 {
     memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
-        const double ratio = glide->limit[j] * glide->most[j], by_z = s->hold[j] ? 0.0 : ratio;
-        const double end = ratio * (s->force[j] + s->end[j]) - by_z * s->z[j];
         const int touches = glide->most_force[j] > 0.0;
-        const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
         glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
+        if (!glide->held[j]) glide->full[j] = 0;
+        const double ratio = glide->limit[j] * glide->most[j], last = ratio + glide->full[j] * glide->most[j];
+        const double present = s->force[j] + s->end[j], by_z = s->hold[j] ? 0.0 : last;
+        const double end = last * present - by_z * s->z[j];
+        const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
+        const int free = glide->held[j] && !glide->full[j];
         glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
         glide->end_by_z[j] = by_z;
         glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
                           : glide->rolls                      ? 0.5 * ratio * s->force0[j]
                                                               : 0.5 * (glide->start_end[j] + end);
-        const double by_mean = glide->rolls ? glide->share[j] : 1.0 / (0.5 + glide->damps[j]);
-        const double by_start = glide->rolls ? 0.0 : (glide->damps[j] - 0.5) * by_mean;
-        glide->end_fixed[j] = glide->held[j] ? by_start * glide->start_end[j] : end;
-        glide->end_by_mean[j] = glide->held[j] ? by_mean : 0.0;
+        const double by_mean = glide->rolls ? glide->share[j] / glide->by_end[j] : 1.0 / (0.5 + glide->damps[j]);
+        const double from_start = glide->rolls ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * present
+                                               : (glide->damps[j] - 0.5) * by_mean * glide->start_end[j];
+        glide->end_fixed[j] = free ? from_start : end;
+        glide->end_by_mean[j] = free ? by_mean : 0.0;
     }
 }
 
@@ -199,7 +197,7 @@ static void express_friction(gk_glide *glide, const gk_system *s)
     for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
         const int i = held[k];
         const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = slid_in_step(glide, i), *a = all_a + k * width, *x = all_x + k * width;
+        double rest = gk_friction_slid(glide, i), *a = all_a + k * width, *x = all_x + k * width;
         for (int r = 0; r < s->n; r++) {
             const double each = moved[r] + yielded[r];
             rest -= each * s->z[r], x[r] = -each;
@@ -264,26 +262,38 @@ static double find_limits(gk_glide *glide, const gk_system *s)
     return largest;
 }
 
+/* Gears that roll, below the limit in the mean: is the coefficient at the end of the step over it, or no longer? */
+static int change_end(gk_glide *glide, int j)
+{
+    if (!glide->rolls || !glide->held[j]) return 0;
+    const double start = glide->ratio[j] / glide->most[j], mean = glide->mean[j] / glide->most_force[j];
+    const double end = start + (mean - start) / glide->by_end[j];
+    if (glide->full[j] ? glide->full[j] * end >= 1.0 : fabs(mean) > 1.0 || !(fabs(end) > 1.0 + ALMOST)) return 0;
+    glide->full[j] = (signed char)(glide->full[j] ? 0 : end > 0.0 ? 1 : -1);
+    return 1;
+}
+
 /* Where friction contradicts its status: beyond its limit, or at a limit along the sliding of the step. All change at
  * once, later the last one only. Returns how many. */
 static int change_status(gk_glide *glide, const gk_system *s, int patient)
 {
-    static const double ALMOST = 1e-7;
     int count = 0;
     for (int j = s->contacts - 1; j >= 0 && (patient || !count); j--) {
         const double most = glide->rolls ? glide->most_force[j] : glide->most_end[j];
         const double p = glide->rolls ? glide->mean[j] : glide->end[j];
         if (!(most > 0.0)) { /* apart at the end: what there was may not push along the sliding */
-            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * slid_in_step(glide, j) > 0.0;
+            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * gk_friction_slid(glide, j) > 0.0;
             if (pushes) glide->limit[j] = glide->start_end[j] > 0.0 ? -1 : 1, count++;
             if (glide->held[j] && fabs(glide->mean[j]) > glide->most_force[j]) /* what would hold it shows the side */
                 glide->limit[j] = glide->mean[j] > 0.0 ? 1 : -1;
             else if (!(glide->most_force[j] > 0.0))
-                glide->limit[j] = against(slid_in_step(glide, j), glide->creep[j]);
+                glide->limit[j] = against(gk_friction_slid(glide, j), glide->creep[j]);
             continue;
         }
-        if (glide->limit[j] ? glide->limit[j] * slid_in_step(glide, j) > -glide->creep[j] * (1.0 - ALMOST)
-                            : fabs(p) > most * (1.0 + ALMOST)) {
+        if (change_end(glide, j)) {
+            count++;
+        } else if (glide->limit[j] ? glide->limit[j] * gk_friction_slid(glide, j) > -glide->creep[j] * (1.0 - ALMOST)
+                                   : fabs(p) > most * (1.0 + ALMOST)) {
             glide->limit[j] = (signed char)(glide->limit[j] ? 0 : p > 0.0 ? 1 : -1);
             count++;
         }
@@ -310,44 +320,6 @@ static void apply(const gk_glide *glide, gk_system *s)
     }
 }
 
-/* What a mean of friction that is not that of both ends leaves of the energy it holds along the profile: taken where it
- * is less than nothing */
-static double faded(const gk_glide *glide, const gk_system *s)
-{
-    double sum = 0.0;
-    for (int j = 0; j < s->contacts; j++) {
-        const double *own = glide->yields + j * s->stride;
-        const double off = 0.5 * (glide->start_end[j] + glide->end[j]) - glide->mean[j];
-        for (int k = 0; k < s->contacts && off != 0.0; k++) sum += off * own[k] * (glide->end[k] - glide->start_end[k]);
-    }
-    return gk_min(sum, 0.0);
-}
-
-/* What the forces of the step leave of the energy that friction holds in what is quasi-static, because they are no
- * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
-static double friction_defect(const gk_glide *glide, const gk_system *s)
-{
-    GK_ASSERT(glide && s);
-    double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
-    for (int j = 0; j < s->contacts; j++) {
-        const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
-        const double moved = glide->end[j] - glide->start_end[j];
-        for (int i = 0; i < s->n; i++)
-            sum -= gap[i] * (gk_solve_static_mean(s, i) * moved +
-                             glide->mean[j] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]));
-        for (int k = 0; k < s->contacts; k++) sum -= glide->mean[k] * own[k] * moved;
-    }
-    return sum;
-}
-
-/* what friction takes in the step; its sliding is known */
-static double friction_taken(const gk_glide *glide, const gk_system *s)
-{
-    double taken = -faded(glide, s);
-    for (int j = 0; j < s->contacts; j++) taken -= glide->mean[j] * slid_in_step(glide, j);
-    return taken;
-}
-
 /* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
  * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
 double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
@@ -363,8 +335,8 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     gk_solve_settle(s);
     gk_solve_contacts(s);
     glide->moved = follow(glide, s);
-    s->rubbing = friction_defect(glide, s);
-    s->rubbed = friction_taken(glide, s);
+    s->rubbing = gk_friction_defect(glide, s);
+    s->rubbed = gk_friction_taken(glide, s);
     if (changed || (!stands && !round)) return 1.0;
     return glide->moved / find_limits(glide, s);
 }
@@ -393,5 +365,5 @@ double gk_friction_settle(gk_glide *glide, const gk_system *s)
         glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;
         glide->last[j] = glide->ratio[j] * s->force[j];
     }
-    return friction_taken(glide, s) - s->unbalanced;
+    return gk_friction_taken(glide, s) - s->unbalanced;
 }

@@ -173,10 +173,44 @@ void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, 
 }
 
 /* What the sliding by the row at the end of the step is ahead of that in the step: contacts move along the line of
- * action, so that rolling gears change their row in the step. speed: of both gears on their carrier */
+ * action, parts of a line at a speed of their own, so that rolling gears change their row in the step. speed: of both
+ * gears on their carrier */
 double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h)
 {
     GK_ASSERT(h > 0.0);
     const double grows = point->slide[PHIA] < 0.0 ? point->gradient[PHIA] : -point->gradient[PHIA];
-    return mesh->cosine > 0.0 ? 0.5 * h * h * grows / mesh->cosine * speed[0] * (speed[0] - speed[1]) : 0.0;
+    const double moves = mesh->rides ? point->moves : 1.0;
+    return mesh->cosine > 0.0 ? 0.5 * h * h * moves * grows / mesh->cosine * speed[0] * (speed[0] - speed[1]) : 0.0;
+}
+
+static const double *start_forces(const gk_system *s) { return s->force0; }
+
+/* Parts of lines of contact ride over the flanks, and with them what modes yield at once: a state contains κ times the
+ * force on the rows of the last step. Their sliding in the step is what they really move, so what rows that ride along
+ * make of it, κ(T₀p₀ + W₀λ₀) less κ(T₁p₀ + W₁λ₀), is taken off with the lead. */
+void gk_glide_ride(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                   gk_work *work)
+{
+    GK_ASSERT(k->h > 0.0);
+    const double *f = gk_ground_seen(data) + 2 * setup->base.n;
+    int ride = 0;
+    for (int e = 0; e < model->engagements; e++) ride |= setup->mesh[e].rides && work->engaged[e].glide->rolls;
+    if (!ride) return;
+    gk_exchange_scatter(model, setup, work, start_forces, start_forces); /* friction of the start is in `last` */
+    for (int i = 0; i < setup->base.n; i++)
+        work->ground_reading[i] = k->ground.kappa[i] * (f[i] - work->ground_next[i]);
+    for (int g = 0; g < model->gears; g++) {
+        const int n = GK_LANES(setup, g);
+        const gk_real *force = gk_modal_seen(setup, data, g) + 2 * n;
+        for (int i = 0; i < n; i++) work->reading[g][i] = k->flow[g].kappa[i] * (force[i] - work->next[g][i]);
+    }
+    for (int e = 0; e < model->engagements; e++) {
+        gk_glide *glide = work->engaged[e].glide;
+        double moved[MAX_STRIDE];
+        if (!setup->mesh[e].rides || !glide->rolls) continue;
+        const gk_rows rows = gk_rows_of_sliding(setup, work, e);
+        gk_exchange_read_ground(&rows, work->ground_reading, moved);
+        for (int w = 0; w < 2; w++) gk_exchange_read_modes(&rows, w, work->reading[setup->mesh[e].side[w].gear], moved);
+        for (int i = 0; i < rows.count; i++) glide->lead[i] -= moved[i];
+    }
 }

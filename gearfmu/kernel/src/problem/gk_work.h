@@ -10,7 +10,17 @@
 
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
 /* phases of a step, for the profile */
-enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
+enum {
+    PHASE_PREDICT,
+    PHASE_FIND,
+    PHASE_ROWS,
+    PHASE_SYSTEM,
+    PHASE_SOLVE,
+    PHASE_PASS,
+    PHASE_CORRECT,
+    PHASE_REMEMBER,
+    PHASES
+};
 typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
     double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
@@ -43,7 +53,9 @@ typedef struct gk_glide {
     double most_force[MAX_STRIDE],              /* times the mean normal force; */
         most_end[MAX_STRIDE];                   /* the one at the end */
     double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
+    double by_end[MAX_STRIDE];                  /* weight of the end of the step in the mean coefficient */
     signed char limit[MAX_STRIDE], held[MAX_STRIDE];    /* ±1: at that limit; 1: below it */
+    signed char full[MAX_STRIDE];                       /* ±1: at the limit at the end alone, where the gears roll */
     int rolls;                                          /* the gears do: friction fades, it does not stick */
     double moved;                                       /* by the last round, N */
     double fixed[MAX_STRIDE], *by_z;                    /* mean friction as a function of z, (contacts, stride) */
@@ -54,8 +66,8 @@ typedef struct gk_glide {
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
     double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
     double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
-    double slid[MAX_STRIDE], lead[MAX_STRIDE]; /* sliding in the step by the rows at its end; what that is ahead of its
-                                                  mean */
+    double slid[MAX_STRIDE], lead[MAX_STRIDE]; /* sliding in the step by the rows at its end; what that is more than by
+                                                  rows that move */
     double damps[MAX_STRIDE];                  /* relaxation time of a contact that sticks over h */
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
@@ -68,9 +80,7 @@ typedef struct gk_forces { /* of an engagement; along: the same along the profil
     double of[PUSHES][MAX_STRIDE], along[2][MAX_STRIDE];
 } gk_forces;
 
-/* halves of LANES that hold n */
 enum { MAX_NEAR = (MAX_GROUND + 4 * MAX_ROTORS) / 8 + 1 };
-static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
 
 typedef struct gk_far_tooth { /* load on a tooth by patterns, and what others move of it */
     gk_real load[LANES], moved[LANES];
@@ -196,11 +206,18 @@ GK_HOT void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_w
 GK_HOT void gk_glide_own(const gk_glide *glide, const gk_system *s, const gk_forces *f, double *gaps, double *along);
 GK_HOT void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e);
 GK_HOT double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h);
+GK_HOT void gk_glide_ride(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                          gk_work *work);
+/* gk_friction_energy.c */
+GK_HOT double gk_friction_held(const gk_glide *glide, const gk_system *s);
+GK_HOT double gk_friction_held0(const gk_glide *glide, const gk_system *s);
+GK_HOT double gk_friction_defect(const gk_glide *glide, const gk_system *s);
+GK_HOT double gk_friction_taken(const gk_glide *glide, const gk_system *s);
+static inline double gk_friction_slid(const gk_glide *glide, int j) { return glide->slid[j] - glide->lead[j]; }
 /* gk_friction.c */
 GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k, gk_work *work, int e);
 GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
-GK_HOT double gk_friction_held(const gk_glide *glide, const gk_system *s);
 GK_HOT double gk_friction_local_yield(const gk_system *s, int i);
 GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
 GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);

@@ -31,8 +31,7 @@ void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const 
 /* gk_supports.c: vectors of the ground oscillators, and of the supports */
 GK_HOT void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved,
                                double *speed);
-GK_HOT void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved,
-                                  const double *speed, double *out);
+GK_HOT gk_supports_function gk_supports_by_motion;
 GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work,
                                    const gk_data *data, double *out);
 GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,

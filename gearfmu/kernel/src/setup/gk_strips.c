@@ -81,6 +81,7 @@ gk_line gk_strips_line(const gk_model *model, const gk_mesh *mesh, double sg, co
         else
             line.end[0] = gk_max(line.end[0], end), line.edge[0] = gk_max(line.edge[0], edge / slope);
     }
+    line.moves[0] = line.end[0] == -half, line.moves[1] = line.end[1] == half;
     const double length = line.end[1] - line.end[0];
     line.missing = gk_max(0.0, 1.0 - length / least);
     if (line.missing == 0.0) return line;
@@ -95,6 +96,8 @@ gk_part gk_strips_part(const gk_setup *setup, const gk_line *line, int strip)
     GK_ASSERT(strip >= 0 && strip < setup->strips);
     const double length = (line->end[1] - line->end[0]) / setup->strips;
     gk_part part;
+    const double at = (strip + 0.5) / setup->strips;
+    part.moves = (1.0 - at) * line->moves[0] + at * line->moves[1];
     for (int i = 0; i < 2; i++) part.end[i] = line->end[0] + (strip + i) * length;
     part.middle = part.flank = 0.5 * (part.end[0] + part.end[1]);
     if (line->edge[0] < line->edge[1]) part.flank = gk_clamp(part.middle, line->edge[0], line->edge[1]);
