@@ -28,15 +28,15 @@ PLANETS = 4
 def rim_velocity(
     ring: Any, step: float, forces: Mapping[str, np.ndarray], angles: Mapping[str, np.ndarray]
 ) -> np.ndarray:
-    """Radial velocity (n,) m/s of the rim on +x. ring: ReducedBody; step: s, between samples; forces (n,) N, drive
+    """Radial velocity (n,) m/s of the rim on +x. ring: its body; step: s, between samples; forces (n,) N, drive
     flanks positive, at the angles (n,) rad, by mesh."""
     flank = 0 if sum(force.mean() for force in forces.values()) >= 0 else 1
-    rows = ring.flank_rows[flank, ring.flank_rows.shape[1] // 2, 0]
-    radial, velocity = ring.rim.patch_rows[0], np.zeros(len(next(iter(forces.values()))))
-    for k in np.flatnonzero((ring.frequency < NYQUIST_PART * 0.5 / step) & (ring.part != 2)).tolist():
-        pair = ring.part[k] == 1
+    rows = ring.flank.rows[flank, ring.flank.rows.shape[1] // 2, 0]
+    radial, velocity = ring.sensors.rows[0], np.zeros(len(next(iter(forces.values()))))
+    for k in np.flatnonzero((ring.frequency < NYQUIST_PART * 0.5 / step) & (ring.flank.part != 2)).tolist():
+        pair = ring.flank.part[k] == 1
         factors = [(rows[k], -rows[k + 1]), (rows[k + 1], rows[k])] if pair else [(rows[k], 0.0)]
-        turned = {mesh: ring.nodal_diameter[k] * angle for mesh, angle in angles.items()}
+        turned = {mesh: ring.flank.diameter[k] * angle for mesh, angle in angles.items()}
         for member, (a, b) in enumerate(factors, k):
             modal = -sum((a * np.cos(t) + b * np.sin(t)) * np.abs(forces[mesh]) for mesh, t in turned.items())
             omega = 2 * np.pi * ring.frequency[k]

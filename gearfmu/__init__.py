@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
+    from gearfmu.api.sound import house, sound_power
     from gearfmu.api.stages import bearings, effects, efficiency, new
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
@@ -57,6 +58,7 @@ __all__ = [
     "efficiency",
     "export",
     "frf",
+    "house",
     "load",
     "load_scene",
     "modes",
@@ -66,6 +68,7 @@ __all__ = [
     "run",
     "run_plan",
     "simulate",
+    "sound_power",
     "sweep",
     "te",
     "validate",
@@ -79,6 +82,7 @@ _HOMES = {
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.settings": ("Settings",),
+    "api.sound": ("house", "sound_power"),
     "api.stages": ("bearings", "effects", "efficiency", "new"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),

@@ -50,6 +50,8 @@ VERBS = {
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),
     "simulate": ("gearfmu.commands.runs:simulate", "Run a stage alone, without FMU and drivetrain."),
+    "house": ("gearfmu.commands.sound:house", "Put a housing under a finished run: sensors, mounts."),
+    "sound": ("gearfmu.commands.sound:sound", "Sound power of a housing: third octaves, dB, dB(A)."),
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "compare": ("gearfmu.commands.runs:compare", "Compare two or more traces in one page."),
     "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),

@@ -28,7 +28,8 @@ _DAMAGE = (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeErro
 @dataclass(frozen=True)
 class Format:
     """A kind of file: `name` and `version` as they stand in it, `noun` for people, the error and the remedy when it
-    cannot be read. form: version of HDF5 whose form it has, by h5py's name, None: the oldest that will do."""
+    cannot be read. form: version of HDF5 whose form it has, by h5py's name, None: the oldest that will do. former:
+    names and versions that are read as well."""
 
     name: str
     version: int
@@ -36,6 +37,12 @@ class Format:
     error: type[GearfmuError]
     remedy: str
     form: str | None = None
+    former: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the formats that are read."""
+        return {self.name, *dict(self.former)}
 
 
 @contextmanager
@@ -68,14 +75,14 @@ def reading(path: str | os.PathLike[str], kind: Format) -> Iterator[h5py.File]:
         raise kind.error(f"{source}: no sound {kind.noun} file ({error}); {kind.remedy}") from error
 
 
-def format_of(path: str | os.PathLike[str]) -> str:
-    """Name of the format of one of our HDF5 files. Raises GearfmuError for a file that is none, or damaged."""
+def format_of(path: str | os.PathLike[str]) -> tuple[str, int]:
+    """Name and version of the format of one of our HDF5 files. GearfmuError for a file that is none, or damaged."""
     try:
         _check_seal(Path(path), "gearfmu HDF5")
     except GearfmuError as error:
         raise GearfmuError(f"{path}: {error}") from None
     with h5py.File(path, "r") as file:
-        return str(file.attrs["format"])
+        return str(file.attrs["format"]), int(file.attrs["format_version"])
 
 
 def seal(path: str | os.PathLike[str]) -> None:
@@ -106,8 +113,9 @@ def _hash_of_rest(file: BinaryIO) -> bytes:
 
 
 def _check_format(file: h5py.File, kind: Format) -> None:
-    if file.attrs.get("format") != kind.name:
+    name, known = file.attrs.get("format"), ((kind.name, kind.version), *kind.former)
+    if name not in kind.names:
         raise kind.error(f"not a {kind.name.replace('-', ' ')}; 'gearfmu inspect' shows its kind")
-    version = int(file.attrs["format_version"])
-    if version != kind.version:
-        raise kind.error(f"{kind.noun} format {version}, this gearfmu reads {kind.version}")
+    version, read = int(file.attrs["format_version"]), sorted({own for of, own in known if of == name})
+    if version not in read:
+        raise kind.error(f"{kind.noun} format {version}, this gearfmu reads {' and '.join(map(str, read))}")

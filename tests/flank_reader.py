@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from gearfmu.stage.build.fields import SIZES
-from gearfmu.stage.build.free import turn_tables
+from gearfmu.stage.build.ground_part import turn_tables
 
 
 def full_tables(sections: Mapping[str, np.ndarray], gear: int, rolls: int, number: int = 0) -> SimpleNamespace:

@@ -29,7 +29,6 @@ MODELS = 24  # opened models, and assembled ones of the same bodies
 def share() -> None:
     """Keep results for the life of this process."""
     bodies.load_body = _read_once(bodies.load_body)
-    bodies.load_interface_body = _read_once(bodies.load_interface_body)
     everywhere(assembly.assemble, _assembled_once(assembly.assemble))
     instance._opened = lru_cache(MODELS)(instance._opened.__wrapped__)
     instance.Kernel.prepare = _prepared_once(instance.Kernel.prepare)

@@ -23,8 +23,10 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
+from gearfmu.body.body import Flank
 from gearfmu.body.parts import kept_offsets, tooth_flank
+from gearfmu.body.toothed import symmetric_mass
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
@@ -81,40 +83,44 @@ def _gear(gear: GearSpec, scale: float) -> GearSpec:
     )
 
 
-def bodies_of(spec: Stage) -> list[ReducedBody]:
+def bodies_of(spec: Stage) -> list[Body]:
     """Bodies of both gears with static tables and a dozen modes of their own, without pictures and gyroscopic terms."""
     stored = load_bodies(load_stage("helical_demo"))
     return [_body(*entry) for entry in zip(stored, spec.written.gears, spec.written.geometry.gears, strict=True)]
 
 
-def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBody:
+def _body(stored: Body, gear: GearSpec, shape: GearGeometry) -> Body:
     flank, points = tooth_flank(shape, gear)
     sector = gear_sector(shape, gear.face_width, gear.body.mesh)
     body = SectorBody(sector, gear.material, flank, points, gear.rigid_bore)
     statics, modes = static_tables(body, []), elastic_modes(body, MODES)
-    return replace(
-        stored,
-        face_width=gear.face_width,
+    own = Flank(
+        teeth=gear.teeth,
+        internal=False,
         r_b=shape.r_b,
         psi_b=shape.psi_b,
-        mass=float(body.inertia[0, 0]),
-        inertia=body.inertia[3:, 3:],
-        frequency=modes.frequency,
-        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
-        nodal_diameter=modes.nodal_diameter,
-        part=modes.part,
-        parity=modes.parity,
-        flank_rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
-        bore_rows=modes.bore_rows,
+        beta_b=shape.beta_b,
+        face_width=gear.face_width,
+        strip_half_width=gear.body.strip_half_width,
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
-        static_ff=kept_offsets(statics.static_ff, whole=False),
-        static_fb=statics.static_fb,
-        static_bb=statics.static_bb,
-        tangent=None,
-        shapes=None,
+        diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
+        static=kept_offsets(statics.static_ff),
+        node=statics.static_fb,
+    )
+    return replace(
+        stored,
+        mass=symmetric_mass(body.inertia),
+        frequency=modes.frequency,
+        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
+        rows=modes.bore_rows,
+        static=statics.static_bb,
+        flank=own,
+        picture=None,
         spin=None,
-        base_helix_angle=shape.beta_b,
     )
 
 

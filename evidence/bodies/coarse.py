@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.api.models import load, reduce
-from gearfmu.body import current_bodies
-from gearfmu.body.reduced import ReducedBody
+from gearfmu.body import Body, current_bodies
 from gearfmu.files import written_whole
 from gearfmu.spec.proposals.coarse import coarse_stage
 from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
@@ -31,13 +30,13 @@ TO = 20e3  # Hz
 PAIR = Wish((31, 73), 2.5e-3, 30e-3, center=141e-3, helix=math.radians(22), torque=180.0)
 
 
-def families(body: ReducedBody) -> list[np.ndarray]:
+def families(body: Body) -> list[np.ndarray]:
     """Frequencies (Hz) below `TO` by nodal diameter, ascending."""
     low = body.frequency < TO
-    return [body.frequency[low & (body.nodal_diameter == nu)] for nu in np.unique(body.nodal_diameter[low])]
+    return [body.frequency[low & (body.flank.diameter == nu)] for nu in np.unique(body.flank.diameter[low])]
 
 
-def frequency_difference(coarse: ReducedBody, own: ReducedBody) -> float:
+def frequency_difference(coarse: Body, own: Body) -> float:
     """Largest relative difference of frequencies that both have below `TO`."""
     found = [
         np.abs(a[: min(len(a), len(b))] / b[: min(len(a), len(b))] - 1).max(initial=0.0)
@@ -46,9 +45,9 @@ def frequency_difference(coarse: ReducedBody, own: ReducedBody) -> float:
     return float(max(found))
 
 
-def own_tooth(body: ReducedBody) -> np.ndarray:
+def own_tooth(body: Body) -> np.ndarray:
     """(2, R) m/N: compliance of either flank under a load uniform across the width, at every roll point."""
-    own = body.static_ff[:, :, 0, :, :, 0, 0]
+    own = body.flank.static[:, :, 0, :, :, 0, 0]
     return np.array([np.diagonal(own[flank, flank]) for flank in (0, 1)])
 
 
@@ -56,17 +55,17 @@ def row(coarse: Any, own: Any) -> dict[str, Any]:
     """Differences of one body, per cent, and costs."""
     facts = {
         "body": own.name,
-        "coarse_cpu_s": coarse.provenance["cpu_s"],
-        "own_cpu_s": own.provenance["cpu_s"],
-        "coarse_GB": coarse.provenance["peak_memory_GB"],
-        "own_GB": own.provenance["peak_memory_GB"],
+        "coarse_cpu_s": coarse.how.provenance["cpu_s"],
+        "own_cpu_s": own.how.provenance["cpu_s"],
+        "coarse_GB": coarse.how.provenance["peak_memory_GB"],
+        "own_GB": own.how.provenance["peak_memory_GB"],
     }
-    if not isinstance(own, ReducedBody):
+    if own.flank is None:
         count = 20
         difference = float(np.abs(coarse.frequency[:count] / own.frequency[:count] - 1).max())
         return facts | {"frequencies_%": 100 * difference}
     first, second = (own_tooth(body) for body in (coarse, own))
-    change, middle = first / second - 1, len(own.roll) // 2
+    change, middle = first / second - 1, len(own.flank.roll) // 2
     return facts | {
         "frequencies_%": 100 * frequency_difference(coarse, own),
         "compliance_%": 100 * float(np.abs(change).max()),

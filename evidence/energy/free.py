@@ -86,7 +86,7 @@ class FreePair:
         """Sections of the model on the bearings of `start`."""
         key = start.bearing, start.bearing_damping
         if key not in self._mounted:
-            gears = tuple(_on_bearing(gear, body.mass, *key) for gear, body in self._pairs())
+            gears = tuple(_on_bearing(gear, body.total_mass, *key) for gear, body in self._pairs())
             model = assemble(rewritten(self.spec, gears=gears), self.bodies)
             self._mounted[key] = dict(read_blob(model.blob))
         return self._mounted[key]

@@ -7,11 +7,12 @@ import re
 from importlib.resources import files
 from typing import NamedTuple
 
-NAMES = {"SHAFT": "P", "ROTOR": "R", "MESH": "M", "SUPPORT": "S", "STAGE": "", "MODE": "G.A"}
+NAMES = {"SHAFT": "P", "ROTOR": "R", "MESH": "M", "SUPPORT": "S", "SENSOR": "sensor.N.ax", "STAGE": "", "MODE": "G.A"}
 LEGEND = (
     "`P` is a port, `R` a rotor (in a pair pinion or wheel), `M` an engagement (`mesh` in a pair; parameters have "
     "`M.` only where there are several). `S` is a direction of a support (`bearing.pinion.fx`; N.m and rad for "
-    "moments), `D` the displacement there (`pinion.gear.x`). `G.A` is an observed gear "
+    "moments), `D` the displacement there (`pinion.gear.x`); feet of a housing are `mount.foot0.fx`. "
+    "`sensor.N.ax` … `az` are points of a housing. `G.A` is an observed gear "
     "(`gearfmu export --observe ring`): `ring.motion.x` … `ring.motion.rz` (m, rad) and `ring.mode_12`"
 )
 WHEN = {
@@ -27,6 +28,7 @@ WHEN = {
     "DEVIATING": "deviations",
     "RUNNING_OUT": "runout",
     "RUBBING": "profile rows",
+    "HOUSED": "housing",
     "OBSERVED": "observed gear",
 }
 FIELDS = re.compile(r'\s*("(?:[^"\\]|\\.)*"|[^,]+?)\s*(?:,|$)')

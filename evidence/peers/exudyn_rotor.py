@@ -28,17 +28,19 @@ from types import SimpleNamespace
 import numpy as np
 import scipy.linalg as sl
 
+from gearfmu.body.body import Node
 from gearfmu.fem import hex20
 from gearfmu.femesh import gear_sector
 from gearfmu.modes.cyclic import unfolded
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
-from gearfmu.stage.build.free import FreeBody
+from gearfmu.stage.build.ground_part import GroundPart
 from gearfmu.stage.build.groups import Layout, Support, mount
-from gearfmu.stage.build.spinning import gear_spinning, turn_rates
+from gearfmu.stage.build.spinning import body_spinning, turn_rates
 from gearfmu.stage.build.whirls import whirl_rows
 
 COARSE = MeshSpec(flank=2, thickness=1, root=2, rim=1, width=2)
@@ -118,9 +120,12 @@ def our_motion(rotor: Rotor, speed: float, times: np.ndarray, known: bool = True
     for i, end in enumerate(rotor.ends):
         rows[i, :3] = rotor.shapes[rotor.low][:, end].mean(axis=1).T
     inertia = rotor.body.inertia
-    free = FreeBody(
-        "rotor", inertia, 2 * np.pi * modes.frequency[rotor.low], np.zeros(rotor.low.size), np.array(places), rows,
-        np.zeros((12, 12)), spinning=gear_spinning(modes, inertia, rotor.low),
+    nodes = tuple(Node(f"end{i}", "averaging", COMPONENTS, np.array([0.0, 0.0, z])) for i, z in enumerate(places))
+    teeth = SimpleNamespace(diameter=modes.nodal_diameter, part=modes.part)
+    turning = SimpleNamespace(exact=None, spin=modes.spin, mass=inertia, frequency=modes.frequency, toothed=teeth)
+    free = GroundPart(
+        "rotor", inertia, 2 * np.pi * modes.frequency[rotor.low], np.zeros(rotor.low.size), nodes, rows,
+        np.zeros((12, 12)), spinning=body_spinning(turning, rotor.low),
     )  # fmt: skip
     spring = np.diag([1 / RADIAL, 1 / RADIAL, 1 / AXIAL])
     springs = [Support(f"end{i}", (0, i), None, (0, 1, 2), spring, np.zeros(3)) for i in (0, 1)]
@@ -137,7 +142,7 @@ def our_motion(rotor: Rotor, speed: float, times: np.ndarray, known: bool = True
     ends = np.stack([[group.node_rows(0, i, d) for d in (0, 1)] for i in (0, 1)])
     omega, turn = 2 * np.pi * modes.frequency[rotor.turning], np.zeros(2 * (rotor.turning.size,))
     first = np.flatnonzero(modes.part[rotor.turning] == 1)
-    turn[first + 1, first] = turn_rates(modes, rotor.turning)[first]
+    turn[first + 1, first] = turn_rates(turning, rotor.turning)[first]
     high = propagate(omega, known * (turn - turn.T), speed, rotor.kick()[rotor.turning], times)
     return np.einsum("edn,tn->ted", ends, low), rotor.seen(high)
 

@@ -13,7 +13,7 @@ from evidence.stability.bench import Bench, at
 from evidence.stability.checks import CLEARANCE, SOFTEST
 from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
@@ -113,7 +113,7 @@ class Pair(Bench):
 
 
 @lru_cache(maxsize=1)
-def _bodies() -> list[ReducedBody]:
+def _bodies() -> list[Body]:
     return load_bodies(load_stage(PLAIN))
 
 

@@ -15,7 +15,7 @@ from evidence.stability.bench import Bench, at
 from evidence.stability.checks import CLEARANCE
 from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
@@ -127,7 +127,7 @@ def set_bodies() -> list[Any]:
 
 
 @lru_cache(maxsize=1)
-def thin_ring() -> tuple[RingSpec, ReducedBody]:
+def thin_ring() -> tuple[RingSpec, Body]:
     """A ring with 3.4 mm of rim instead of 9 behind its teeth, oval at 0.4 kHz where the shipped one is at 1.6, and its
     body: reduced here in a few seconds, on a coarse mesh."""
     spec = load_stage(SET)
@@ -218,7 +218,7 @@ def _in_polar(gamma: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[
 @lru_cache(maxsize=2)
 def _share_of_planet(distance: float) -> float:
     _, planet, _, carrier = set_bodies()
-    own = planet.mass * distance**2
+    own = planet.total_mass * distance**2
     return float(own / (carrier.inertia[2, 2] + PLANETS * own))
 
 

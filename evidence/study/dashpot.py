@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.kernel.linear import LinearModel
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
@@ -42,7 +42,7 @@ def _paths(linear: LinearModel) -> list[float]:
     return found
 
 
-def same_loss(spec: Stage, bodies: Sequence[ReducedBody], others: Sequence[ReducedBody]) -> float:
+def same_loss(spec: Stage, bodies: Sequence[Body], others: Sequence[Body]) -> float:
     """Contact damping (N·s/m²) with which `others`, reductions of the same gears, lose what `bodies` lose with that of
     `spec`: the more modes are stored, the shorter is the path, and the loss goes with c times its square. Taken at half
     of the largest load."""

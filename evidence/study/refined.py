@@ -123,7 +123,7 @@ def _run(scene: SceneSpec, bodies: Sequence[Any], variant: Variant, h: float) ->
 
 def _row(scene: SceneSpec, variant: Variant, own: Run, bodies: Sequence[Any], cost: tuple[float, float]) -> BodyRow:
     run = _run(scene, bodies, variant, cost[0])
-    e, dof = errors(own.signals, run.signals), "/".join(str(body.mesh["dof_sector"]) for body in bodies)
+    e, dof = errors(own.signals, run.signals), "/".join(str(body.how.mesh["dof_sector"]) for body in bodies)
     head = (scene.name, variant.name, dof, run.n_dyn, variant.slices, variant.rolls)
     return BodyRow(*head, e.te, e.te_mean, e.force, e.bearing, cost[1])
 

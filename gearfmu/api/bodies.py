@@ -15,6 +15,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported.housing import imported_housing
 from gearfmu.reduction.judged import Judgement, judged
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
@@ -75,10 +76,14 @@ def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     if body not in names:
         remedy = f"no body '{body}'; the stage has {', '.join(names)}"
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
-    imported = toothed[body].gear.imported if body in toothed else carrier_of(spec).part.imported
+    housings = {housing.name: housing for housing in spec.housings}
+    part = toothed[body].gear if body in toothed else housings[body] if body in housings else carrier_of(spec).part
+    imported = part.imported
     if imported is not None and scale is not None:
         remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
         raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
+    if body in housings:
+        return imported_housing(housings[body]).full
     if body not in toothed:
         return carrier_full_order(carrier_of(spec), **factor)
     if imported is not None:

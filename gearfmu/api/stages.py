@@ -119,6 +119,6 @@ def modes(
     names = spec.files
     if body not in names:
         raise SpecError([Problem(str(spec.source), "body", body, f"the stage has {', '.join(names)}")])
-    if spec.carriers:
+    if spec.carriers or body in {housing.name for housing in spec.housings}:
         return body_modes(spec, body, count)
     return gear_modes(spec, reduce(spec)[names.index(body)], count)

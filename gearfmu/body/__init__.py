@@ -12,14 +12,12 @@ from gearfmu.body.bodies import (
     reduce_bodies,
     reduce_body,
 )
+from gearfmu.body.body import Body
 from gearfmu.body.inspect import inspect_file
-from gearfmu.body.interface_body import InterfaceBody, load_interface_body
-from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body
 
 __all__ = [
-    "InterfaceBody",
-    "ReducedBody",
+    "Body",
     "body_hashes",
     "body_needs",
     "body_path",
@@ -27,7 +25,6 @@ __all__ = [
     "inspect_file",
     "load_bodies",
     "load_body",
-    "load_interface_body",
     "reduce_apart",
     "reduce_bodies",
     "reduce_body",

@@ -13,11 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sl
+
+from gearfmu.body.body import Body, Exact, How, Node
+from gearfmu.reduction.full_order import COMPONENTS
 
 FINEST = 1e-9  # m: nodes nearer than that are one
 ORDER = 4
@@ -95,24 +98,13 @@ class Shaft:
         return np.append(np.concatenate(parts), steps[-1])
 
 
-@dataclass(frozen=True)
-class BeamBody:
-    """A free shaft, reduced. centre: z of its centre of mass, the origin of mass and place; mass (6, 6) of the rigid
-    motion; omega (n,) rad/s, ascending; place (K,) m; rows (K, 6, n), kg^-½ and kg^-½/m, of the interfaces in the
-    modes; residual (6K, 6K): C_static beyond them, mean-axis gauge; gyroscopic (6 + n, 6 + n), kg·m² …, skew: ∫ρI of
-    (θ_a × θ_b)_z, θ the tilts of sections in unit rigid motion and unit modes."""
+def reduce_shaft(
+    shaft: Shaft, cut: float, longest: float | None = None, name: str = "shaft", damping_ratio: float = 0.0
+) -> Body:
+    """The free shaft with its modes below `cut` (Hz), all with one damping ratio; its origin is its centre of mass.
 
-    centre: float
-    mass: np.ndarray
-    omega: np.ndarray
-    place: np.ndarray
-    rows: np.ndarray
-    residual: np.ndarray
-    gyroscopic: np.ndarray
-
-
-def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> BeamBody:
-    """The free shaft with its modes below `cut` (Hz). longest: element, m; the 12th part of the length when None."""
+    longest: element, m; the 12th part of the length when None. Nothing is stored: a beam is made in milliseconds.
+    """
     ends = shaft.ends(longest or shaft.length / ELEMENTS)
     at = np.array([ORDER * int(np.abs(ends - place).argmin()) for place in shaft.places])
     bending = _solve(*bending_matrices(shaft, ends), rigid=2)
@@ -122,7 +114,7 @@ def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> Beam
         (torsion, {TURNING: (0, 1.0)}),
         (extension, {ALONG: (0, 1.0)}),
     ]
-    omega, rows, residual = [], [], np.zeros((6 * len(at), 6 * len(at)))
+    found, rows, residual = [], [], np.zeros((6 * len(at), 6 * len(at)))
     tilts = [np.zeros((2, bending[1].shape[0] // 2, 6))]  # about x and y, of all nodes
     tilts[0][[0, 1], :, [3, 4]] = 1.0
     for (frequency, shapes), directions in motions:
@@ -137,20 +129,25 @@ def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> Beam
         tilts.append(tilt)
         rest = (own[..., ~stored] / frequency[~stored]).reshape(6 * len(at), -1)
         residual += rest @ rest.T
-        omega.append(frequency[stored])
+        found.append(frequency[stored])
         rows.append(own[..., stored])
-    order = np.argsort(np.concatenate(omega), kind="stable")
+    omega = np.concatenate(found)
+    order = np.argsort(omega, kind="stable")
     centre, mass = rigid_mass(shaft)
     about_x, about_y = np.concatenate([tilts[0], np.concatenate(tilts[1:], axis=2)[..., order]], axis=2)
     turning = about_x.T @ rotary_matrix(shaft, ends) @ about_y
-    return BeamBody(
-        centre=centre,
+    modes, omega = np.concatenate(rows, axis=2)[..., order].reshape(6 * len(at), -1), omega[order]
+    points = [np.array([0.0, 0.0, place]) for place in np.asarray(shaft.places) - centre]
+    return Body(
+        name=name,
+        how=How("0" * 64, "beam", asdict(shaft.material)),
         mass=mass,
-        omega=np.concatenate(omega)[order],
-        place=np.asarray(shaft.places) - centre,
-        rows=np.concatenate(rows, axis=2)[..., order],
-        residual=residual,
-        gyroscopic=turning - turning.T,
+        frequency=omega / (2 * math.pi),
+        damping_ratio=np.full(omega.size, damping_ratio),
+        nodes=tuple(Node(f"node{k}", "section", COMPONENTS, point) for k, point in enumerate(points)),
+        rows=modes,
+        static=residual + (modes / omega) @ (modes / omega).T,
+        exact=Exact(omega, residual, turning - turning.T),
     )
 
 

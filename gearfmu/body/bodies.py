@@ -6,15 +6,15 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
-from gearfmu.body.carrier import reduced_carrier
-from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
+from gearfmu.body.body import Body
+from gearfmu.body.housing import reduced_housing
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
+from gearfmu.body.whole import reduced_carrier
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
@@ -23,7 +23,6 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import carrier_of, members
 from gearfmu.spec.reading.library import model_folder
 
-Body: TypeAlias = ReducedBody | InterfaceBody
 Folder: TypeAlias = "str | os.PathLike[str] | None"
 Progress = Callable[[str, float], None]
 
@@ -43,7 +42,7 @@ def body_path(stage: Stage, name: str, folder: Folder = None) -> Path:
     return (Path(folder) if folder is not None else model_folder(stage)) / f"{name}.h5"
 
 
-def load_bodies(stage: Stage, folder: Folder = None) -> Any:
+def load_bodies(stage: Stage, folder: Folder = None) -> list[Body]:
     """The stored bodies: gears in the order of the stage, then the carrier of a set. BodyError when one is missing,
     damaged or stale."""
     return [_load_current(stage, name, folder) for name in stage.files]
@@ -95,22 +94,21 @@ def reduce_apart(
 
 def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = None) -> None:
     """Reduce one body and store it at `path`. Raises MeshError and BodyError."""
-    body = reduce_body(stage, name, progress)
-    if isinstance(body, InterfaceBody):
-        save_interface_body(body, path)
-    else:
-        save_body(body, path)
+    save_body(reduce_body(stage, name, progress), path)
 
 
 def reduce_body(stage: Stage, name: str, progress: Progress | None = None) -> Body:
     """One body from the numbers of its stage. Raises MeshError with the place of the body in the stage file."""
     toothed, wanted = members(stage), expected_hash(stage, name)
+    housings = {housing.name: housing for housing in stage.housings}
     try:
         if name in toothed:
             return reduced_gear(toothed[name], wanted, progress)
+        if name in housings:
+            return reduced_housing(housings[name], wanted, progress)
         return reduced_carrier(carrier_of(stage), wanted, progress)
     except MeshError as error:
-        place = toothed[name].place if name in toothed else name
+        place = toothed[name].place if name in toothed else stage.table_of(name)
         raise MeshError(f"{stage.source}: {place}: {error}") from error
 
 
@@ -139,7 +137,7 @@ def _current(stage: Stage, name: str, folder: Folder) -> Body | None:
 def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
     """The stored body. Raises BodyError when it is missing, damaged or stale."""
     path = body_path(stage, name, folder)
-    body: Body = load_body(path) if name in members(stage) else load_interface_body(path)
+    body = load_body(path)
     _refuse_stale(path, body, expected_hash(stage, name), stage.source)
     return body
 
@@ -147,10 +145,10 @@ def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
 def _refuse_stale(path: Path, body: Body, wanted_hash: str, source: Path) -> None:
     """BodyError when the body of this file has another fingerprint than the stage file asks for: it says whether the
     program or the numbers are others."""
-    if body.input_hash == wanted_hash:
+    if body.how.hash == wanted_hash:
         return
-    if body.algorithm_version != ALGORITHM_VERSION:
-        why = f"made by version {body.algorithm_version} of the reduction, this program has version {ALGORITHM_VERSION}"
+    if body.how.algorithm != ALGORITHM_VERSION:
+        why = f"made by version {body.how.algorithm} of the reduction, this program has version {ALGORITHM_VERSION}"
     else:
         why = f"made from other numbers than {source} asks for now"
     raise BodyError(f"{path}: stale: {why}; make it again with 'gearfmu reduce STAGE'")

@@ -11,9 +11,8 @@ from gearfmu.body.parts import (
     DRAWN,
     Parts,
     pictured_loads,
-    rim_of,
-    sector_display,
-    sector_shapes,
+    rim_sensor,
+    sector_picture,
     tooth_flank,
 )
 from gearfmu.errors import BodyError, MeshError
@@ -24,7 +23,7 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import Progress, elastic_modes
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
-from gearfmu.reduction.display import Display, outline, whole_surface
+from gearfmu.reduction.display import Picture, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier
@@ -133,9 +132,8 @@ def _by_sector(found: ImportedGear, member: Member, case: FrfCase, drawing: tupl
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
-    rim = rim_of(body, modes, statics, member.mounts)
-    display, shapes = sector_display(surface, body, statics), sector_shapes(surface, modes)
-    return Parts(modes, statics, frf, found.facts, display, body.inertia, rim, shapes)
+    picture = sector_picture(surface, body, modes, statics)
+    return Parts(modes, statics, frf, found.facts, picture, body.inertia, rim_sensor(body, modes))
 
 
 def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
@@ -149,10 +147,10 @@ def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tupl
     report("frequency response", 0.0)
     frf = mean_frf(gear, space, modes, statics, case)
     facts = found.facts | {"teeth_deviation": deviation, "compliance_left_to_residual": left}
-    return Parts(modes, statics, frf, facts, _whole_display(drawn, found, statics), gear.inertia)
+    return Parts(modes, statics, frf, facts, _whole_picture(drawn, found, statics), gear.inertia)
 
 
-def _whole_display(drawn: Any, found: ImportedGear, statics: Statics) -> Display:
+def _whole_picture(drawn: Any, found: ImportedGear, statics: Statics) -> Picture:
     """Pictures on the drawn surface: every point moves like the nearest node of the whole mesh."""
     gear = found.body
     assert isinstance(gear, WholeGear)
@@ -164,4 +162,4 @@ def _whole_display(drawn: Any, found: ImportedGear, statics: Statics) -> Display
     pictured = pictured_loads(gear.points)
     loads = np.array([picture[dofs] for picture in statics.pictures], "f4")
     rolls = gear.points.rolls[[load // gear.points.functions for load in pictured]]
-    return Display(points.astype("f4"), quads, loads, rolls)
+    return Picture(points.astype("f4"), quads, loads, rolls)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from gearfmu.body.layout import Entry
+from gearfmu.errors import BodyError
 
 SMALL = 16  # numbers: not worth compressing
 FILTERS = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
@@ -33,10 +34,13 @@ def write_entry(file: h5py.File, entry: Entry, value: np.ndarray) -> None:
         dataset.attrs[STEP] = step
 
 
-def read_entry(dataset: h5py.Dataset, entry: Entry) -> np.ndarray:
-    """The numbers of an entry from its dataset."""
-    value = dataset[()]
-    return unpacked(value, dataset.attrs[STEP], entry) if entry.bits else value
+def read_entry(file: h5py.File, entry: Entry, path: str | None = None) -> Any:
+    """The numbers of an entry from its dataset, or from the one at `path`. Raises BodyError where it is missing."""
+    dataset = file.get(path or entry.path)
+    if not isinstance(dataset, h5py.Dataset):
+        raise BodyError(f"dataset {path or entry.path} is missing")
+    value = unpacked(dataset[()], dataset.attrs[STEP], entry) if entry.bits else dataset[()]
+    return value.item() if not entry.shape and np.ndim(value) == 0 else np.ascontiguousarray(value)
 
 
 def packed(value: np.ndarray, entry: Entry) -> tuple[np.ndarray, Any]:

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import scipy
 
-from gearfmu.body.reduced import Rim, Tangent
+from gearfmu.body.body import Sensors, Tangent
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
-from gearfmu.reduction.display import Display, Outline, Shapes, unfold_sectors, whole_surface
+from gearfmu.reduction.display import Outline, Picture, Shapes, unfold_sectors, whole_surface
 from gearfmu.spec.tables.gear import MeshSpec
 
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
@@ -31,16 +31,15 @@ _OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
 @dataclass(frozen=True)
 class Parts:
     """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures,
-    mass matrix (6, 6) of the rigid body, of a ring what its mounts need, and the surface in all modes."""
+    mass matrix (6, 6) of the rigid body, of a ring the sensor on its rim."""
 
     modes: Modes
     statics: Statics
-    frf: FrfError
+    error: FrfError
     facts: dict[str, Any]
-    display: Display
+    picture: Picture
     inertia: np.ndarray
-    rim: Rim | None = None
-    shapes: Shapes | None = None
+    sensors: Sensors | None = None
 
 
 def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[ToothFlank, Points]:
@@ -66,10 +65,9 @@ def drawn_counts(geometry: Any, face_width: float) -> MeshSpec:
     return DRAWN.model_copy(update={"width": layers})
 
 
-def kept_offsets(static_ff: np.ndarray, whole: bool) -> np.ndarray:
-    """Of the table (2, 2, z, …) of all tooth offsets those that the kernel reads (2, 2, 7, …). whole: all are
-    needed."""
-    if whole or static_ff.shape[2] <= 2 * _OFFSETS + 1:
+def kept_offsets(static_ff: np.ndarray) -> np.ndarray:
+    """Of the table (2, 2, z, …) of all tooth offsets those that the kernel reads (2, 2, 7, …)."""
+    if static_ff.shape[2] <= 2 * _OFFSETS + 1:
         return static_ff
     return np.concatenate([static_ff[:, :, : _OFFSETS + 1], static_ff[:, :, -_OFFSETS:]], axis=2)
 
@@ -82,19 +80,9 @@ def tangent_of(modes: Modes, statics: Statics, points: Points) -> Tangent | None
     return Tangent(rows, statics.static_nt, statics.static_tt)
 
 
-def rim_of(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:
-    """What a ring's mounts (MountsSpec or None) need; None of an external gear."""
-    if not body.internal:
-        return None
-    return Rim(
-        patch_point=body.patch_point,
-        patch_rows=modes.patch_rows,
-        flank_rigid=body.rigid_rows().reshape(2, len(body.points.rolls), body.points.functions, 6),
-        static_fp=np.ascontiguousarray(statics.static_fp),
-        static_pp=np.ascontiguousarray(statics.static_pp),
-        mounts=mounts.points if mounts else 0,
-        mount_stiffness=mounts.stiffness if mounts else 0.0,
-    )
+def rim_sensor(body: SectorBody, modes: Modes) -> Sensors | None:
+    """The patch of a ring's rim in sector 0; None of an external gear."""
+    return Sensors(("rim",), body.patch_point[None], modes.patch_rows) if body.internal else None
 
 
 def pictured_loads(points: Points) -> list[int]:
@@ -111,16 +99,17 @@ def sector_shapes(sector: Outline, modes: Modes) -> Shapes | None:
     return Shapes(sector.points.astype("f4"), sector.quads, sector.ahead.astype(int), modes.surface.astype("f4"))
 
 
-def sector_display(sector: Outline, body: SectorBody, statics: Statics) -> Display:
+def sector_picture(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Picture:
     """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
     pictured = pictured_loads(body.points)
     points, quads = whole_surface(sector, body.teeth)
     loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
-    return Display(
+    return Picture(
         points.astype("f4"),
         quads,
         np.array(loads, "f4"),
         body.points.rolls[[load // body.points.functions for load in pictured]],
+        sector_shapes(sector, modes),
     )
 
 

@@ -13,9 +13,11 @@ from gearfmu.spec.forms.members import carrier_of, members
 def body_sector(stage: Stage, name: str, scale: float = 1.0) -> FeMesh:
     """One sector of the body `name` of a stage. scale : factor on all element counts, but for an imported gear's.
 
-    BodyError for an imported carrier and for imported gears without a sector of hexahedra.
+    BodyError for a housing, an imported carrier and for imported gears without a sector of hexahedra.
     """
     toothed = members(stage)
+    if name in {housing.name for housing in stage.housings}:
+        raise BodyError(f"{stage.source}: {name}: a housing has no sector that repeats: look at it in your own program")
     if name not in toothed:
         carrier = carrier_of(stage)
         if carrier.part.imported is None:

@@ -1,93 +1,117 @@
-"""The HDF5 file of a reduced body (docs/file-formats.md)."""
+"""The HDF5 file of a body (docs/file-formats.md)."""
 
 from __future__ import annotations
 
 import json
 import os
-from dataclasses import fields
+from collections.abc import Mapping
 from typing import Any
 
-import h5py
 import numpy as np
 
-from gearfmu.body.layout import FORMAT, FORMAT_VERSION, GROUPS, TEXTS, Entry, entries_of
+from gearfmu.body.body import Body, Flank, How, Node, Sensors, Skin, Tangent
+from gearfmu.body.former import FORMATS, former_values
+from gearfmu.body.layout import BODY, FORMAT, FORMAT_VERSION, GROUPS, TEXTS, entries_of, value_of
 from gearfmu.body.packing import read_entry, write_entry
-from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
-from gearfmu.reduction.display import Display, Shapes, whole_surface
+from gearfmu.reduction.display import Picture, Shapes, whole_surface
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
-FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM)
+FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM, FORMATS)
+PARTS = {  # classes by their path in a body, inner ones first
+    "flank.tangent": Tangent,
+    "picture.shapes": Shapes,
+    "error": FrfError,
+    "flank": Flank,
+    "spin": Spin,
+    "picture": Picture,
+    "sensors": Sensors,
+    "skin": Skin,
+}
 
 
-def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
-    """Write a body under a temporary name, then rename it to `path`."""
+def save_body(body: Body, path: str | os.PathLike[str]) -> None:
+    """Write a body under a temporary name, then rename it to `path`. A beam is made anew and has no file."""
+    assert body.exact is None, "a beam has no file"
     with writing(path, FILE) as file:
-        file.attrs["algorithm_version"] = body.algorithm_version
-        file.attrs["name"] = body.name
-        file.attrs["input_hash"] = body.input_hash
-        for text in TEXTS:
-            file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
-        for entry in entries_of(body.groups):
+        file.attrs["name"], file.attrs["input_hash"] = body.name, body.how.hash
+        file.attrs["algorithm_version"] = body.how.algorithm
+        for name, text in _texts(body).items():
+            file.attrs[name] = json.dumps(text, sort_keys=True)
+        for entry in entries_of(body):
             value = np.asarray(value_of(body, entry.field), dtype=entry.kind)
-            if entry.field == "static_ff":
+            if entry.field == "flank.static":
                 value = value[:, :, : value.shape[2] // 2 + 1]
             write_entry(file, entry, value)
 
 
-def load_body(path: str | os.PathLike[str]) -> ReducedBody:
-    """Read and check a body file. Raises BodyError: missing, damaged, of another kind or version, or not sound."""
+def load_body(path: str | os.PathLike[str]) -> Body:
+    """Read and check a body file of this version or a former one. Raises BodyError: missing, damaged, of another kind
+    or version, or not sound."""
     with reading(path, FILE) as file:
-        values = {entry.field: _read(file, entry) for entry in entries_of([name for name in GROUPS if name in file])}
-        heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
-        texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
-        versions = {name: int(file.attrs[name]) for name in ("format_version", "algorithm_version")}
-        return _body(values, {**heads, **texts, **versions})
+        if int(file.attrs["format_version"]) == FORMAT_VERSION:
+            there = [*BODY, *(entry for group in GROUPS if group[0].path in file for entry in group)]
+            values = {entry.field: read_entry(file, entry) for entry in there}
+            texts = {name: json.loads(file.attrs[name]) for name in TEXTS if name in file.attrs}
+        else:
+            values, texts = former_values(file)
+        how = {name: texts.pop(name) for name in ("method", "material", "mesh", "provenance")}
+        version = int(file.attrs.get("algorithm_version", 1))  # the first carriers do not say it
+        made = How(str(file.attrs["input_hash"]), **how, algorithm=version)
+        return _body(str(file.attrs["name"]), made, values, texts)
 
 
-def _read(file: h5py.File, entry: Entry) -> Any:
-    if not isinstance(file.get(entry.path), h5py.Dataset):
-        raise BodyError(f"dataset {entry.path} is missing")
-    value = read_entry(file[entry.path], entry)
-    if not entry.shape and np.ndim(value) == 0:
-        return value.item()
-    return np.ascontiguousarray(value)
+def _texts(body: Body) -> dict[str, Any]:
+    how, error = body.how, body.error
+    nodes = [
+        {"name": n.name, "kind": n.kind, "components": list(n.components)} | ({"span": list(n.span)} if n.span else {})
+        for n in body.nodes
+    ]
+    names = {"sensors": list(body.sensors.names)} if body.sensors is not None else {}
+    return {
+        "nodes": nodes,
+        "ground": list(error.ground) if error is not None else [],
+        "method": how.method,
+        "material": how.material,
+        "mesh": how.mesh,
+        "provenance": how.provenance,
+    } | names
+
+
+def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any]) -> Body:
+    """The body of numbers by their fields; texts: nodes, sensors, ground."""
+    points = values.pop("points")
+    nodes = [Node(point=point, **_node(text)) for text, point in zip(texts["nodes"], points, strict=True)]
+    if "flank.static" in values:
+        values["flank.static"] = _all_offsets(values["flank.static"], values["flank.teeth"])
+        values["flank.internal"] = bool(values["flank.internal"])
+    if "picture.shapes.points" in values:
+        shapes = Shapes(*(values[f"picture.shapes.{name}"] for name in ("points", "quads", "ahead", "modes")))
+        surface, quads = whole_surface(shapes, values["flank.teeth"])
+        values |= {"picture.points": surface.astype("f4"), "picture.quads": quads}
+    extra = {"sensors.names": tuple(texts.get("sensors", ())), "error.ground": tuple(texts.get("ground", ()))}
+    values |= {field: text for field, text in extra.items() if any(f.startswith(field.split(".")[0]) for f in values)}
+    for part, kind in PARTS.items():
+        own = [field for field in values if field.rpartition(".")[0] == part]
+        if own:
+            values[part] = kind(**{field.rpartition(".")[2]: values.pop(field) for field in own})
+    return Body(name=name, how=how, nodes=tuple(nodes), **values)
+
+
+def _node(text: Mapping[str, Any]) -> dict[str, Any]:
+    lists = {name: tuple(text[name]) for name in ("components", "span") if name in text}
+    return {"name": str(text["name"]), "kind": str(text["kind"])} | lists
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
     """Compliance for every tooth offset from that of 0 … z/2, or for −K … K from 0 … K: C[f, g, m, i, j, a, b] =
     C[g, f, −m, j, i, b, a] (reciprocity)."""
     if half.ndim != 7 or not 0 < half.shape[2] <= teeth // 2 + 1:
-        raise BodyError(f"static/c_ff has shape {half.shape}, expected offsets 0 … {teeth // 2} in its third place")
+        raise BodyError(f"flank/static has shape {half.shape}, expected offsets 0 … {teeth // 2} in its third place")
     single = half.shape[2] == teeth // 2 + 1 and teeth % 2 == 0  # the offset z/2 is its own mirror image
     mirrored = half[:, :, 1 : half.shape[2] - single].transpose(1, 0, 2, 4, 3, 6, 5)
     return np.concatenate([half, mirrored[:, :, ::-1]], axis=2)
-
-
-def _whole_surface(values: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Surface of all sectors from that of sector 0."""
-    sector = Shapes(**{f.name: values[f"shapes.{f.name}"] for f in fields(Shapes)})
-    points, quads = whole_surface(sector, values["teeth"])
-    return {"display.points": points.astype("f4"), "display.quads": quads}
-
-
-def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
-    values["static_ff"] = _all_offsets(values["static_ff"], values["teeth"])
-    if "shapes.points" in values:
-        values |= _whole_surface(values)
-    parts: dict[str, Any] = {}
-    for group, kind in (
-        ("frf", FrfError),
-        ("display", Display),
-        ("rim", Rim),
-        ("tangent", Tangent),
-        ("shapes", Shapes),
-        ("spin", Spin),
-    ):
-        if any(name.startswith(f"{group}.") for name in values):
-            parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})
-    return ReducedBody(**values, **parts, **heads)

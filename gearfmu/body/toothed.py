@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gearfmu.body.apart import Work
+from gearfmu.body.body import Body, Flank, How, Node
+from gearfmu.body.former import GEAR_METHOD
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.parts import (
     Parts,
@@ -16,13 +19,11 @@ from gearfmu.body.parts import (
     kept_offsets,
     pictured_loads,
     provenance,
-    rim_of,
-    sector_display,
-    sector_shapes,
+    rim_sensor,
+    sector_picture,
     tangent_of,
     tooth_flank,
 )
-from gearfmu.body.reduced import ReducedBody
 from gearfmu.femesh import mesh_report, sector_mesh
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
@@ -31,10 +32,12 @@ from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.display import outline
+from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.spec.forms.general import ToothedBody
 from gearfmu.spec.forms.members import Member
 
+ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 Progress = Callable[[str, float], None]
 
@@ -47,7 +50,7 @@ def gear_work(member: Member) -> Work | None:
     return Work(gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
 
 
-def reduced_gear(member: Member, input_hash: str, progress: Progress | None = None) -> ReducedBody:
+def reduced_gear(member: Member, input_hash: str, progress: Progress | None = None) -> Body:
     """The reduced body of an external or internal gear, by cyclic symmetry. Raises MeshError."""
     gear, geometry = member.gear, member.geometry
     report = _named(progress, gear.name)
@@ -58,39 +61,51 @@ def reduced_gear(member: Member, input_hash: str, progress: Progress | None = No
         made = imported_parts(member, FRF_CUT, report)
     else:
         made = _made_here(member, (flank, points), report)
-    modes, statics = made.modes, made.statics
-    return ReducedBody(
+    node = Node("rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging", COMPONENTS, ORIGIN)
+    spent = provenance(time.process_time() - started)
+    return Body(
         name=gear.name,
-        input_hash=input_hash,
-        material=gear.material.model_dump(),
-        mesh=made.facts,
-        provenance=provenance(time.process_time() - started),
-        teeth=geometry.z,
-        r_b=geometry.r_b,
-        psi_b=geometry.psi_b,
-        face_width=gear.face_width,
-        mass=float(made.inertia[0, 0]),
-        inertia=made.inertia[3:, 3:],
-        frequency=modes.frequency,
-        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
-        nodal_diameter=modes.nodal_diameter,
-        part=modes.part,
-        parity=modes.parity,
-        flank_rows=_by_point(modes.flank_rows, points),
-        bore_rows=modes.bore_rows,
+        how=How(input_hash, GEAR_METHOD, gear.material.model_dump(), made.facts, spent),
+        mass=symmetric_mass(made.inertia),
+        frequency=made.modes.frequency,
+        damping_ratio=np.full(len(made.modes.frequency), gear.modal_damping),
+        nodes=(node,),
+        rows=made.modes.bore_rows,
+        static=made.statics.static_bb,
+        error=replace(made.error, ground=(node.name,)),
+        flank=_flank(geometry.z, made, flank, points),
+        spin=made.modes.spin,
+        picture=made.picture,
+        sensors=made.sensors,
+    )
+
+
+def symmetric_mass(inertia: np.ndarray) -> np.ndarray:
+    """Mass matrix (6, 6) of a body of equal sectors about its middle: mass and inertia alone."""
+    mass = np.zeros((6, 6))
+    mass[:3, :3], mass[3:, 3:] = inertia[0, 0] * np.eye(3), inertia[3:, 3:]
+    return mass
+
+
+def _flank(teeth: int, made: Parts, flank: ToothFlank, points: Points) -> Flank:
+    modes, statics = made.modes, made.statics
+    return Flank(
+        teeth=teeth,
+        internal=flank.internal,
+        r_b=flank.r_b,
+        psi_b=flank.psi_b,
+        beta_b=flank.base_helix_angle,
+        face_width=flank.face_width,
+        strip_half_width=flank.strip_half_width,
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
-        strip_half_width=gear.body.strip_half_width,
-        static_ff=kept_offsets(statics.static_ff, whole=member.mounts is not None and not geometry.beta),
-        static_fb=statics.static_fb,
-        static_bb=statics.static_bb,
-        frf=made.frf,
-        display=made.display,
-        rim=made.rim,
+        diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
+        static=kept_offsets(statics.static_ff),
+        node=statics.static_fb,
         tangent=tangent_of(modes, statics, points),
-        shapes=made.shapes,
-        spin=modes.spin,
-        base_helix_angle=geometry.beta_b,
     )
 
 
@@ -108,10 +123,8 @@ def _made_here(member: Member, load_points: tuple[ToothFlank, Points], report: P
     statics = static_tables(body, pictured_loads(points), _within(report, 0.6, 0.8))
     case = FrfCase(gear.modal_damping, FRF_CUT, geometry.r)
     frf = frf_error(body, modes, statics, case, _within(report, 0.8, 1.0))
-    display = sector_display(surface, body, statics)
-    rim = rim_of(body, modes, statics, member.mounts)
-    shapes = sector_shapes(surface, modes)
-    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)
+    picture, facts = sector_picture(surface, body, modes, statics), _mesh_facts(body, gear)
+    return Parts(modes, statics, frf, facts, picture, body.inertia, rim_sensor(body, modes))
 
 
 def _named(progress: Progress | None, name: str) -> Progress:
@@ -121,10 +134,6 @@ def _named(progress: Progress | None, name: str) -> Progress:
 def _within(report: Progress, first: float, last: float) -> Progress:
     """Progress of a part of the work as progress of the whole."""
     return lambda what, share: report(what, first + (last - first) * share)
-
-
-def _by_point(rows: np.ndarray, points: Points) -> np.ndarray:
-    return rows.reshape(2, len(points.rolls), points.functions, -1)
 
 
 def _mesh_facts(body: SectorBody, gear: ToothedBody) -> dict[str, Any]:

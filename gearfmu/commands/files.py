@@ -89,15 +89,15 @@ def _shipped(name: Path) -> Path:
 
 def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body import inspect_file
-    from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
-    from gearfmu.body.layout import FORMAT
+    from gearfmu.body.store import FILE as BODY
     from gearfmu.hdf5 import format_of
     from gearfmu.stage.run.deformation import FILE as DEFORMATION
     from gearfmu.stage.run.trace import Trace
 
-    if format_of(path) in (FORMAT, INTERFACE_FORMAT):
+    name, _ = format_of(path)
+    if name in BODY.names:
         return inspect_file(path)
-    if format_of(path) == DEFORMATION.name:
+    if name == DEFORMATION.name:
         return _deformation(path)
     trace = Trace.load(path)
     channels = {

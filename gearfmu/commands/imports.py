@@ -60,6 +60,8 @@ def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> di
             raise click.UsageError(f"a carrier needs --bore and {planets} times --bolt, each a node set")
         part = carrier.part.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
         return imported_carrier(replace(carrier, part=part)).facts
+    if name in {housing.name for housing in spec.housings}:
+        raise click.UsageError(f"{name} is a housing: write its node sets into the stage file, then gearfmu reduce")
     member = member_of(spec, name)
     ring = isinstance(member.gear, RingBody)
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.models import by_text, reducing
 from gearfmu.commands.shared import echo_pairs, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.body import Body
 
 
 @click.command()
@@ -80,23 +83,21 @@ def reduce(stage: str, out: Path | None, force: bool, coarse: bool) -> None:
     click.echo(f"{made} bodies reduced, {len(kept)} read, in {time.perf_counter() - started:.1f} s")
 
 
-def _described(body: Any, kept: bool) -> str:
+def _described(body: Body, kept: bool) -> str:
     """A body in two lines: what it is and how good, and what it cost; kept: it was up to date."""
-    from gearfmu.body import InterfaceBody
-
-    if isinstance(body, InterfaceBody):
-        kind, error, top = f"{body.modes} oscillators ({body.method})", body.max_error, body.band[1]
-    else:
-        kind, error, top = f"{body.modes} modes", body.frf.max_error, body.frf.band[1]
+    kind = f"{body.modes} modes" if body.flank is not None else f"{body.modes} oscillators ({body.how.method})"
+    error = body.error
+    assert error is not None, "a stored body says how good it is"
     return (
-        f"{body.name}: {kind} to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, frequency response "
-        f"within {error:.1e} to {top / 1e3:.0f} kHz, input {body.input_hash[:12]}\n  {_cost(body, kept)}"
+        f"{body.name}: {kind} to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.total_mass:.4g} kg, frequency response "
+        f"within {error.max_error:.1e} to {error.band[1] / 1e3:.0f} kHz, input {body.how.hash[:12]}\n"
+        f"  {_cost(body, kept)}"
     )
 
 
-def _cost(body: Any, kept: bool) -> str:
+def _cost(body: Body, kept: bool) -> str:
     """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
-    mesh, made = body.mesh, body.provenance
+    mesh, made = body.how.mesh, body.how.provenance
     memory, sectors = made["peak_memory_GB"], mesh["teeth"]
     return (
         f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; "

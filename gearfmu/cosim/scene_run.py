@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu import fmu
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drive import Drive
@@ -57,7 +57,7 @@ class Staged:
         cls,
         scene: SceneSpec,
         stage: Stage | None = None,
-        bodies: Sequence[Any] | None = None,
+        bodies: Sequence[Body] | None = None,
         observe: Sequence[str] = (),
     ) -> Staged:
         """stage : that of the file that the scene names when None; bodies : of `load_bodies(stage)` when None;

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
@@ -31,6 +31,9 @@ def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = 
 
     scale : factor on all element counts.
     """
+    if name in {housing.name for housing in stage.housings}:
+        why = "shapes are drawn of gears, rings and carriers: `gearfmu inspect` shows a housing's frequencies"
+        raise BodyError(f"{stage.source}: {name} is a housing: {why}")
     part: CarrierSpec | ToothedBody = carrier_of(stage).part if name == CARRIER else member_of(stage, name).gear
     if isinstance(part, CarrierSpec) and part.imported is None:
         found = _carrier(stage, count, progress, scale)
@@ -42,7 +45,7 @@ def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = 
     return _damped(found, part.modal_damping)
 
 
-def gear_modes(stage: Stage, stored: ReducedBody, count: int, progress: Progress | None = None) -> BodyModes:
+def gear_modes(stage: Stage, stored: Body, count: int, progress: Progress | None = None) -> BodyModes:
     """`body_modes` of a gear, as far as its reduced body has them; stored : that body, whose frequencies they must
     have: BodyError where they differ (a file made by another program version)."""
     found = body_modes(stage, stored.name, min(count, stored.modes), progress)

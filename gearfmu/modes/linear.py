@@ -15,20 +15,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 from scipy.optimize import linear_sum_assignment
 
+from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.spec.forms.general import ShaftBody, Stage
 from gearfmu.spec.forms.turning import rolling
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.assembly import mount_sets, tangents_of
+from gearfmu.stage.build.assembly import stage_group
 from gearfmu.stage.build.groups import Group
-from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.run.limits import places_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
@@ -56,7 +55,7 @@ class StageModes:
 
 
 def stage_modes(
-    model: StageModel, bodies: Sequence[Any], torque: float, count: int = 20, positions: int = 12
+    model: StageModel, bodies: Sequence[Body], torque: float, count: int = 20, positions: int = 12
 ) -> StageModes:
     """The `count` lowest natural frequencies under `torque` (N·m on the input, not 0; output held, other ports free) at
     positions i/N of one pitch, of that mesh whose pitch is longest. bodies: those that the model is made of.
@@ -137,14 +136,13 @@ def full_kernel(model: StageModel) -> Kernel:
     return kernel
 
 
-def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
-    """(k, oscillators of the ground group): √2 × the square root of the strain energy of each mode of an elastic shaft,
-    beside what its ends yield beyond them; None where the stage has no shafts."""
+def shaft_rows(model: StageModel, bodies: Sequence[Body]) -> np.ndarray | None:
+    """(k, oscillators of the ground group): √2 × the square root of the strain energy of each mode of an elastic shaft
+    or of the housing, beside what its ends yield beyond them; None where the stage has no shafts."""
     if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):
         return None
-    layout = stage_layout(model.stage, bodies, tangents=tangents_of(model.stage, bodies))
-    group = mount_sets(layout)[0]
-    own = [_elastic(group, b) for b, body in enumerate(layout.bodies) if body.flank is None]
+    group = stage_group(model.stage, bodies)
+    own = [_elastic(group, b) for b, body in enumerate(group.layout.bodies) if body.flank is None]
     return np.vstack(own)
 
 

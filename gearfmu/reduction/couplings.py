@@ -72,7 +72,7 @@ def full_order(
     """
     _check(couplings)
     rigid = [c for c in couplings if c.kind == "rigid"]
-    transform, node_of_dof = _elimination(body.nodes, rigid)
+    transform, node_of_dof = elimination(body.nodes, rigid)
     stiffness = body.stiffness
     if springs is not None:
         stiffness = stiffness + springs.rows.T @ sp.diags_array(springs.stiffness) @ springs.rows
@@ -122,7 +122,7 @@ def _masters(count: int, rigid: Sequence[Coupling]) -> np.ndarray:
     return stands
 
 
-def _elimination(nodes: np.ndarray, rigid: Sequence[Coupling]) -> tuple[sp.csr_array, np.ndarray]:
+def elimination(nodes: np.ndarray, rigid: Sequence[Coupling]) -> tuple[sp.csr_array, np.ndarray]:
     """T (3N, n) from the unknowns, free nodes first, then six of each master; and the node of each unknown."""
     count = len(nodes)
     stands = _masters(count, rigid)

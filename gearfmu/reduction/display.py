@@ -13,14 +13,16 @@ from gearfmu.fem import surface
 
 
 @dataclass(frozen=True)
-class Display:
+class Picture:
     """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; loads (p, P, 3):
-    displacement under a unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m."""
+    displacement under a unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m; shapes: a sector in all
+    modes, None where none was made."""
 
     points: np.ndarray
     quads: np.ndarray
     loads: np.ndarray
     load_roll: np.ndarray
+    shapes: Shapes | None = None
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ class Oscillators:
     omega (n,) rad/s ascending; damping_ratio (n,); rows (m, n), kg^-½ (rotations kg^-½/m), of all interfaces in the
     order of the FullOrder: labels (m,) = (interface, component), scales (m,) = length for rotations, else 1, m.
     rigid_rows (m, r), rows of the rigid fields about the origin, and rigid_mass (r, r) their mass matrix; r = 0 for a
-    body that is held. static (m, m) : C_static, m/N …, of the full model (inertia relief, mean-axis gauge).
+    body that is held. static (m, m) : C_static, m/N …, of the full model (inertia relief, mean-axis gauge). turn (n,
+    n): oscillators in vectors of the basis.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Oscillators:
     rigid_rows: np.ndarray
     rigid_mass: np.ndarray
     static: np.ndarray
+    turn: np.ndarray
 
     @property
     def size(self) -> int:
@@ -98,6 +100,7 @@ def decoupled(body: FullOrder, projection: Projection, damping_ratio: float) -> 
         rigid_rows=body.rows() @ fields,
         rigid_mass=fields.T @ (body.mass @ fields),
         static=projection.static,
+        turn=turn,
     )
 
 

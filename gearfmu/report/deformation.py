@@ -161,9 +161,9 @@ def _bar(figure: Figure, axes: list[Axes], face: _Face, shrink: float) -> None:
 
 def _caption(face: _Face, moved: Sequence[np.ndarray]) -> str:
     largest = ", ".join(f"{MICRO * np.linalg.norm(u, axis=1).max():.3g}" for u in moved)
-    marks = " Thin circles: tip circles of the planets." if face.neighbours is not None else ""
-    if face.gear.body.rim is not None and face.gear.body.rim.mounts:
-        marks += " The model spreads the ring's mounts evenly round its rim."
+    marks = ""
+    if face.neighbours is not None:
+        marks = " Thin circles: tip circles of the planets. What holds the ring is spread evenly round its rim."
     return (
         f"Seen along the axis, elastic displacement enlarged {face.scale:g} times, coloured by its magnitude; largest: "
         f"{largest} µm. The sum of all stored modes at that time; rigid motion on its supports is left out, and what "
@@ -174,7 +174,7 @@ def _caption(face: _Face, moved: Sequence[np.ndarray]) -> str:
 def _columns(deformation: Deformation, gear: DeformedGear, frames: Sequence[int]) -> dict[str, np.ndarray]:
     """Root-mean-square displacement by nodal diameter, and rigid motion."""
     own, chosen = gear.motion, np.asarray(frames)
-    diameter = gear.body.nodal_diameter[own.modes - 1]
+    diameter = gear.body.toothed.diameter[own.modes - 1]
     table: dict[str, Any] = {"time_[s]": deformation.time[chosen]}
     for nu in np.unique(diameter):
         table[f"rms_nu{nu}_[m]"] = np.sqrt((own.amplitude[chosen][:, diameter == nu] ** 2).sum(axis=1))

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gearfmu.body import Body
 from gearfmu.files import write_text
 from gearfmu.report import heading, page, sections
 from gearfmu.report.chart import Plot
@@ -28,14 +29,14 @@ def write(
     summary: Mapping[str, Any],
     out_dir: str | os.PathLike[str],
     spec: Stage | None = None,
-    bodies: Sequence[Any] | None = None,
+    bodies: Sequence[Body] | None = None,
     deformation: Deformation | None = None,
 ) -> Path:
     """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
 
     trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
     summary : fields of docs/file-formats.md; what is missing is shown as "not given".
-    spec : the stage, for tooth numbers; bodies : its ReducedBody objects, for statics and the turning gears;
+    spec : the stage, for tooth numbers; bodies : its Body objects, for statics and the turning gears;
     deformation : of gears at chosen times, drawn where bodies are given too. Raises OSError when the folder cannot be
     written.
     """

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
@@ -33,7 +33,7 @@ STATIC, RUN = "quasi-static", "in the run"
 
 
 def static_loads(
-    trace: Trace, window: Window, meshes: Sequence[str], stage: Stage, bodies: Sequence[Any]
+    trace: Trace, window: Window, meshes: Sequence[str], stage: Stage, bodies: Sequence[Body]
 ) -> tuple[dict[str, FlankLoads], list[str]]:
     """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
     there; those with hardly a load are left out."""

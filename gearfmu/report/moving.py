@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gearfmu.body import Body
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
@@ -36,7 +37,7 @@ Contacts: TypeAlias = np.ndarray
 
 
 @dataclass
-class Body:
+class Drawn:
     """A gear in the view. points (P, 3) m, `teeth` equal sectors of them one after the other; quads (Q, 4) of the first
     sector and whether a point is the next sector's; angle, x, y (F,), z; contacts by mesh: (3, F, C) tooth, roll (m),
     force (N, negative on flank 1); unit: displacement (2, R, P, 3) m/N under unit loads on the flanks 0 and 1 of tooth
@@ -65,7 +66,7 @@ class View:
     recorded modes."""
 
     time: np.ndarray
-    bodies: Sequence[Body]
+    bodies: Sequence[Drawn]
     scale: float
     most: float
     close: tuple[np.ndarray, np.ndarray, float]
@@ -97,12 +98,12 @@ class View:
 
 
 def moving_view(
-    trace: Trace, stage: Stage, bodies: Mapping[str, Any], window: tuple[float, float],
+    trace: Trace, stage: Stage, bodies: Mapping[str, Body], window: tuple[float, float],
     recorded: Sequence[tuple[DeformedGear, np.ndarray]] = (),
 ) -> View | None:  # fmt: skip
-    """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: ReducedBody
+    """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: Body
     by gear; recorded: gears with the times (s) of their frames."""
-    gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].display is not None]
+    gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].picture is not None]
     time = np.linspace(*window, FRAMES)
     if not gears or any(_rotor_angle(trace, stage, stage.rotor_of(name)) is None for name in gears):
         return None
@@ -125,7 +126,7 @@ def moving_view(
     return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
 
 
-def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Body]:
+def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Drawn]:
     """Shafts and carriers whose angle was recorded."""
     found = []
     for name, rotor, profile, (x, y), z in parts(stage):
@@ -136,14 +137,14 @@ def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Body]:
         at = axis + complex(x, y) * np.exp(1j * angle)
         surface = turned(profile)
         found.append(
-            Body(name, *surface, AROUND, angle, (at.real, at.imag, z), tone=BOLT_TONE if "bolt" in name else 1.0)
+            Drawn(name, *surface, AROUND, angle, (at.real, at.imag, z), tone=BOLT_TONE if "bolt" in name else 1.0)
         )
     return found
 
 
-def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
+def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Drawn:
     (name, body), rotor = named, stage.rotor_of(named[0])
-    display, carrier = body.display, stage.carrier_of(rotor)
+    display, carrier = body.picture, stage.carrier_of(rotor)
     turned = _rotor_angle(trace, stage, rotor)
     assert turned is not None
     angle, (x, y) = np.interp(time, trace.time, turned), stage.rotors[rotor].axis
@@ -152,10 +153,10 @@ def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, 
         about = np.interp(time, trace.time, trace[f"{carrier}{GEAR_PHI}"])
     places = (x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about))
     points, quads = np.asarray(display.points, float), np.asarray(display.quads, int)
-    teeth = body.teeth if _periodic(points, quads, body.teeth) else 1
+    teeth = body.toothed.teeth if _periodic(points, quads, body.toothed.teeth) else 1
     size, first = len(points) // teeth, quads[: len(quads) // teeth]
     ahead = ((first // size) % max(teeth, 1) == 1).astype(np.int8) if teeth > 1 else np.zeros_like(first, np.int8)
-    return Body(
+    return Drawn(
         name, points, first % size if teeth > 1 else first, ahead, teeth, angle + phase,
         (*places, float(stage.rotors[rotor].bodies[name])),
     )  # fmt: skip
@@ -183,7 +184,7 @@ def _periodic(points: np.ndarray, quads: np.ndarray, teeth: int) -> bool:
 
 
 def _load(
-    trace: Trace, stage: Stage, mesh: EngagementSpec, gears: tuple[dict[str, Body], Mapping[str, Any]],
+    trace: Trace, stage: Stage, mesh: EngagementSpec, gears: tuple[dict[str, Drawn], Mapping[str, Body]],
     time: np.ndarray,
 ) -> None:  # fmt: skip
     """Add the tooth pairs in contact of an engagement to its two bodies."""
@@ -203,7 +204,7 @@ def _load(
         body = made[name]
         body.contacts[mesh.name] = own
         if body.unit is None:
-            body.rolls, body.unit = _unit_loads(bodies[name].display)
+            body.rolls, body.unit = _unit_loads(bodies[name].picture)
 
 
 def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
@@ -228,14 +229,15 @@ def _mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
     return unit[index] * mirror
 
 
-def _record(body: Body, gear: DeformedGear, times: np.ndarray, window: tuple[float, float]) -> None:
+def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[float, float]) -> None:
     """Give a body its recorded motion around the window instead of loads."""
     first = max(int(np.searchsorted(times, window[0])) - 1, 0)
     chosen = range(first, min(int(np.searchsorted(times, window[1])) + 1, times.size))
     c, s = math.cos(gear.angle), math.sin(gear.angle)
     back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # from the axes of the stage to the body's
     points, quads = gear.surface
-    teeth, size = gear.body.teeth, len(points) // gear.body.teeth
+    teeth = gear.body.toothed.teeth
+    size = len(points) // teeth
     body.points, body.teeth = points @ back, teeth
     first_quads = quads[: len(quads) // teeth]
     body.quads, body.ahead = first_quads % size, (first_quads // size == 1).astype(np.int8)
@@ -243,7 +245,7 @@ def _record(body: Body, gear: DeformedGear, times: np.ndarray, window: tuple[flo
     body.contacts, body.unit, body.rolls = {}, None, None
 
 
-def _turn_together(stage: Stage, made: dict[str, Body]) -> None:
+def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
     """Turn of every rotor per unit of enlargement that closes the gaps which the enlarged displacement opens: from the
     last gears B, which stay, back to the input, by equal lengths on the base circles."""
     turned: dict[str, list[np.ndarray]] = {}
@@ -261,7 +263,7 @@ def _turn_together(stage: Stage, made: dict[str, Body]) -> None:
             body.extra = np.mean(own, axis=0)
 
 
-def _recede(body: Body, mesh: str, geometry: Any) -> np.ndarray:
+def _recede(body: Drawn, mesh: str, geometry: Any) -> np.ndarray:
     """(F,) m, signed as the force: how far the loaded flanks of a gear yield at their contacts, mean over them."""
     if body.unit is None or body.rolls is None or mesh not in body.contacts:
         return np.zeros(FRAMES)
@@ -280,7 +282,7 @@ def _yield(points: np.ndarray, unit: np.ndarray, geometry: Any, roll: float) -> 
     return abs(float(unit[nearest, :2] @ normal))
 
 
-def _largest(body: Body) -> float:
+def _largest(body: Drawn) -> float:
     """Largest displacement (m) at any frame."""
     if body.frames is not None:
         return float(np.linalg.norm(body.frames, axis=2).max())
@@ -301,7 +303,7 @@ def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np
     return at.real, at.imag, 4.0 * float(stage.gears[0].normal_module)
 
 
-def _numbers(body: Body, pack: Pack) -> dict[str, Any]:
+def _numbers(body: Drawn, pack: Pack) -> dict[str, Any]:
     size, (x, y, z) = len(body.points) // body.teeth, body.place
     found: dict[str, Any] = {"tone": body.tone} if body.tone else {}
     found |= {

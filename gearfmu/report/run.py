@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.plots_set import PlanetSet, planet_set
@@ -27,7 +28,7 @@ class Run:
     trace: Trace
     summary: Mapping[str, Any]
     spec: Stage | None = None
-    bodies: Sequence[Any] | None = None
+    bodies: Sequence[Body] | None = None
     deformation: Deformation | None = None
 
     @cached_property

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
+from gearfmu.body import Body
 from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
@@ -197,7 +197,7 @@ def _loudest_bearings(part: Trace) -> list[str]:
     return [name for name in found if name in loud]
 
 
-def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Any]) -> tuple[float, ...]:
+def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Body]) -> tuple[float, ...]:
     """Natural frequencies (Hz) of a pair or train linearised under the run's mean mesh force, those modes that a
     transmission error drives; none where the stage finds no equilibrium with its flanks in contact."""
     model = assemble(stage, bodies)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu.report import heading, page, plots_nvh, plots_set
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
@@ -18,6 +18,9 @@ from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
 from gearfmu.stage import assemble
 from gearfmu.stage.run.refinement import left_of_slices
 from gearfmu.stage.run.trace import Trace
+
+if TYPE_CHECKING:
+    from gearfmu.reduction.cyclic.frf import FrfError
 
 WORDS = {  # key of a result: words, channel of the mesh, unit
     "mesh_force_mean_N": ("Mesh force, mean", "force", "N"),
@@ -235,7 +238,7 @@ def accuracy(run: Run) -> list[str]:
             {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}
         )
     ]
-    made_with = fingerprint(body.input_hash for body in bodies or ())
+    made_with = fingerprint(body.how.hash for body in bodies or ())
     prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
     if prices:
         parts += [
@@ -250,7 +253,11 @@ def accuracy(run: Run) -> list[str]:
                 "(evidence/study/levels.py does it)."
             )
         )
-    return parts + [page.note(_frf_words(body)) for body in bodies or () if hasattr(body, "frf")]
+    return parts + [
+        page.note(_frf_words(body.name, body.error))
+        for body in bodies or ()
+        if body.error is not None and body.error.cut
+    ]
 
 
 PRICES = (
@@ -260,10 +267,9 @@ PRICES = (
 )
 
 
-def _frf_words(body: Any) -> str:
-    frf = body.frf
+def _frf_words(name: str, frf: FrfError) -> str:
     return (
-        f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static "
+        f"Body {name}: frequency response of the modes below {(frf.cut or 0) / 1e3:g} kHz with their static "
         "residual against the finite elements: "
         f"largest error {frf.max_error:.1e} of the response from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be "
         f"trusted up to {frf.trusted_to / 1e3:.3g} kHz."

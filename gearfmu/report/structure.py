@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gearfmu.spec.forms.general import CarrierBody, ShaftBody, Stage
+from gearfmu.spec.tables.housing import HousingBody
 
 AROUND = 40  # sectors of a surface of revolution
 Profile = Sequence[tuple[float, float]]
@@ -50,6 +51,8 @@ def parts(stage: Stage) -> list[tuple[str, str, Profile, tuple[float, float], fl
     (m). A carrier is its plate and a bolt for each rotor that it carries beside its middle."""
     found: list[tuple[str, str, Profile, tuple[float, float], float]] = []
     for name, body in stage.bodies.items():
+        if isinstance(body, HousingBody):
+            continue
         rotor = stage.rotor_of(name)
         place = float(stage.rotors[rotor].bodies[name])
         if isinstance(body, ShaftBody):

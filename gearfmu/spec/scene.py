@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field
+from pydantic import AliasChoices, Field, SerializerFunctionWrapHandler, model_serializer
 
 from gearfmu.errors import Problem, SpecError, near_or_all
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
@@ -49,6 +49,13 @@ class Effects(Spec):
     runout: Switch = True
     friction: Switch = True
     film: Switch = True
+    housing: Switch = True
+
+    @model_serializer(mode="wrap")
+    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Scenes that are older than housings stay what they were."""
+        tables: dict[str, object] = handler(self)
+        return {key: value for key, value in tables.items() if key != "housing" or not value}
 
     @property
     def off(self) -> tuple[str, ...]:

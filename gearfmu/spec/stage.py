@@ -119,6 +119,10 @@ def _load_general(layers: Layers) -> Read:
     if spec is None or problems:
         return None, problems
     bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
+    for own in spec.housings:
+        bodies[own.name] = own.model_copy(
+            update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")}
+        )
     return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies})), []
 
 

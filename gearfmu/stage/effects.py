@@ -208,6 +208,18 @@ EFFECTS: tuple[Effect, ...] = (
         kept="without it bearing forces are reactions, another output",
     ),
     _switched(
+        "housing",
+        title="elastic housing",
+        formula="one more free body of the ground group: bearings between shafts and seats, feet on the ground",
+        equation="1 (eq. 2d)",
+        matters="forces at bearings and mounts below some kHz: on rigid ground sensors err by 12 dB",
+        off="bearings rest on rigid ground: the stage without its housing, bit for bit; sensors and mounts are 0",
+        code="gk_choose.c (gk_choose): another set of ground oscillators; gk_sensors.c",
+        kept="without it sensors and mounts have no signal",
+        test="tests/stage/test_housing.py::test_without_its_housing_it_is_the_stage_on_the_ground_bit_for_bit",
+        of_data=True,
+    ),
+    _switched(
         "modal_damping",
         title="modal damping",
         formula="2ζω q̇",

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
@@ -131,7 +131,9 @@ class KeptSource:
         return self.unit_made
 
 
-def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any) -> StageModel:
+def models_for(
+    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: Any
+) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of what is written in its file."""
     stage = rewritten(load_stage(scene.stage.name), **changes)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu import cosim
+from gearfmu.body import Body
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
@@ -51,7 +52,7 @@ def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
     return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
-def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Any]) -> Trace:
+def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Body]) -> Trace:
     """The scene on the stage of these bodies; by the kernel, which has the bits of its FMU."""
     return cosim.run(Staged.of(scene, stage, bodies), unit="kernel")
 

@@ -14,9 +14,8 @@ import pytest
 from verbs import call
 
 from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies
-from gearfmu.body.layout import GROUPS, entries_of
+from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.parts import drawn_counts, kept_offsets
-from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.spec.stage import load_stage
@@ -41,20 +40,20 @@ def made(tmp_path_factory) -> SimpleNamespace:
 def test_a_helical_body_reads_back_as_it_was_written(made: SimpleNamespace) -> None:
     for index, body in enumerate(made.bodies):
         again = load_body(body_path(made.spec, made.spec.gears[index].name))
-        assert body.groups == again.groups == ("helix", "tangent", "shapes", "spin")
-        for entry in entries_of(body.groups):
+        assert again.flank.knows_profile and again.spin is not None and again.picture.shapes is not None
+        for entry in entries_of(body):
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
     assert [b.name for b in load_bodies(made.spec)] == ["pinion", "wheel"]
 
 
 def test_pinion_and_wheel_are_of_opposite_hand(made: SimpleNamespace) -> None:
-    angles = [body.base_helix_angle for body in made.bodies]
+    angles = [body.flank.beta_b for body in made.bodies]
     assert angles[0] == -angles[1] == pytest.approx(math.asin(math.sin(math.radians(20)) * math.cos(math.radians(20))))
     for body in made.bodies:
-        assert np.all(body.parity == 0)
-        assert body.tangent.rows.shape == body.flank_rows.shape
-        own = body.static_ff[:, :, 0].shape
-        assert body.tangent.static_tt.shape == body.tangent.static_nt.shape == own
+        assert np.all(body.flank.parity == 0)
+        assert body.flank.tangent.rows.shape == body.flank.rows.shape
+        own = body.flank.static[:, :, 0].shape
+        assert body.flank.tangent.static_tt.shape == body.flank.tangent.static_nt.shape == own
 
 
 def test_normal_and_profile_tables_of_a_tooth_are_positive_together(made: SimpleNamespace) -> None:
@@ -66,10 +65,10 @@ def test_normal_and_profile_tables_of_a_tooth_are_positive_together(made: Simple
         return table.transpose(0, 2, 4, 1, 3, 5).reshape(size, size)
 
     for body in made.bodies:
-        t = body.tangent
-        nn, nt, tt = block(body.static_ff[:, :, 0]), block(t.static_nt), block(t.static_tt)
+        t = body.flank.tangent
+        nn, nt, tt = block(body.flank.static[:, :, 0]), block(t.static_nt), block(t.static_tt)
         whole = np.block([[nn, nt], [nt.T, tt]])
-        rows = np.vstack([r.reshape(len(nn), -1) for r in (body.flank_rows, t.rows)])
+        rows = np.vstack([r.reshape(len(nn), -1) for r in (body.flank.rows, t.rows)])
         for modes in (0, 30):
             left = whole - (rows[:, :modes] / (2 * np.pi * body.frequency[:modes]) ** 2) @ rows[:, :modes].T
             assert np.abs(left - left.T).max() < 1e-12 * np.abs(whole).max()
@@ -80,43 +79,41 @@ def test_kept_offsets_are_what_the_kernel_reads() -> None:
     """−3 … 3, all of them where they are needed or no more."""
     for teeth, expected in ((37, [0, 1, 2, 3, 34, 35, 36]), (7, range(7)), (6, range(6))):
         table = np.broadcast_to(np.arange(teeth)[:, None, None, None, None], (2, 2, teeth, 4, 4, 2, 2))
-        assert list(kept_offsets(table, whole=False)[0, 0, :, 0, 0, 0, 0]) == list(expected)
-        assert kept_offsets(table, whole=True).shape[2] == teeth
+        assert list(kept_offsets(table)[0, 0, :, 0, 0, 0, 0]) == list(expected)
 
 
 def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace, tmp_path: Path) -> None:
     body, path = made.bodies[1], tmp_path / "few.h5"
     save_body(body, path)
     again = load_body(path)
-    assert again.static_ff.shape[2] == body.static_ff.shape[2] == 7 < body.teeth
+    assert again.flank.static.shape[2] == body.flank.static.shape[2] == 7 < body.flank.teeth
     for offset in range(4):
-        mirrored = again.static_ff[:, :, -offset].transpose(1, 0, 3, 2, 5, 4)
-        assert np.allclose(again.static_ff[:, :, offset], mirrored, rtol=0, atol=1e-14 * np.abs(mirrored).max())
+        mirrored = again.flank.static[:, :, -offset].transpose(1, 0, 3, 2, 5, 4)
+        assert np.allclose(again.flank.static[:, :, offset], mirrored, rtol=0, atol=1e-14 * np.abs(mirrored).max())
     assert inspect_file(path)["facts"]["tooth_offsets"] == "−3 to 3"
     with pytest.raises(BodyError, match="tooth offsets"):
-        replace(body, static_ff=body.static_ff[:, :, :6])
+        replace(body, flank=replace(body.flank, static=body.flank.static[:, :, :6]))
 
 
 def test_shipped_spur_gears_know_their_profile_and_what_turning_does() -> None:
     for body in load_bodies(load_stage("fzg_c")):
-        assert body.groups == ("tangent", "shapes", "spin") and body.base_helix_angle == 0.0
-        assert body.knows_profile
-    assert set(GROUPS) == {"rim", "helix", "tangent", "shapes", "surface", "spin"}
+        assert body.flank.knows_profile and body.flank.beta_b == 0.0
+        assert body.spin is not None and body.picture.shapes is not None and body.sensors is None
 
 
 def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:
     """Points of the drawn tip circle at the ends of the face width are turned by ± b/2·twist."""
     for body, shape, gear in zip(made.bodies, made.spec.written.geometry.gears, made.spec.gears, strict=True):
         assert drawn_counts(shape, gear.face_width).width > 1
-        points, pitch = np.asarray(body.display.points, float), 2 * np.pi / body.teeth
+        points, pitch = np.asarray(body.picture.points, float), 2 * np.pi / body.flank.teeth
         radius, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
         for end in (-0.5, 0.0, 0.5):
             z = end * gear.face_width
             layers = np.unique(np.round(points[:, 2], 7))
             near = layers[np.abs(layers - z).argmin()]
             top = (radius > 0.9999 * shape.r_a) & (np.abs(points[:, 2] - near) < 1e-6)
-            turn = np.exp(1j * (angle[top] - shape.twist * near) * body.teeth).mean()
-            assert abs(np.angle(turn)) < 1e-3 * body.teeth * pitch
+            turn = np.exp(1j * (angle[top] - shape.twist * near) * body.flank.teeth).mean()
+            assert abs(np.angle(turn)) < 1e-3 * body.flank.teeth * pitch
 
 
 def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path: Path) -> None:

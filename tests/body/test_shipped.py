@@ -23,8 +23,11 @@ def test_no_shipped_body_is_stale_large_or_incomplete(stage):
     spec = load_stage(stage)
     for body in load_bodies(spec):
         assert body_path(spec, body.name).stat().st_size <= LARGEST
-        assert body.frf.max_error < 0.01 or spec.written is spec  # those of a train say how far they reach
-        assert body.knows_profile and body.spin is not None
+        if body.skin is not None:
+            assert body.error.max_error < 0.1 and body.error.trusted_to > 6e3 and body.sensors is not None
+            continue
+        assert body.error.max_error < 0.01 or spec.written is spec  # those of a train say how far they reach
+        assert body.flank.knows_profile and body.spin is not None
 
 
 def test_the_bodies_of_the_library_are_small_together():
@@ -34,17 +37,17 @@ def test_the_bodies_of_the_library_are_small_together():
 
 def bore_held(body, offset: int = 0) -> np.ndarray:
     """Compliance (R, R) of uniform loads on flank 0 of teeth 0 and `offset` relative to the bore, m/N."""
-    z, normal = body.teeth, _uniform_resultant(body)
+    z, normal = body.flank.teeth, _uniform_resultant(body)
     angle = 2 * np.pi * offset / z
     c, s = np.cos(angle), np.sin(angle)
     turned = normal @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     planar = [0, 1, 5]
-    fb = body.static_fb[0, :, 0]
+    fb = body.flank.node[0, :, 0]
     other = fb.copy()
     other[:, 0], other[:, 1] = c * fb[:, 0] - s * fb[:, 1], s * fb[:, 0] + c * fb[:, 1]
-    bb = body.static_bb[np.ix_(planar, planar)]
+    bb = body.static[np.ix_(planar, planar)]
     return (
-        body.static_ff[0, 0, offset, :, :, 0, 0]
+        body.flank.static[0, 0, offset, :, :, 0, 0]
         - normal @ other[:, planar].T
         - fb[:, planar] @ turned.T
         + normal @ bb @ turned.T
@@ -54,17 +57,20 @@ def bore_held(body, offset: int = 0) -> np.ndarray:
 def _uniform_resultant(body) -> np.ndarray:
     """Force x, y and moment z (R, 3) of the uniform unit load at each roll point: mean normal over the strip, and
     r_b."""
-    arc = body.roll**2 / (2 * body.r_b)
-    low, high = body.roll_range**2 / (2 * body.r_b)
-    first, last = np.clip(arc - body.strip_half_width, low, high), np.clip(arc + body.strip_half_width, low, high)
+    arc = body.flank.roll**2 / (2 * body.flank.r_b)
+    low, high = body.flank.roll_range**2 / (2 * body.flank.r_b)
+    first, last = (
+        np.clip(arc - body.flank.strip_half_width, low, high),
+        np.clip(arc + body.flank.strip_half_width, low, high),
+    )
     share = (np.arange(400) + 0.5) / 400
-    roll = np.sqrt(2 * body.r_b * (first[:, None] + (last - first)[:, None] * share))
-    tau = body.psi_b - roll / body.r_b
-    return np.stack([-np.sin(tau).mean(1), np.cos(tau).mean(1), np.full(len(arc), body.r_b)], axis=1)
+    roll = np.sqrt(2 * body.flank.r_b * (first[:, None] + (last - first)[:, None] * share))
+    tau = body.flank.psi_b - roll / body.flank.r_b
+    return np.stack([-np.sin(tau).mean(1), np.cos(tau).mean(1), np.full(len(arc), body.flank.r_b)], axis=1)
 
 
 def at_roll(body, matrix: np.ndarray, roll: float) -> float:
-    weights = BarycentricInterpolator(body.roll, np.eye(len(body.roll)))(roll)
+    weights = BarycentricInterpolator(body.flank.roll, np.eye(len(body.flank.roll)))(roll)
     return float(weights @ matrix @ weights)
 
 
@@ -78,18 +84,18 @@ def pair_stiffness(bodies, spec, twist: bool) -> float:
     1/r_f²).
     """
     pair, width = spec.written.pair, spec.gears[0].face_width
-    r_b = [body.r_b for body in bodies]
+    r_b = [body.flank.r_b for body in bodies]
     rolls = [np.sqrt(pair.center_distance**2 - sum(r_b) ** 2) * r / sum(r_b) for r in r_b]
     modulus = 206e9 / (1 - 0.3**2)
     hertz = np.sqrt(4 * 300e3 * rolls[0] * rolls[1] / sum(rolls) / (np.pi * modulus / 2))
     total = 0.0
     for body, gear, roll in zip(bodies, spec.gears, rolls, strict=True):
         total += at_roll(body, bore_held(body), roll)
-        total += 2 / (np.pi * modulus * width) * (np.log(4 * body.strip_half_width / hertz) - 1)
+        total += 2 / (np.pi * modulus * width) * (np.log(4 * body.flank.strip_half_width / hertz) - 1)
         if not twist:
             root = gear_geometry(gear, pair).r_f
             shear = 206e9 / 2.6
-            total -= body.r_b**2 / (4 * np.pi * shear * width) * (4 / gear.bore_diameter**2 - 1 / root**2)
+            total -= body.flank.r_b**2 / (4 * np.pi * shear * width) * (4 / gear.bore_diameter**2 - 1 / root**2)
     return 1e-9 / (total * width)
 
 
@@ -108,23 +114,23 @@ def test_a_symmetric_load_does_not_notice_that_motion_out_of_the_plane_is_held()
     them through the bore or the inertia; odd ones do, so zero is not the answer to everything."""
     planar, out = [0, 1, 5], [2, 3, 4]
     for body in load_bodies(load_stage("fzg_c")):
-        even = np.arange(body.static_fb.shape[2]) % 2 == 0
-        symmetric = body.parity > 0
-        scale = np.abs(body.static_fb[:, :, ~even][..., out]).max(axis=(0, 1, 2))
-        assert np.all(scale > 0) and np.all(np.abs(body.static_fb[:, :, even][..., out]) < 1e-9 * scale)
-        scale = np.abs(body.bore_rows[out][:, ~symmetric]).max(axis=1, keepdims=True)
-        assert np.all(scale > 0) and np.all(np.abs(body.bore_rows[out][:, symmetric]) < 1e-9 * scale)
-        scale = np.abs(body.bore_rows[planar]).max(axis=1, keepdims=True)
-        assert np.all(np.abs(body.bore_rows[planar][:, ~symmetric]) < 1e-9 * scale)
-        assert np.all(body.flank_rows[:, :, even][..., ~symmetric] == 0)
-        size = np.sqrt(body.static_bb.diagonal())
-        assert np.abs(body.static_bb / np.outer(size, size))[np.ix_(planar, out)].max() < 1e-9
+        even = np.arange(body.flank.node.shape[2]) % 2 == 0
+        symmetric = body.flank.parity > 0
+        scale = np.abs(body.flank.node[:, :, ~even][..., out]).max(axis=(0, 1, 2))
+        assert np.all(scale > 0) and np.all(np.abs(body.flank.node[:, :, even][..., out]) < 1e-9 * scale)
+        scale = np.abs(body.rows[out][:, ~symmetric]).max(axis=1, keepdims=True)
+        assert np.all(scale > 0) and np.all(np.abs(body.rows[out][:, symmetric]) < 1e-9 * scale)
+        scale = np.abs(body.rows[planar]).max(axis=1, keepdims=True)
+        assert np.all(np.abs(body.rows[planar][:, ~symmetric]) < 1e-9 * scale)
+        assert np.all(body.flank.rows[:, :, even][..., ~symmetric] == 0)
+        size = np.sqrt(body.static.diagonal())
+        assert np.abs(body.static / np.outer(size, size))[np.ix_(planar, out)].max() < 1e-9
         assert np.abs(body.inertia[2, :2]).max() < 1e-9 * body.inertia[2, 2]
 
 
 def test_neighbour_teeth_move_along_less_than_the_loaded_one():
     for body in load_bodies(load_stage("fzg_c")):
-        middle = len(body.roll) // 2
+        middle = len(body.flank.roll) // 2
         own, neighbour = (bore_held(body, m)[middle, middle] for m in (0, 1))
         assert 0 < neighbour < 0.35 * own
 
@@ -133,11 +139,11 @@ def test_neighbour_teeth_move_along_less_than_the_loaded_one():
 def test_residual_of_any_cut_is_positive_semidefinite(modes):
     """C_static − Σ N Nᵀ/ω² on both flanks of a tooth and the bore, whichever modes are dynamic."""
     for body in load_bodies(load_stage("fzg_c")):
-        points = body.static_fb[..., 0].size
-        flank = body.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)
-        bore = body.static_fb.reshape(points, 6)
-        static = np.block([[flank, bore], [bore.T, body.static_bb]])
-        rows = np.vstack([body.flank_rows.reshape(points, -1), body.bore_rows])[:, :modes]
+        points = body.flank.node[..., 0].size
+        flank = body.flank.static[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)
+        bore = body.flank.node.reshape(points, 6)
+        static = np.block([[flank, bore], [bore.T, body.static]])
+        rows = np.vstack([body.flank.rows.reshape(points, -1), body.rows])[:, :modes]
         residual = static - (rows / (2 * np.pi * body.frequency[:modes]) ** 2) @ rows.T
         scale = np.sqrt(static.diagonal())
         values = np.linalg.eigvalsh(residual / np.outer(scale, scale))
@@ -157,10 +163,10 @@ def test_gearfmu_reduce_remakes_the_shipped_bodies(tmp_path):
     response's error to 1e-3 of itself."""
     spec = load_stage("fzg_c")
     for shipped, made in zip(load_bodies(spec), reduce_bodies(spec, tmp_path), strict=True):
-        assert made.input_hash == shipped.input_hash
+        assert made.how.hash == shipped.how.hash
         assert np.allclose(made.frequency, shipped.frequency, rtol=1e-6)
         for name in ("static_ff", "static_fb", "static_bb"):
             stored = common_offsets(shipped, name)
             assert np.abs(common_offsets(made, name) - stored).max() <= 1e-6 * np.abs(stored).max()
-        assert np.allclose(made.frf.error, shipped.frf.error, rtol=1e-3, atol=1e-9)
+        assert np.allclose(made.error.error, shipped.error.error, rtol=1e-3, atol=1e-9)
         assert Path(body_path(spec, spec.gears[0].name, tmp_path)).is_file()

@@ -107,9 +107,7 @@ def test_the_report_is_about_the_stage_of_the_fmu(plain: Path, tmp_path: Path) -
     assert trace.meta["stage"] == "fzg_c" and Path(trace.meta["fmu_path"]) == plain
     spec, bodies = stage_and_bodies(trace.meta)
     assert spec.gears[0].tip_relief is None and spec.ports == gf.load("fzg_c").ports
-    assert [body.input_hash for body in bodies] == [
-        trace.meta["hashes"][f"body {name}"] for name in ("pinion", "wheel")
-    ]
+    assert [body.how.hash for body in bodies] == [trace.meta["hashes"][f"body {name}"] for name in ("pinion", "wheel")]
     with pytest.raises(BodyError, match="has other bodies"):
         stage_and_bodies(trace.meta | {"stage": "helical_demo"})
     changed = trace.meta | {"hashes": {"model": "0" * 64}}

@@ -62,6 +62,7 @@ def test_chain_in_the_stage_and_exact_clutch_outside_are_the_same_drivetrain():
     outside = inside.model_copy(
         update={"passenger_car": inside.passenger_car.model_copy(update={"chain_in_fmu": False})}
     )
+    assert inside.chain_in_fmu and not outside.chain_in_fmu
     a, b = cosim.run(inside, unit="kernel"), cosim.run(outside, unit="kernel")
     lock_a, lock_b = (
         trace.time[np.argmax(trace[name] > 0)]

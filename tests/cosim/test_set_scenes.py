@@ -40,7 +40,7 @@ def momentum(trace: Trace, model: StageModel) -> np.ndarray:
     sun, planet, ring, carrier = load_bodies(model.stage)
     own = {"sun": sun, "ring": ring, "carrier": carrier} | {f"planet{k}": planet for k in (1, 2, 3, 4)}
     spins = sum(body.inertia[2, 2] * trace[f"{name}.gear.w"] for name, body in own.items())
-    return spins + 4.0 * planet.mass * PIN_CIRCLE**2 * trace["carrier.gear.w"]
+    return spins + 4.0 * planet.total_mass * PIN_CIRCLE**2 * trace["carrier.gear.w"]
 
 
 def impulse(trace: Trace, channel: str, step: float) -> np.ndarray:

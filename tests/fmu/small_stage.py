@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
+from handmade import mass_matrix, toothed
 
+from gearfmu.body import Body
 from gearfmu.spec.forms.expand import rewritten, with_ports
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -37,10 +38,10 @@ def unpack(fmu: Path, target: Path) -> str:
     return str(target)
 
 
-def body(gear, shape) -> SimpleNamespace:
-    """Fields of a ReducedBody as docs/file-formats.md lists them."""
+def body(gear, shape) -> Body:
+    """A gear whose modes are one pattern of a tooth, by nodal diameter."""
     z = gear.teeth
-    diameters = np.concatenate([[0], np.repeat(np.arange(1, (z + 1) // 2), 2), [z // 2] * (z % 2 == 0)])
+    diameters = np.concatenate([[0], np.repeat(np.arange(1, (z + 1) // 2), 2), [z // 2] * (z % 2 == 0)]).astype(int)
     n = diameters.size
     part = np.array([0] + [1, 2] * ((n - 1) // 2) + [0] * ((n - 1) % 2))
     frequency = TOOTH_FREQUENCY * (1 + 0.02 * diameters)
@@ -51,33 +52,34 @@ def body(gear, shape) -> SimpleNamespace:
     amplitude = np.sqrt(BENDING / z) * 2 * np.pi * frequency * np.where(part > 0, np.sqrt(2.0), 1.0)
     rows[0, :, 0] = shape_of_roll[:, None] * (amplitude * (part < 2))
     rows[1] = -rows[0]
-    return SimpleNamespace(
-        name=gear.name,
-        input_hash=f"{z:064x}",
-        teeth=z,
-        width_functions=FUNCTIONS,
-        r_b=shape.r_b,
-        face_width=gear.face_width,
-        strip_half_width=gear.body.strip_half_width,
-        **_inertia(gear),
+    flank = {
+        "teeth": z,
+        "r_b": shape.r_b,
+        "face_width": gear.face_width,
+        "strip_half_width": gear.body.strip_half_width,
+        "diameter": diameters,
+        "part": part,
+        "roll": roll,
+        "rows": rows,
+        "static": _static(rows, frequency, diameters, z),
+        "node": np.zeros((2, ROLLS, FUNCTIONS, 6)),
+    }
+    return toothed(
+        gear.name,
+        flank,
+        _mass(gear),
+        f"{z:064x}",
         frequency=frequency,
         damping_ratio=np.full(n, gear.modal_damping),
-        nodal_diameter=diameters,
-        part=part,
-        parity=np.ones(n, int),
-        roll=roll,
-        flank_rows=rows,
-        bore_rows=np.zeros((6, n)),
-        static_ff=_static(rows, frequency, diameters, z),
-        static_fb=np.zeros((2, ROLLS, FUNCTIONS, 6)),
-        static_bb=1e-11 * np.eye(6),
+        rows=np.zeros((6, n)),
+        static=1e-11 * np.eye(6),
     )
 
 
-def _inertia(gear) -> dict:
+def _mass(gear) -> np.ndarray:
     r, r0 = gear.tip_diameter / 2, gear.bore_diameter / 2
     mass = DENSITY * np.pi * (r**2 - r0**2) * gear.face_width
-    return {"mass": mass, "inertia": np.diag([0.3, 0.3, 0.5]) * mass * (r**2 + r0**2)}
+    return mass_matrix(mass, np.diag([0.3, 0.3, 0.5]) * mass * (r**2 + r0**2))
 
 
 def _static(rows: np.ndarray, frequency: np.ndarray, diameters: np.ndarray, z: int) -> np.ndarray:

@@ -19,9 +19,9 @@ from gearfmu.stage import StageModel, Steady, assemble
 STEPS, H = 20, 1e-4
 
 
-@pytest.fixture(scope="module")
-def train() -> StageModel:
-    spec = load_stage("two_stage")
+@pytest.fixture(scope="module", params=["two_stage", "two_stage/stage_housed"])
+def train(request: pytest.FixtureRequest) -> StageModel:
+    spec = load_stage(request.param)
     fast = spec.levels.model_copy(update={"standard_cut": spec.levels.fast_cut})
     return assemble(spec.model_copy(update={"levels": fast}), load_bodies(spec))
 
@@ -53,6 +53,8 @@ def test_the_fmu_of_a_train_is_its_kernel_bit_for_bit(train: StageModel, fmu: Pa
     found = np.array(ours)
     assert np.abs(found[:, outputs.index("stage2.force")]).min() > 1000, "the run loads the teeth"
     assert found.tobytes() == np.array(theirs).tobytes()
+    felt = [np.ptp(found[:, k]) for k, name in enumerate(outputs) if name.startswith(("sensor.", "mount."))]
+    assert bool(felt) == bool(train.stage.housings) and min(felt, default=1.0) > 0
 
 
 @pytest.mark.full
@@ -64,3 +66,5 @@ def test_the_fmu_of_a_train_names_ports_and_meshes(train: StageModel) -> None:
     assert list(shafts(train.kernel_variables())) == ["input", "output"]
     names = {v.name for v in train.kernel_variables()}
     assert {"stage1.force", "stage2.te", "stage1.backlash", "bearing.input_left.fx", "seat.wheel2.mz"} <= names
+    housed = {"sensor.top.ax", "mount.foot0.fy", "mount.foot3.fz_mean", "effect.housing"}
+    assert housed & names == (housed if train.stage.housings else set())

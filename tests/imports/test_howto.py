@@ -76,7 +76,7 @@ def test_the_page_runs_as_it_stands(tmp_path: Path) -> None:
         load_body(tmp_path / "mine" / "pinion.h5"),
         load_body(ROOT / "reduced_models" / "fzg_c" / "pinion.h5"),
     )
-    assert body.mesh["method"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
+    assert body.how.mesh["method"] == "cyclic" and body.how.mesh["fit"]["residual_max_um"] < 1e-3
     assert np.abs(body.frequency[:60] / shipped.frequency[:60] - 1).max() < 0.015  # a coarse mesh
     te = re.search(r"302\.0 N·m: mean ([\d.]+) µm, peak to peak ([\d.]+) µm", done.stdout)
     assert te, done.stdout

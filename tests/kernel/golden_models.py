@@ -61,30 +61,27 @@ def _rounded(values: np.ndarray | str) -> np.ndarray | str:
 
 def _small(body: Any, modes: int, functions: int) -> Any:
     """The body with its first modes, pairs whole, and its first width functions; static compliance stays whole."""
-    if hasattr(body, "rigid_rows"):
+    if body.flank is None:
         return _with(body, frequency=body.frequency[:modes], damping_ratio=body.damping_ratio[:modes],
                      rows=body.rows[:, :modes])  # fmt: skip
     n = _lowest(body, modes)
     a = functions
-    small = _with(
-        body,
-        **{name: getattr(body, name)[n] for name in ("frequency", "damping_ratio", "nodal_diameter", "part", "parity")},
-        flank_rows=body.flank_rows[:, :, :a][..., n],
-        bore_rows=body.bore_rows[:, n],
-        static_ff=body.static_ff[..., :a, :a],
-        static_fb=body.static_fb[:, :, :a],
-        shapes=None,
+    flank = _with(
+        body.flank,
+        **{name: getattr(body.flank, name)[n] for name in ("diameter", "part", "parity")},
+        rows=body.flank.rows[:, :, :a][..., n],
+        static=body.flank.static[..., :a, :a],
+        node=body.flank.node[:, :, :a],
     )
-    if body.rim is not None:
-        rim = body.rim
-        rim = _with(rim, patch_rows=rim.patch_rows[:, n], flank_rigid=rim.flank_rigid[:, :, :a],
-                    static_fp=rim.static_fp[:, :, :, :a])  # fmt: skip
-        small = _with(small, rim=rim)
-    if body.tangent is not None:
-        of = body.tangent
+    small = _with(body, frequency=body.frequency[n], damping_ratio=body.damping_ratio[n], rows=body.rows[:, n],
+                  flank=flank, picture=None)  # fmt: skip
+    if body.sensors is not None:
+        small = _with(small, sensors=_with(body.sensors, rows=body.sensors.rows[:, n]))
+    if body.flank.tangent is not None:
+        of = body.flank.tangent
         of = _with(of, rows=of.rows[:, :, :a][..., n], static_nt=of.static_nt[..., :a, :a],
                    static_tt=of.static_tt[..., :a, :a])  # fmt: skip
-        small = _with(small, tangent=of)
+        small = _with(small, flank=_with(flank, tangent=of))
     if body.spin is not None:
         s = body.spin
         s = _with(s, coupling=s.coupling[np.ix_(n, n)], tilt=s.tilt[:, n], load=s.load[n], stiffening=s.stiffening[n],
@@ -95,9 +92,9 @@ def _small(body: Any, modes: int, functions: int) -> Any:
 
 def _lowest(body: Any, modes: int) -> np.ndarray:
     """Numbers of the lowest modes of nodal diameter 0, 1 and above, a third of `modes` each, pairs whole."""
-    diameter = np.minimum(body.nodal_diameter, 2)
+    diameter = np.minimum(body.flank.diameter, 2)
     kept = np.concatenate([np.flatnonzero(diameter == d)[: modes // 3] for d in range(3)])
-    second = kept[body.part[kept] == 1] + 1
+    second = kept[body.flank.part[kept] == 1] + 1
     return np.union1d(kept, second)
 
 

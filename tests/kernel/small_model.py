@@ -8,12 +8,13 @@ free bodies by gearfmu.stage.build.groups, as those of every stage.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 from exact_bars import Bar
+from handmade import mass_matrix, toothed
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
+from gearfmu.body import Body
 from gearfmu.spec.tables.ports import LevelSpec
 from gearfmu.stage.build.assembly import (
     MODEL_VERSION,
@@ -25,7 +26,7 @@ from gearfmu.stage.build.assembly import (
 )
 from gearfmu.stage.build.blob import read_blob, write_blob
 from gearfmu.stage.build.fields import gear_numbers, order_sections
-from gearfmu.stage.build.free import FreeBody, free_gear
+from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.build.groups import Group, Layout, Support, mount
 
 NAMES = ("pinion", "wheel")
@@ -55,7 +56,8 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     rng = np.random.default_rng(seed)
     bodies = [_body(g, rng) for g in (0, 1)]
     every, cuts = np.arange(len(FREQUENCY)), LevelSpec(fast_cut=CUTS[0], standard_cut=CUTS[1])
-    groups = _groups([free_gear(body, every, np.arange(2), np.eye(ROLLS), cuts) for body in bodies])
+    reading = Reading(every, np.arange(2), np.eye(ROLLS), cuts)
+    groups = _groups([ground_part(body, reading) for body in bodies])
     layout, last = groups[0].layout, (2e4, 5.0, 0.05, 2e-3, 8e3, 0.5)
     sections = {
         "counts": np.array([MODEL_VERSION, 3, 2, 2, 1, 2, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
@@ -133,9 +135,8 @@ def _gear(g: int) -> np.ndarray:
     )
 
 
-def _body(g: int, rng: np.random.Generator) -> SimpleNamespace:
-    """What `free_gear` reads of a reduced body: invented modes, and static compliances that hold them plus a positive
-    residual."""
+def _body(g: int, rng: np.random.Generator) -> Body:
+    """Invented modes, and static compliances that hold them plus a positive residual."""
     omega = 2 * np.pi * FREQUENCY * (1.0, 0.8)[g]
     rows = 0.6 * rng.standard_normal((2, 1, 1, omega.size)) * np.ones((2, ROLLS, 2, 1)) / np.sqrt(MASS[g])
     rows *= np.linspace(0.7, 1.3, ROLLS)[None, :, None, None] * np.array([1.0, 0.2])[None, None, :, None]
@@ -148,20 +149,22 @@ def _body(g: int, rng: np.random.Generator) -> SimpleNamespace:
     roll = np.linspace(0.7, 1.3, ROLLS)
     between = 1e-11 * rng.standard_normal((2, 1, 1, 6)) / np.array([1, 1, 1, BASE[g], BASE[g], BASE[g]])
     between = between * roll[None, :, None, None] * np.array([1.0, 0.2])[None, None, :, None]
-    return SimpleNamespace(
-        name=NAMES[g],
-        teeth=TEETH[g],
-        mass=MASS[g],
-        inertia=np.diag([0.6, 0.6, 1.0]) * INERTIA[g],
+    flank = {
+        "teeth": TEETH[g],
+        "diameter": DIAMETER,
+        "part": MEMBER,
+        "rows": rows,
+        "static": static,
+        "node": np.einsum("fiak,ck->fiac", rows / omega**2, bore) + between,
+    }
+    return toothed(
+        NAMES[g],
+        flank,
+        mass_matrix(MASS[g], np.diag([0.6, 0.6, 1.0]) * INERTIA[g]),
         frequency=omega / (2 * np.pi),
         damping_ratio=np.full(omega.size, 0.01),
-        nodal_diameter=DIAMETER,
-        part=MEMBER,
-        flank_rows=rows,
-        bore_rows=bore,
-        static_ff=static,
-        static_fb=np.einsum("fiak,ck->fiac", rows / omega**2, bore) + between,
-        static_bb=np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-10, 3e-8, 3e-8, 3e-8]),
+        rows=bore,
+        static=np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-10, 3e-8, 3e-8, 3e-8]),
     )
 
 
@@ -174,7 +177,7 @@ def _bore_rows(size: np.ndarray, r_b: float) -> np.ndarray:
     return rows
 
 
-def _groups(bodies: list[FreeBody]) -> list[Group]:
+def _groups(bodies: list[GroundPart]) -> list[Group]:
     """As supported by the bearings, and with the bores held on their axes."""
     bearings = [
         Support(f"bearing.{name}", (g, 0), None, (0, 1), np.eye(2) / BEARING_K, np.full(2, BEARING_C))
@@ -184,7 +187,7 @@ def _groups(bodies: list[FreeBody]) -> list[Group]:
     return [mount(layout), mount(replace(layout, supports=[bearing.hold() for bearing in bearings]))]
 
 
-def _modes(g: int, body: SimpleNamespace, groups: list[Group]) -> dict[str, np.ndarray]:
+def _modes(g: int, body: Body, groups: list[Group]) -> dict[str, np.ndarray]:
     degrees, flank = np.array(DEGREES), groups[0].layout.bodies[g].flank
     tables = flank_sections(g, groups, NODES, degrees)
     reads = tables[f"ground_list{g}_0"].size

@@ -32,7 +32,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
     gears = spec.written.geometry.gears
     path = own_path(model, torque)
-    mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
+    mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.total_mass, b.inertia[2, 2] / g.r_b**2)])
     width = min(gear.face_width for gear in spec.gears)
 
     def mode(damping: float) -> complex:
@@ -44,7 +44,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
             closing = 1 / (flexible + path / pairs / (1 + s * damping * width * path))
             matrix = closing * np.outer(CLOSING, CLOSING).astype(complex)
             for i, (gear, body) in enumerate(zip(spec.written.gears, bodies, strict=True)):
-                c = 2 * gear.bearing.damping_ratio * np.sqrt(gear.bearing.stiffness * body.mass)
+                c = 2 * gear.bearing.damping_ratio * np.sqrt(gear.bearing.stiffness * body.total_mass)
                 matrix[2 * i, 2 * i] += gear.bearing.stiffness + s * c
             values, shapes = eig(matrix, np.diag(mass))
             share = np.abs(CLOSING @ (shapes / np.sqrt(np.einsum("ij,i,ij->j", shapes.conj(), mass, shapes)))) ** 2

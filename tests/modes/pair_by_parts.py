@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg as sl
 from numpy.polynomial.legendre import Legendre
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.tables import excited_modes, resampling, symmetric_functions
@@ -58,29 +58,27 @@ class Gear:
     residual: np.ndarray
 
 
-def gear_at(
-    spec: Stage, bodies: Sequence[ReducedBody], index: int, position: float, contacts: Sequence[Contact]
-) -> Gear:
+def gear_at(spec: Stage, bodies: Sequence[Body], index: int, position: float, contacts: Sequence[Contact]) -> Gear:
     pair, body = spec.written.geometry, bodies[index]
     shape, side = pair.gears[index], (1.0, -1.0)[index]
-    degrees = symmetric_functions(min(b.width_functions for b in bodies))
+    degrees = symmetric_functions(min(b.flank.width_functions for b in bodies))
     chosen = excited_modes(body, degrees)
     angle = (0.0, pair.wheel_phase)[index] + side * 2 * math.pi * position / shape.z
     direction = math.pi / 2 - pair.alpha_wt - angle  # of the line of action in the body's frame
     rigid = np.array([side * math.cos(direction), side * math.sin(direction), shape.r_b])
     weights = slice_weights(spec.written.contact.slices, degrees)
-    places = [(c.teeth[index], resampling(body.roll, c.rolls[index], c.rolls[index], 1)[0]) for c in contacts]
+    places = [(c.teeth[index], resampling(body.flank.roll, c.rolls[index], c.rolls[index], 1)[0]) for c in contacts]
     flank = [
-        on_tooth(np.einsum("r,a,ran->n", place, weights[c.slice], body.flank_rows[DRIVE][:, degrees][..., chosen]),
+        on_tooth(np.einsum("r,a,ran->n", place, weights[c.slice], body.flank.rows[DRIVE][:, degrees][..., chosen]),
                   body, chosen, tooth)
         for (tooth, place), c in zip(places, contacts, strict=True)
     ]  # fmt: skip
-    modal = np.vstack([*flank, body.bore_rows[np.ix_(np.array(BORE), chosen)]])
+    modal = np.vstack([*flank, body.rows[np.ix_(np.array(BORE), chosen)]])
     rows = np.hstack([np.vstack([np.tile(rigid, (len(contacts), 1)), np.eye(3)]), modal])
     omega = 2 * np.pi * body.frequency[chosen]
     static = static_of(body, degrees, places, weights[[c.slice for c in contacts]])
     return Gear(
-        mass=np.concatenate([[body.mass, body.mass, body.inertia[2, 2]], np.ones(len(chosen))]),
+        mass=np.concatenate([[body.total_mass, body.total_mass, body.inertia[2, 2]], np.ones(len(chosen))]),
         omega=np.concatenate([np.zeros(3), omega]),
         rows=rows,
         residual=static - (modal / omega) @ (modal / omega).T,
@@ -101,10 +99,10 @@ def weights_between(edges: np.ndarray, degrees: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def on_tooth(row: np.ndarray, body: ReducedBody, chosen: np.ndarray, tooth: int) -> np.ndarray:
+def on_tooth(row: np.ndarray, body: Body, chosen: np.ndarray, tooth: int) -> np.ndarray:
     """Row (n,) of tooth 0 on another tooth (docs/theory.md eq. 3)."""
-    theta = 2 * np.pi * body.nodal_diameter[chosen] * tooth / body.teeth
-    first, second = np.flatnonzero(body.part[chosen] == 1), np.flatnonzero(body.part[chosen] == 2)
+    theta = 2 * np.pi * body.flank.diameter[chosen] * tooth / body.flank.teeth
+    first, second = np.flatnonzero(body.flank.part[chosen] == 1), np.flatnonzero(body.flank.part[chosen] == 2)
     result = row * np.cos(theta)
     result[first] -= row[second] * np.sin(theta[first])
     result[second] += row[first] * np.sin(theta[first])
@@ -112,19 +110,19 @@ def on_tooth(row: np.ndarray, body: ReducedBody, chosen: np.ndarray, tooth: int)
 
 
 def static_of(
-    body: ReducedBody, degrees: np.ndarray, places: Sequence[tuple[int, np.ndarray]], weights: np.ndarray
+    body: Body, degrees: np.ndarray, places: Sequence[tuple[int, np.ndarray]], weights: np.ndarray
 ) -> np.ndarray:
     """C_static (c + 3, c + 3) of contacts at `places` (tooth, weights of the roll points) and of the bore."""
     count = len(places)
     total = np.zeros((count + 3, count + 3))
     bore = np.ix_(BORE, BORE)
-    total[count:, count:] = body.static_bb[bore]
+    total[count:, count:] = body.static[bore]
     for i, (tooth, place) in enumerate(places):
         for j, (other, there) in enumerate(places):
-            block = body.static_ff[DRIVE, DRIVE, other - tooth][..., degrees, :][..., degrees]
+            block = body.flank.static[DRIVE, DRIVE, other - tooth][..., degrees, :][..., degrees]
             total[i, j] = np.einsum("r,s,a,b,rsab->", place, there, weights[i], weights[j], block)
-        x, y, turn = np.einsum("r,a,rak->k", place, weights[i], body.static_fb[DRIVE][:, degrees])[list(BORE)]
-        theta = 2 * np.pi * tooth / body.teeth
+        x, y, turn = np.einsum("r,a,rak->k", place, weights[i], body.flank.node[DRIVE][:, degrees])[list(BORE)]
+        theta = 2 * np.pi * tooth / body.flank.teeth
         c, s = math.cos(theta), math.sin(theta)
         total[i, count:] = total[count:, i] = [c * x - s * y, s * x + c * y, turn]
     return total

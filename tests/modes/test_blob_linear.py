@@ -17,7 +17,7 @@ from pair_by_parts import Contact, couple, gear_at, slice_weights, tangents
 from gearfmu.body import load_bodies
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.assembly import general_sections
-from gearfmu.stage.build.free import read_tables
+from gearfmu.stage.build.ground_part import read_tables
 from gearfmu.stage.build.tables import OFFSETS
 
 ROLLS = 48

@@ -33,7 +33,7 @@ def body(request: pytest.FixtureRequest) -> Any:
 def moved(body: Any, amplitudes: dict[int, float], rigid: tuple[float, ...] = (0.0,) * 6, **at: float) -> DeformedGear:
     """One frame; amplitudes in kg^½·m by number of the mode, from 0."""
     modes, values = np.array(list(amplitudes), int), np.array([list(amplitudes.values())], float)
-    motion = GearMotion(body.input_hash, modes + 1, values / math.sqrt(body.mass), np.array([rigid]))
+    motion = GearMotion(body.how.hash, modes + 1, values / math.sqrt(body.total_mass), np.array([rigid]))
     return deformed_gear("gear", body, motion, **at)
 
 
@@ -42,10 +42,11 @@ def test_one_mode_is_the_shape_that_the_finite_elements_found() -> None:
     sector, drawn = small_gear.coarse(), gear_sector(small_gear.GEAR, small_gear.WIDTH, DRAWN)
     surface, z = outline(drawn, sector.mesh.nodes), small_gear.GEAR.z
     modes = elastic_modes(sector, 40, None, surface.sample)
+    teeth = SimpleNamespace(teeth=z, diameter=modes.nodal_diameter, part=modes.part)
+    picture = SimpleNamespace(shapes=sector_shapes(surface, modes))
     body = SimpleNamespace(
-        input_hash="0" * 64, mass=1.0, teeth=z, modes=len(modes.frequency), nodal_diameter=modes.nodal_diameter,
-        part=modes.part, shapes=sector_shapes(surface, modes),
-    )  # fmt: skip
+        how=SimpleNamespace(hash="0" * 64), total_mass=1.0, modes=len(modes.frequency), toothed=teeth, picture=picture
+    )
     assert len(modes.shapes) > 5 and len(set(modes.nodal_diameter[list(modes.shapes)])) > 2
     for index, shape in modes.shapes.items():
         turn = np.exp(2j * np.pi * modes.nodal_diameter[index] * np.arange(z) / z)
@@ -56,16 +57,16 @@ def test_one_mode_is_the_shape_that_the_finite_elements_found() -> None:
 
 
 def test_the_surface_of_a_body_is_that_of_its_sectors(body: Any) -> None:
-    assert np.array_equal(moved(body, {0: 1.0}).surface[0].astype("f4"), body.display.points)
+    assert np.array_equal(moved(body, {0: 1.0}).surface[0].astype("f4"), body.picture.points)
 
 
 def test_a_pair_turns_a_tooth_on(body: Any) -> None:
     """Amplitudes cos ν2π/z and −sin… of a pair: the first member's pattern, one tooth further."""
-    first = int(np.flatnonzero(body.part == 1)[3])
-    angle = 2 * math.pi * body.nodal_diameter[first] / body.teeth
+    first = int(np.flatnonzero(body.flank.part == 1)[3])
+    angle = 2 * math.pi * body.flank.diameter[first] / body.flank.teeth
     turned = moved(body, {first: math.cos(angle), first + 1: math.sin(angle)}).elastic(0)
-    back = moved(body, {first: 1.0}, angle=2 * math.pi / body.teeth).elastic(0)
-    shifted = np.roll(back.reshape(body.teeth, -1, 3), 1, axis=0).reshape(-1, 3)
+    back = moved(body, {first: 1.0}, angle=2 * math.pi / body.flank.teeth).elastic(0)
+    shifted = np.roll(back.reshape(body.flank.teeth, -1, 3), 1, axis=0).reshape(-1, 3)
     assert np.abs(turned - shifted).max() < 1e-6 * np.abs(turned).max()
 
 
@@ -84,9 +85,9 @@ def test_rigid_motion_and_the_angle_of_the_gear(body: Any) -> None:
 def test_another_body_and_one_without_surface_are_refused(body: Any) -> None:
     motion = moved(body, {0: 1.0}).motion
     with pytest.raises(DeformationError, match="another reduced body"):
-        deformed_gear("ring", replace(body, input_hash="0" * 64), motion)
+        deformed_gear("ring", replace(body, how=replace(body.how, hash="0" * 64)), motion)
     with pytest.raises(DeformationError, match="gearfmu reduce STAGE --force"):
-        deformed_gear("ring", replace(body, shapes=None), motion)
+        deformed_gear("ring", replace(body, picture=replace(body.picture, shapes=None)), motion)
 
 
 def test_a_series_reads_back(body: Any, tmp_path: Path) -> None:
@@ -111,7 +112,7 @@ def test_the_file_of_a_run_reads_back_and_a_damaged_one_is_refused(body: Any, tm
     kept.save(tmp_path / "deformation.h5")
     again = Deformation.load(tmp_path / "deformation.h5")
     assert np.array_equal(again.gears["ring"].amplitude, motion.amplitude) and again.meta == kept.meta
-    assert again.gears["ring"].body_hash == body.input_hash
+    assert again.gears["ring"].body_hash == body.how.hash
     bytes_ = bytearray((tmp_path / "deformation.h5").read_bytes())
     bytes_[len(bytes_) // 2] ^= 1
     (tmp_path / "deformation.h5").write_bytes(bytes_)

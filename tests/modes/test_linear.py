@@ -395,8 +395,8 @@ def test_a_chain_with_heavy_inertia_holds_the_shaft(fzg: Stage) -> None:
     one, other = (linearised(model, TORQUE, 0.375) for model in (chained, spring))
     assert len(one.linear.mass) == len(other.linear.mass) + 1
     (slow, *_), pinion = one.modes(1), fzg.bodies[0]
-    mesh = loaded_te(fzg.model, [TORQUE], 8).stage_stiffness[0, 3] * pinion.r_b**2
-    behind = 1 / (1 / 15e3 + 1 / mesh + 1 / (40e3 * (pinion.teeth / fzg.bodies[1].teeth) ** 2))
+    mesh = loaded_te(fzg.model, [TORQUE], 8).stage_stiffness[0, 3] * pinion.flank.r_b**2
+    behind = 1 / (1 / 15e3 + 1 / mesh + 1 / (40e3 * (pinion.flank.teeth / fzg.bodies[1].flank.teeth) ** 2))
     assert slow[0] == pytest.approx(np.sqrt((20e3 + behind) / 10) / (2 * np.pi), rel=2e-3)
     for theirs, mine in zip(other.modes(6)[:3], one.modes(7)[:3], strict=True):
         assert np.allclose(mine[1:], theirs, rtol=1e-3, atol=1e-5)

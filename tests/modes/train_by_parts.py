@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg as sl
 from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.general import EngagementSpec, ShaftBody, Stage
@@ -116,38 +116,38 @@ def _tangent(stage: Stage, mesh: EngagementSpec, curvature: float, line: float) 
     return slope + a * (1 - min(line / lowest, 1.0))
 
 
-def gear_part(stage: Stage, body: ReducedBody, touches: Sequence[tuple[Load, Touch, int]], count: int) -> Part:
+def gear_part(stage: Stage, body: Body, touches: Sequence[tuple[Load, Touch, int]], count: int) -> Part:
     """A gear with its bore's node and the slices that it carries; the last of each entry: 0 gear A, 1 gear B. count: of
     width functions."""
     zero = touches[0][1].zero[touches[0][2]]
-    seen = np.abs(body.flank_rows).max(axis=(0, 1, 2)) > UNSEEN * np.abs(body.flank_rows).max()
-    seen |= (np.abs(body.bore_rows) > UNSEEN * np.abs(body.bore_rows).max(axis=1, keepdims=True)).any(axis=0)
-    second = np.flatnonzero(body.part == 2)
+    seen = np.abs(body.flank.rows).max(axis=(0, 1, 2)) > UNSEEN * np.abs(body.flank.rows).max()
+    seen |= (np.abs(body.rows) > UNSEEN * np.abs(body.rows).max(axis=1, keepdims=True)).any(axis=0)
+    second = np.flatnonzero(body.flank.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     chosen, degrees, turn = np.flatnonzero(seen), np.arange(count), np.kron(np.eye(2), _about_z(zero))
     weights = [weights_between(t.part, degrees)[0] for _, t, _ in touches]
-    places = [resampling(body.roll, t.rolls[side], t.rolls[side], 1)[0] for _, t, side in touches]
+    places = [resampling(body.flank.roll, t.rolls[side], t.rolls[side], 1)[0] for _, t, side in touches]
     teeth = [t.teeth[side] for _, t, side in touches]
-    modal, rigid = [turn @ body.bore_rows[:, chosen]], [np.eye(6)]
+    modal, rigid = [turn @ body.rows[:, chosen]], [np.eye(6)]
     for (load, t, side), place, tooth, weight in zip(touches, places, teeth, weights, strict=True):
-        table = body.flank_rows[load.flank][:, degrees][..., chosen]
+        table = body.flank.rows[load.flank][:, degrees][..., chosen]
         row = np.einsum("r,a,ran->n", place, weight, table)
         modal.append(on_tooth(row, body, chosen, tooth)[None])
         rigid.append(t.rigid[side][None])
     rows, omega = np.vstack(modal), 2 * np.pi * body.frequency[chosen]
     static = np.zeros((6 + len(touches),) * 2)
-    static[:6, :6] = turn @ body.static_bb @ turn.T
+    static[:6, :6] = turn @ body.static @ turn.T
     for i, (load, _, _) in enumerate(touches):
-        own = np.kron(np.eye(2), _about_z(zero + 2 * math.pi * teeth[i] / body.teeth))
-        to_bore = np.einsum("r,a,rak->k", places[i], weights[i], body.static_fb[load.flank][:, degrees])
+        own = np.kron(np.eye(2), _about_z(zero + 2 * math.pi * teeth[i] / body.flank.teeth))
+        to_bore = np.einsum("r,a,rak->k", places[i], weights[i], body.flank.node[load.flank][:, degrees])
         static[6 + i, :6] = static[:6, 6 + i] = own @ to_bore
         for j, (other, _, _) in enumerate(touches):
-            offset = (teeth[j] - teeth[i]) % body.static_ff.shape[2]
-            block = body.static_ff[load.flank, other.flank, offset][:, :, :count, :count]
+            offset = (teeth[j] - teeth[i]) % body.flank.static.shape[2]
+            block = body.flank.static[load.flank, other.flank, offset][:, :, :count, :count]
             static[6 + i, 6 + j] = np.einsum("r,s,a,b,rsab->", places[i], places[j], weights[i], weights[j], block)
     return Part(
         stiffness=np.diag(np.concatenate([np.zeros(6), omega**2])),
-        mass=sl.block_diag(body.mass * np.eye(3), body.inertia, np.eye(omega.size)),
+        mass=sl.block_diag(body.total_mass * np.eye(3), body.inertia, np.eye(omega.size)),
         rows=np.hstack([np.vstack(rigid), rows]),
         residual=static - (rows / omega) @ (rows / omega).T,
     )
@@ -178,7 +178,7 @@ def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:
 
 
 def frequencies(
-    stage: Stage, bodies: Sequence[ReducedBody], loads: Sequence[Load], turned: Mapping[str, float], count: int
+    stage: Stage, bodies: Sequence[Body], loads: Sequence[Load], turned: Mapping[str, float], count: int
 ) -> np.ndarray:
     """(count,) lowest frequencies, Hz. turned: angle (rad) of every rotor; every seat is at a gear's mid-width."""
     touches = []
@@ -187,7 +187,7 @@ def frequencies(
         a, b = (turned[stage.rotor_of(name)] for name in mesh.gears)
         touches.append(touch(stage, mesh, load, (a, b)))
     parts, first, node_of, contact_of = [], 0, {}, {}
-    functions = min(body.width_functions for body in bodies)
+    functions = min(body.flank.width_functions for body in bodies)
     for gear, body in zip(stage.gears, bodies, strict=True):
         own = [(i, stage.engagements[x.mesh].gears.index(gear.name)) for i, x in enumerate(loads)
                if gear.name in stage.engagements[x.mesh].gears]  # fmt: skip

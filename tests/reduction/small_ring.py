@@ -12,8 +12,6 @@ import scipy.sparse as sp
 from blocks import free_body
 
 from gearfmu.body.parts import tooth_flank
-from gearfmu.body.reduced import ReducedBody
-from gearfmu.body.toothed import reduced_gear
 from gearfmu.fem import hex20
 from gearfmu.femesh import ring_sector
 from gearfmu.geometry.internal import InternalGearGeometry
@@ -23,7 +21,6 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.forms.planetary import MountsSpec, RingSpec
 from gearfmu.spec.forms.shapes import ring_geometry
 from gearfmu.spec.stage import load_stage
@@ -61,11 +58,6 @@ def geometry(beta: float) -> InternalGearGeometry:
 def coarse(beta: float = 0.0) -> SectorBody:
     own = geometry(beta)
     return SectorBody(ring_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec(), internal=True))
-
-
-@lru_cache(maxsize=2)
-def reduced(modes: int = 81) -> ReducedBody:
-    return reduced_gear(member_of(set_spec(modes=modes), "ring"), "0" * 64)
 
 
 @lru_cache(maxsize=2)

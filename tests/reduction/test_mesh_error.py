@@ -64,7 +64,7 @@ def test_the_mesh_error_falls_with_the_mesh() -> None:
 
 @pytest.mark.parametrize("stage", ["planetary54", "helical_set"])
 def test_shipped_carriers_say_how_far_their_mesh_can_be_trusted(stage: str) -> None:
-    said = load_bodies(load_stage(stage))[-1].mesh["frequency_error"]
+    said = load_bodies(load_stage(stage))[-1].how.mesh["frequency_error"]
     assert said["finer"] == FINER and said["modes"] == COMPARED
     assert 0 < said["max_error"] < ALLOWED[stage]
 
@@ -88,6 +88,6 @@ def test_a_coarser_mesh_tells_the_distance_to_the_finer_one_that_shipped_carrier
     """Never less, a fifth more at most."""
     found = carrier_mesh_error(carrier_of(load_stage(stage)))
     print(stage, found)
-    measured = load_bodies(load_stage(stage))[-1].mesh["frequency_error"]
+    measured = load_bodies(load_stage(stage))[-1].how.mesh["frequency_error"]
     assert found["compared"] < 1 and found["to_Hz"] == pytest.approx(measured["to_Hz"], rel=1e-6)
     assert measured["max_error"] < found["max_error"] < 1.2 * measured["max_error"]

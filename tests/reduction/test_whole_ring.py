@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-import scipy.sparse.linalg as spl
 from sections import section
 from small_ring import (
     GEOMETRY,
-    MOUNTS,
     STEEL,
     coarse,
     mounted_stiffness,
-    reduced,
     set_spec,
     whole,
     whole_rows,
 )
+from turned_rows import on_tooth
 
-from gearfmu.body.mounted import mounted_frequencies, turned_rows
-from gearfmu.errors import BodyError
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.cyclic.modal import elastic_modes
@@ -64,16 +58,11 @@ def test_frequencies_of_one_sector_are_those_of_the_whole_ring(modes):
 
 def test_rows_of_flanks_and_patches_are_those_of_the_whole_ring(modes):
     squared, shapes = lowest_modes(whole().free, len(modes.frequency) + 6, block=12)
-    names = ("frequency", "nodal_diameter", "part", "parity")
-    body = replace(reduced(), shapes=None, spin=None, tangent=None, **{name: getattr(modes, name) for name in names},
-                   flank_rows=modes.flank_rows.reshape(2, 4, 3, -1), bore_rows=modes.bore_rows,
-                   damping_ratio=np.full(len(modes.frequency), 0.01),
-                   rim=replace(reduced().rim, patch_rows=modes.patch_rows))  # fmt: skip
     omega, mine_0 = 2 * np.pi * modes.frequency, np.vstack([modes.flank_rows, modes.patch_rows])
     full_0 = np.vstack([whole().flank_rows[0], whole_rows(coarse().patch_rows, 0)]) @ shapes
     ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1
     for tooth in (0, 1, 5, 11):
-        mine = turned_rows(body, mine_0, tooth)
+        mine = on_tooth(modes, mine_0, tooth, Z)
         full = np.vstack([whole().flank_rows[tooth], whole_rows(coarse().patch_rows, tooth)]) @ shapes
         for cluster in np.split(np.arange(len(omega)), ends)[:-1]:
             difference = mine_0[:, cluster] @ mine[:, cluster].T - full_0[:, cluster] @ full[:, cluster].T
@@ -101,20 +90,6 @@ def test_inertia_is_the_analytic_one():
     assert coarse().inertia[5, 5] == pytest.approx(polar, rel=1e-3)
 
 
-def test_mounts_make_six_rigid_modes_elastic():
-    """Frequencies of the whole finite elements on springs, within what n modes and a quasi-static rest can say."""
-    stiffness, mass = mounted_stiffness(), whole().free.mass_matrix
-    exact = np.sqrt(np.sort(spl.eigsh(stiffness, 20, mass, sigma=0, which="LM")[0])) / (2 * np.pi)
-    frequency = mounted_frequencies(reduced())
-    assert frequency[:20] == pytest.approx(exact, rel=1e-4)
-    assert len(frequency) == 6 + reduced().modes and frequency[0] > 500
-    softer = replace(reduced(), rim=replace(reduced().rim, mount_stiffness=MOUNTS.stiffness * 1e-8))
-    loose = mounted_frequencies(softer)
-    assert loose[5] < 1.0 and loose[6:] == pytest.approx(reduced().frequency, rel=1e-6)
-    total = 6 * MOUNTS.stiffness * 1e-8 / reduced().mass  # soft springs: the rigid ring on six of them, along the axis
-    assert np.abs(loose[:6] * 2 * np.pi / np.sqrt(total) - 1).min() < 1e-5
-
-
 def test_full_order_of_the_mounted_ring_has_the_same_frequencies():
     full = ring_full_order(member_of(set_spec(), "ring"), scale=1.0)
     assert full.size == 3 * len(whole().elements.nodes) and full.rigid.shape[1] == 0 and len(full.interfaces) == Z
@@ -134,9 +109,3 @@ def test_input_nodes_lie_in_the_middle_of_their_flanks():
     assert roll**2 == pytest.approx(0.5 * (GEOMETRY.s_form**2 + GEOMETRY.s_tip**2), rel=1e-9)
     for interface in full.interfaces[:3]:
         assert interface.rows.toarray().sum() == 3 and interface.components == ("ux", "uy", "uz")
-
-
-def test_a_body_without_mounts_says_so():
-    loose = replace(reduced(), rim=replace(reduced().rim, mounts=0, mount_stiffness=0.0))
-    with pytest.raises(BodyError, match="ring.mounts"):
-        mounted_frequencies(loose)

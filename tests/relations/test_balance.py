@@ -17,7 +17,6 @@ from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number,
 
 from gearfmu.spec.forms.general import CarrierBody
 from gearfmu.stage import assemble
-from gearfmu.stage.build.free import free_carrier
 from gearfmu.stage.build.groups import Layout
 from gearfmu.stage.build.layout import place_of, stage_layout
 from gearfmu.stage.build.meshes import tooth_phases
@@ -56,9 +55,7 @@ def on_the_ground(kind: Kind, out: dict[str, float]) -> tuple[np.ndarray, np.nda
         z = place_of(stage, support)
         if isinstance(stage.bodies[support.body], CarrierBody):
             node = support.node or "bore"
-            body = free_carrier(bodies_of(kind.file)[support.body])
-            names = [str(i["name"]) for i in bodies_of(kind.file)[support.body].interfaces]
-            z += float(body.place[names.index(node)])
+            z += next(float(n.point[2]) for n in bodies_of(kind.file)[support.body].nodes if n.name == node)
         axis = stage.rotors[stage.rotor_of(support.body)].axis
         force += own[0]
         moment += own[1] + np.cross([*axis, z], own[0])
@@ -183,7 +180,7 @@ def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | 
         turned = np.exp(1j * (tooth_phases(stage)[gear] + out[f"{gear}.gear.phi"]))
         place = turned * (out[f"{gear}.motion.x"] + 1j * out[f"{gear}.motion.y"])
         mean = out[f"bearing.{gear}.fx_mean"] + 1j * out[f"bearing.{gear}.fy_mean"]
-        rate = rate + bodies[gear].mass * (place[2:] - 2 * place[1:-1] + place[:-2]) / step**2
+        rate = rate + bodies[gear].total_mass * (place[2:] - 2 * place[1:-1] + place[:-2]) / step**2
         force = force + 0.5 * (mean[1:-1] + mean[2:])
     later = slice(START, None)
     assert rms(np.abs(rate + force)[later]) < MOMENTUM * rms(np.abs(force)[later])

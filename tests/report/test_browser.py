@@ -88,14 +88,14 @@ def test_a_zoomed_curve_shows_the_samples_and_the_other_figures_follow(opened: B
 
 def displaced(body: Any, loads: list[tuple[int, float, float]]) -> np.ndarray:
     """(P, 3) m under forces (N) at rolls (m) of teeth: unit loads between stored rolls, turned from tooth 0."""
-    rolls, unit = _unit_loads(body.display)
+    rolls, unit = _unit_loads(body.picture)
     total = np.zeros(unit.shape[2:])
     for tooth, roll, force in loads:
         place = np.interp(roll, rolls, np.arange(rolls.size))
         low = min(int(place), rolls.size - 2)
         own = unit[0 if force > 0 else 1, low : low + 2]
-        field = (own[0] + (place - low) * (own[1] - own[0])).reshape(body.teeth, -1, 3)
-        turn = rotated(np.roll(field, tooth, axis=0).reshape(-1, 3), 2 * np.pi * tooth / body.teeth)
+        field = (own[0] + (place - low) * (own[1] - own[0])).reshape(body.flank.teeth, -1, 3)
+        turn = rotated(np.roll(field, tooth, axis=0).reshape(-1, 3), 2 * np.pi * tooth / body.flank.teeth)
         total -= abs(force) * turn
     return total
 

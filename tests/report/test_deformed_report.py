@@ -44,10 +44,10 @@ def run() -> Trace:
 def deformation(bodies: list[Any]) -> Deformation:
     """A pattern of four lobes that turns with the carrier: five frames, three of them pictures."""
     ring, time = bodies[2], np.linspace(0, 0.02, 5)
-    first = int(np.flatnonzero((ring.nodal_diameter == 4) & (ring.part == 1))[0])
+    first = int(np.flatnonzero((ring.flank.diameter == 4) & (ring.flank.part == 1))[0])
     turning = 4 * CARRIER * time
     amplitude = 5e-6 * np.column_stack([np.cos(turning), np.sin(turning)])
-    motion = GearMotion(ring.input_hash, np.array([first, first + 1]) + 1, amplitude, np.zeros((5, 6)))
+    motion = GearMotion(ring.how.hash, np.array([first, first + 1]) + 1, amplitude, np.zeros((5, 6)))
     return Deformation(time, np.array([1, 2, 4]), np.arange(5), {"ring": motion}, {"stage": "planetary54"})
 
 
@@ -94,7 +94,7 @@ def test_colours_follow_the_lobes(
 def test_what_cannot_be_drawn_is_said(
     run: Trace, deformation: Deformation, spec: Any, bodies: list[Any], tmp_path: Path
 ) -> None:
-    bare = [replace(body, shapes=None) if body.name == "ring" else body for body in bodies]
+    bare = [replace(body, picture=None) if body.name == "ring" else body for body in bodies]
     page = report.write(run, run.meta, tmp_path, spec, bare, deformation).read_text(encoding="utf-8")
     assert not images(page) and "gearfmu reduce STAGE --force" in page
     page = report.write(run, run.meta, tmp_path, deformation=deformation).read_text(encoding="utf-8")

@@ -32,7 +32,7 @@ def test_shown_only_with_its_bodies(tmp_path: Path, fresh: bool) -> None:
     shipped = load_stage("fzg_c/stage_relief")
     bodies = load_bodies(shipped)
     spec = shipped.model_copy(update={"source": tmp_path / "stage.toml"})
-    made_with = levels.fingerprint(body.input_hash for body in bodies) if fresh else "0+0"
+    made_with = levels.fingerprint(body.how.hash for body in bodies) if fresh else "0+0"
     write_list(levels.levels_path(spec), made_with)
     t = np.arange(50) * 1e-4
     trace = Trace(t, {"mesh.force": Channel(np.sin(t), "N")}, {})

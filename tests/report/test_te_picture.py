@@ -58,3 +58,10 @@ def test_load_over_the_width_of_a_spur_pair_is_even_about_its_middle() -> None:
 
 def test_rounding_is_no_error_of_transmission() -> None:
     assert peak_to_peak(np.array([0.0, 2e-12])) == "0 µm peak to peak"
+
+
+def test_a_torque_without_equilibrium_is_a_row_with_its_reason() -> None:
+    alike, sharing = np.ones((2, 16)), np.ones((2, 16, 2, 3))
+    found = SetTeResult(TORQUE, POSITION, alike, alike, sharing, np.ones((2, 16, 2)), ("", "no static equilibrium"))
+    rows = found.rows
+    assert rows[-1] == ("200.0 N·m", "no static equilibrium") and len(rows) == 1 + 2 + 1

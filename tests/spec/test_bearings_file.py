@@ -89,9 +89,10 @@ def test_a_file_without_them_is_stored_as_ever(name: str) -> None:
 
 
 def test_directions_of_rolling_bearings_count(tmp_path: Path) -> None:
-    """Balls hold five directions and rollers four; the kernel has room for 64."""
+    """Balls hold five directions and rollers four; the kernel has room for 256."""
     supports = "\n".join(
-        f'[[supports]]\nname = "more{k}"\nbody = "input_shaft"\nat = "{10 + k} mm"\nbearing = "NU206"' for k in range(4)
+        f'[[supports]]\nname = "more{k}"\nbody = "input_shaft"\nat = "{10 + k} mm"\nbearing = "NU206"'
+        for k in range(52)
     )
     found = problems(tmp_path, TRAIN, ("[[supports]]", f"{supports}\n\n[[supports]]"))
-    assert "64 directions" in found["supports"]
+    assert "256 directions" in found["supports"]

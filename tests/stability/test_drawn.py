@@ -14,7 +14,7 @@ import pytest
 
 from evidence.stability.checks import common
 from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, SimulationError, SpecError
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import load_stage
@@ -133,7 +133,7 @@ def draw(seed: int) -> Draw:
 
 
 @lru_cache(maxsize=2)
-def bodies(stage: str) -> list[ReducedBody]:
+def bodies(stage: str) -> list[Body]:
     return load_bodies(load_stage(stage))
 
 

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 from scipy.interpolate import BarycentricInterpolator
 from scipy.optimize import brentq, minimize_scalar, root
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.spec.forms.general import Stage
 
@@ -26,7 +26,7 @@ class Pair:
     """A spur pair with drive flanks in contact, both axes in their places; position p in pitches."""
 
     spec: Stage
-    bodies: Sequence[ReducedBody]
+    bodies: Sequence[Body]
 
     @property
     def geometry(self) -> PairGeometry:
@@ -69,9 +69,11 @@ class Pair:
         torques and forces there. modes_only: what the stored modes alone give, Σ N Nᵀ/ω²."""
         total = np.zeros((slices, slices))
         for body, roll in zip(self.bodies, rolls, strict=True):
-            weights = slice_weights(slices, body.flank_rows.shape[2])
+            weights = slice_weights(slices, body.flank.rows.shape[2])
             flank, cross, bore = (_modal if modes_only else _static)(body, roll)
-            held = np.append(-_normal(body, roll), -body.r_b)  # force x, y and moment at the bore per unit slice force
+            held = np.append(
+                -_normal(body, roll), -body.flank.r_b
+            )  # force x, y and moment at the bore per unit slice force
             side = weights @ cross @ held
             total += weights @ flank @ weights.T + side[:, None] + side[None, :] + held @ bore @ held
         return total
@@ -153,31 +155,31 @@ def slice_weights(slices: int, functions: int) -> np.ndarray:
     return weights
 
 
-def _at(body: ReducedBody, roll: float, values: np.ndarray) -> np.ndarray:
+def _at(body: Body, roll: float, values: np.ndarray) -> np.ndarray:
     """`values` (R, …) given at the body's Chebyshev rolls, at this roll."""
-    return np.asarray(BarycentricInterpolator(body.roll, values)(roll))
+    return np.asarray(BarycentricInterpolator(body.flank.roll, values)(roll))
 
 
-def _normal(body: ReducedBody, roll: float) -> np.ndarray:
+def _normal(body: Body, roll: float) -> np.ndarray:
     """Outward normal (x, y) of the drive flank of tooth 0."""
-    t = body.psi_b - roll / body.r_b
+    t = body.flank.psi_b - roll / body.flank.r_b
     return np.array([-math.sin(t), math.cos(t)])
 
 
-def _static(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _static(body: Body, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(A, A) of a tooth's drive flank with itself, (A, 3) with the bore's x, y and rotation, (3, 3) of the bore, per N
     and N·m."""
-    flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
-    return flank, _at(body, roll, body.static_fb[DRIVE][:, :, BORE]), body.static_bb[np.ix_(BORE, BORE)]
+    flank = _at(body, roll, _at(body, roll, body.flank.static[DRIVE, DRIVE, 0]))
+    return flank, _at(body, roll, body.flank.node[DRIVE][:, :, BORE]), body.static[np.ix_(BORE, BORE)]
 
 
-def _modal(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    rows = _at(body, roll, body.flank_rows[DRIVE]) / (2 * math.pi * body.frequency)
-    bore = body.bore_rows[list(BORE)] / (2 * math.pi * body.frequency)
+def _modal(body: Body, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rows = _at(body, roll, body.flank.rows[DRIVE]) / (2 * math.pi * body.frequency)
+    bore = body.rows[list(BORE)] / (2 * math.pi * body.frequency)
     return rows @ rows.T, rows @ bore.T, bore @ bore.T
 
 
-def cut_near(body: ReducedBody, wish: float) -> float:
+def cut_near(body: Body, wish: float) -> float:
     """Frequency (Hz) in the middle of the widest relative gap between modes within 15 % of the wished cut."""
     near = body.frequency[(body.frequency < 1.2 * wish) & (body.frequency > 0.8 * wish)]
     gaps = [(high / low, math.sqrt(low * high)) for low, high in zip(near, near[1:], strict=False)
@@ -185,13 +187,13 @@ def cut_near(body: ReducedBody, wish: float) -> float:
     return max(gaps)[1]
 
 
-def bore_angle(body: ReducedBody, time: np.ndarray, cut: float, damped: bool) -> np.ndarray:
+def bore_angle(body: Body, time: np.ndarray, cut: float, damped: bool) -> np.ndarray:
     """Angle (rad) of the bore node of a free gear under a unit torque there from t = 0 on: rigid body, static share of
     the modes above `cut` (Hz), and every mode below it."""
     omega, zeta = 2 * math.pi * body.frequency, body.damping_ratio * damped
-    flexible = (body.bore_rows[RZ] / omega) ** 2
+    flexible = (body.rows[RZ] / omega) ** 2
     dynamic = body.frequency < cut
-    angle = 0.5 * time**2 / body.inertia[2, 2] + body.static_bb[RZ, RZ] - flexible[dynamic].sum()
+    angle = 0.5 * time**2 / body.inertia[2, 2] + body.static[RZ, RZ] - flexible[dynamic].sum()
     for k in np.flatnonzero(dynamic & (flexible > 0)):
         root_ = math.sqrt(1 - zeta[k] ** 2)
         phase = omega[k] * root_ * time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
@@ -22,7 +22,7 @@ def relief_spec() -> Stage:
 
 
 @pytest.fixture(scope="session")
-def bodies(spec: Stage) -> list[ReducedBody]:
+def bodies(spec: Stage) -> list[Body]:
     return load_bodies(spec)
 
 
@@ -32,12 +32,12 @@ def pair(spec: Stage) -> PairGeometry:
 
 
 @pytest.fixture(scope="session")
-def plain(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def plain(spec: Stage, bodies: list[Body]) -> StageModel:
     """No profile modification."""
     return assemble(spec, bodies)
 
 
 @pytest.fixture(scope="session")
-def relieved(relief_spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def relieved(relief_spec: Stage, bodies: list[Body]) -> StageModel:
     """Tip relief on both gears."""
     return assemble(relief_spec, bodies)

@@ -12,16 +12,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from handmade import mass_matrix, toothed
 
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body.body import Body, How, Node
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
+from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import set_geometries
@@ -195,7 +196,7 @@ def kernel_of(model: StageModel, library: Path | None = None, **parameters: floa
     return kernel
 
 
-def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
+def _gear(rigid: RigidSet, gear: Any, shape: Any) -> Body:
     """One invented mode far above everything, so weak that its products underflow: tables are not empty."""
     body: Rigid = getattr(rigid, gear.name)
     rolls, z, a = 4, gear.teeth, rigid.functions
@@ -205,63 +206,46 @@ def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
         for degree in range(a):  # a foundation: every place across the width yields by itself
             static[flank, flank, 0, ..., degree, degree] = 0.5 / rigid.mesh / (2 * degree + 1)
     polar = body.inertia * shape.r_b**2
-    return SimpleNamespace(
-        name=gear.name,
-        input_hash="0" * 64,
-        teeth=z,
-        r_b=shape.r_b,
-        face_width=gear.face_width,
-        strip_half_width=gear.body.strip_half_width,
-        width_functions=a,
-        roll=middle + half * np.cos((2 * np.arange(rolls) + 1) * np.pi / (2 * rolls)),
-        mass=body.mass,
-        inertia=np.diag([polar / 2, polar / 2, polar]),
+    flank = {
+        "teeth": z,
+        "r_b": shape.r_b,
+        "face_width": gear.face_width,
+        "strip_half_width": gear.body.strip_half_width,
+        "roll": middle - half * np.cos((2 * np.arange(rolls) + 1) * np.pi / (2 * rolls)),
+        "diameter": np.zeros(1, int),
+        "part": np.zeros(1, int),
+        "parity": np.zeros(1, int),
+        "rows": np.full((2, rolls, a, 1), WEAK),
+        "static": static,
+        "node": np.zeros((2, rolls, a, 6)),
+    }
+    return toothed(
+        gear.name,
+        flank,
+        mass_matrix(body.mass, np.diag([polar / 2, polar / 2, polar])),
         frequency=np.array([1e7]),
         damping_ratio=np.zeros(1),
-        nodal_diameter=np.zeros(1, int),
-        part=np.zeros(1, int),
-        parity=np.zeros(1, int),
-        flank_rows=np.full((2, rolls, a, 1), WEAK),
-        bore_rows=np.full((6, 1), WEAK),
-        static_ff=static,
-        static_fb=np.zeros((2, rolls, a, 6)),
-        static_bb=np.zeros((6, 6)),
+        rows=np.full((6, 1), WEAK),
+        static=np.zeros((6, 6)),
     )
 
 
-def _carrier(rigid: RigidSet) -> InterfaceBody:
+def _carrier(rigid: RigidSet) -> Body:
     """Its centre of mass, bore and bolts in the plane of the planets."""
     polar = rigid.carrier.inertia * rigid.distance**2
     angles = rigid.angles()
     point = np.vstack([np.zeros(3), np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1) * rigid.distance])
     names = ["bore", *(f"bolt{k}" for k in range(rigid.planets))]
-    directions = ["x", "y", "z", "rx", "ry", "rz"]
-    rows = []
-    for x, y, z in point:
-        own = np.eye(6)
-        own[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-        rows.append(own)
     m = 6 * len(point)
-    return InterfaceBody(
+    return Body(
         name="carrier",
-        input_hash="0" * 64,
-        method="rigid",
-        interfaces=tuple({"name": name, "kind": "rigid", "components": directions} for name in names),
-        ground=(),
-        material={},
-        mesh={},
-        provenance={},
-        rigid_mass=np.diag([rigid.carrier.mass] * 3 + [polar / 2, polar / 2, polar]),
-        point=point,
-        rigid_rows=np.vstack(rows),
+        how=How("0" * 64, "rigid"),
+        mass=np.diag([rigid.carrier.mass] * 3 + [polar / 2, polar / 2, polar]),
         frequency=np.zeros(0),
         damping_ratio=np.zeros(0),
+        nodes=tuple(Node(name, "rigid", COMPONENTS, place) for name, place in zip(names, point, strict=True)),
         rows=np.zeros((m, 0)),
         static=np.zeros((m, m)),
-        frf_frequency=np.array([1.0]),
-        frf_error=np.zeros(1),
-        length=1.0,
-        trusted_to=1e9,
     )
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gearfmu.body.bodies import reduce_body
-from gearfmu.body.mounted import mounted_frequencies
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
 from gearfmu.spec.stage import load_stage
@@ -32,7 +31,6 @@ def test_a_set_with_61_teeth_in_its_ring_is_reduced_and_moves(tmp_path: Path) ->
     )
     spec = rewritten(spec, **gears, carrier=plate)
     bodies = [reduce_body(spec, name) for name in (*gears, "carrier")]
-    assert mounted_frequencies(bodies[2])[0] > 500  # Hz: six mounts hold it in every direction
     model = assemble(spec, bodies)
     shares = set_te(model, [300.0], 2).sharing
     assert shares == pytest.approx(np.ones(shares.shape), abs=0.05)

@@ -32,8 +32,8 @@ def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
     sections = read_blob(assemble(spec, [body, load_bodies(spec)[1]]).blob)
     table = full_tables(sections, 0, ROLLS).residual
     gear = dict(zip(GEAR_NUMBERS, sections["gear0"], strict=True))
-    to_grid = resampling(body.roll, gear["s_form"], gear["s_tip"])
-    expected = to_grid @ (body.static_ff[0, 0, 1] - _by_ground_modes(body, 1))[:, :, 0, 0] @ to_grid.T
+    to_grid = resampling(body.flank.roll, gear["s_form"], gear["s_tip"])
+    expected = to_grid @ (body.flank.static[0, 0, 1] - _by_ground_modes(body, 1))[:, :, 0, 0] @ to_grid.T
     assert np.abs(table[0, 0, 4, :, :, 0, 0] - expected).max() < 1e-6 * np.abs(expected).max()  # single precision
     block = table[0, 0, 3, :, :, 0, 0]
     assert np.linalg.eigvalsh(0.5 * (block + block.T)).min() > -1e-6 * np.abs(block).max()  # steps of the body
@@ -51,7 +51,7 @@ def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
         flank = layout.bodies[g].flank
         assert flank is not None and sections[f"size{g}"][SIZES.index("mirrored")] == 1
         if not mirrored:
-            own = stage_layout(stage, bodies, points=[np.eye(body.roll.size) for body in bodies])
+            own = stage_layout(stage, bodies, points=[np.eye(body.flank.roll.size) for body in bodies])
             of_points = own.bodies[g].flank
             assert of_points is not None
             sections |= residual_sections(g, of_points.residual, sections["degrees"])
@@ -66,12 +66,12 @@ def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
 
 def _by_ground_modes(body, offset: int) -> np.ndarray:
     """(R, R, A, A), drive flank: what the body's modes of nodal diameter 0 and 1 carry from tooth 0 to `offset`."""
-    low = np.flatnonzero((body.nodal_diameter <= 1) & (body.parity >= 0))
-    rows, angle = body.flank_rows[0], 2 * np.pi * offset / body.teeth
-    there = rows * np.cos(body.nodal_diameter * angle)
-    for first in low[body.part[low] == 1]:
-        there[..., first] -= rows[..., first + 1] * np.sin(body.nodal_diameter[first] * angle)
-        there[..., first + 1] += rows[..., first] * np.sin(body.nodal_diameter[first] * angle)
+    low = np.flatnonzero((body.flank.diameter <= 1) & (body.flank.parity >= 0))
+    rows, angle = body.flank.rows[0], 2 * np.pi * offset / body.flank.teeth
+    there = rows * np.cos(body.flank.diameter * angle)
+    for first in low[body.flank.part[low] == 1]:
+        there[..., first] -= rows[..., first + 1] * np.sin(body.flank.diameter[first] * angle)
+        there[..., first + 1] += rows[..., first] * np.sin(body.flank.diameter[first] * angle)
     omega2 = (2 * np.pi * body.frequency[low]) ** 2
     return np.einsum("iak,jbk->ijab", rows[..., low] / omega2, there[..., low])
 
@@ -84,8 +84,8 @@ def test_bearings_are_damped_by_their_ratio_and_the_mass_of_the_body(spec):
     for index, body in enumerate(bodies):
         compliance, c = (sections[name].reshape(2, 2)[index] for name in ("support_compliance0", "damper0"))
         assert np.all(compliance == 1 / 3e8)
-        assert c == pytest.approx(2 * 0.03 * np.sqrt(3e8 * body.mass), rel=1e-12)
-    assert [body.mass for body in bodies] == pytest.approx([0.381, 0.885], rel=2e-3)
+        assert c == pytest.approx(2 * 0.03 * np.sqrt(3e8 * body.total_mass), rel=1e-12)
+    assert [body.total_mass for body in bodies] == pytest.approx([0.381, 0.885], rel=2e-3)
 
 
 def test_resampling_is_exact_for_polynomials():

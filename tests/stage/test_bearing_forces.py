@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import with_ports
@@ -22,7 +22,7 @@ SHAFTS = ("pinion", "wheel")
 
 
 @pytest.fixture(scope="module")
-def held(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def held(spec: Stage, bodies: list[Body]) -> StageModel:
     """A given torque on the pinion, the wheel's bore held."""
     ports = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}
     return assemble(with_ports(spec, ports), bodies)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from evidence.study.dashpot import own_path, same_loss
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import Steady, assemble
@@ -18,7 +18,7 @@ SPEED, LOAD = 628.0, 80.0  # rad/s, N·m on the pinion: near the mesh mode
 STEP, SETTLED, SAMPLES = 30e-6, 700, 1400
 
 
-def by_hand(spec: Stage, bodies: list[ReducedBody], force: float) -> float:
+def by_hand(spec: Stage, bodies: list[Body], force: float) -> float:
     """Local law (theory, eq. 7) of one tooth pair that carries `force`, and 95 % of what both teeth yield beyond their
     stored modes under 1 N over the width, mean over the roll, m/N."""
     pair, width = spec.written.geometry, min(gear.face_width for gear in spec.written.gears)
@@ -27,24 +27,27 @@ def by_hand(spec: Stage, bodies: list[ReducedBody], force: float) -> float:
     half_width = np.sqrt(2 * sum(local) * force / width / curvature)
     strips = [gear.body.strip_half_width for gear in spec.written.gears]
     law = sum(c * (np.log(4 * w / half_width) - 1.5) for c, w in zip(local, strips, strict=True)) / width
-    static = [body.static_ff[0, 0, 0].diagonal(axis1=0, axis2=1)[0, 0] for body in bodies]
-    modes = [((body.flank_rows[0, :, 0] / (2 * np.pi * body.frequency)) ** 2).sum(axis=1) for body in bodies]
+    static = [body.flank.static[0, 0, 0].diagonal(axis1=0, axis2=1)[0, 0] for body in bodies]
+    modes = [((body.flank.rows[0, :, 0] / (2 * np.pi * body.frequency)) ** 2).sum(axis=1) for body in bodies]
     return float(law + 0.95 * sum((s - m).mean() for s, m in zip(static, modes, strict=True)))
 
 
-def halved(body: ReducedBody) -> ReducedBody:
+def halved(body: Body) -> Body:
     """The same body with about half of its modes stored: cut in the widest gap near the middle."""
     middle = body.frequency.size // 2
     gaps = np.diff(np.log(body.frequency[middle - 8 : middle + 8]))
     n = middle - 8 + int(gaps.argmax()) + 1
-    stored = {
-        name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio", "nodal_diameter", "part", "parity")
-    }
-    rows = {"flank_rows": body.flank_rows[..., :n].copy(), "bore_rows": body.bore_rows[:, :n].copy()}
-    return replace(body, **stored, **rows, tangent=None, spin=None, shapes=None)
+    flank = replace(
+        body.flank,
+        **{name: getattr(body.flank, name)[:n] for name in ("diameter", "part", "parity")},
+        rows=body.flank.rows[..., :n].copy(),
+        tangent=None,
+    )
+    own = {name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio")}
+    return replace(body, **own, rows=body.rows[:, :n].copy(), flank=flank, spin=None, picture=None)
 
 
-def alternating(spec: Stage, bodies: list[ReducedBody]) -> np.ndarray:
+def alternating(spec: Stage, bodies: list[Body]) -> np.ndarray:
     model = assemble(spec, bodies)
     kernel, steady = model.kernel(level=1.0, h=3.75e-6), Steady(model, SPEED, LOAD)
     for name, value in steady(0.0).items():
@@ -59,13 +62,11 @@ def alternating(spec: Stage, bodies: list[ReducedBody]) -> np.ndarray:
     return te[SETTLED:] - te[SETTLED:].mean()
 
 
-def test_the_same_bodies_take_the_same_constant(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_the_same_bodies_take_the_same_constant(relief_spec: Stage, bodies: list[Body]) -> None:
     assert same_loss(relief_spec, bodies, bodies) == pytest.approx(relief_spec.written.contact.damping, rel=1e-14)
 
 
-def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(
-    relief_spec: Stage, bodies: list[ReducedBody]
-) -> None:
+def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(relief_spec: Stage, bodies: list[Body]) -> None:
     """By hand at the pitch point, load shared evenly by the slices of two tooth pairs: the mean over the path of
     contact is near it."""
     torque = 0.5 * relief_spec.written.torque_max
@@ -75,7 +76,7 @@ def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(
     assert have == pytest.approx(want, rel=0.1)
 
 
-def test_half_of_the_modes_lose_the_same_with_their_own_constant(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_half_of_the_modes_lose_the_same_with_their_own_constant(relief_spec: Stage, bodies: list[Body]) -> None:
     fewer = [halved(body) for body in bodies]
     torque = 0.5 * relief_spec.written.torque_max
     longer, path = (own_path(assemble(relief_spec, some), torque) for some in (fewer, bodies))

@@ -12,7 +12,7 @@ import pytest
 from by_hand import DRIVE, Pair, bore_angle
 
 from gearfmu import cli
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import with_ports
@@ -35,12 +35,12 @@ APART = HELD | {"effect.coast_flank": 0.0}
 
 
 @pytest.fixture(scope="module")
-def hand(spec: Stage, bodies: list[ReducedBody]) -> Pair:
+def hand(spec: Stage, bodies: list[Body]) -> Pair:
     return Pair(spec, bodies)
 
 
 @pytest.fixture(scope="module")
-def free(spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def free(spec: Stage, bodies: list[Body]) -> StageModel:
     """Given torques on both shafts."""
     ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
     return assemble(with_ports(spec, ports), bodies)
@@ -79,7 +79,7 @@ def test_elastic(plain: StageModel, hand: Pair) -> None:
 
 
 @pytest.mark.parametrize("level", [RIGID, STANDARD, FULL])
-def test_elastic_off_leaves_a_rigid_gear(free: StageModel, bodies: list[ReducedBody], level: float) -> None:
+def test_elastic_off_leaves_a_rigid_gear(free: StageModel, bodies: list[Body], level: float) -> None:
     """A sudden torque on a free gear: φ = τt²/2J, to rounding, at every level; no modes are left."""
     trace = spun(free, {"level": level, **APART, **STIFF})
     time, angle = turned(trace)
@@ -88,14 +88,14 @@ def test_elastic_off_leaves_a_rigid_gear(free: StageModel, bodies: list[ReducedB
 
 
 @pytest.mark.parametrize("level", [RIGID, STANDARD, FULL])
-def test_modes(free: StageModel, bodies: list[ReducedBody], level: float) -> None:
+def test_modes(free: StageModel, bodies: list[Body], level: float) -> None:
     """The bore of a free gear under a sudden torque: rigid body, static share at once, and the torsional modes below
     the cut of the level ring about theirs. Off (rigid): all of it is there at once."""
     cut = {RIGID: 0.0, STANDARD: free.stage.levels.standard_cut, FULL: math.inf}[level]
     assert elastic_angle_error(spun(free, {"level": level, **APART}), bodies[1], cut, damped=True) < 0.02
 
 
-def test_modal_damping(free: StageModel, bodies: list[ReducedBody]) -> None:
+def test_modal_damping(free: StageModel, bodies: list[Body]) -> None:
     """Off: the torsional modes ring without end; on: they decay with ζω."""
     for damped in (False, True):
         trace = spun(free, {"level": FULL, "effect.modal_damping": damped, **APART})
@@ -103,7 +103,7 @@ def test_modal_damping(free: StageModel, bodies: list[ReducedBody]) -> None:
         assert elastic_angle_error(trace, bodies[1], math.inf, not damped) > 0.05
 
 
-def elastic_angle_error(trace: Trace, body: ReducedBody, cut: float, damped: bool) -> float:
+def elastic_angle_error(trace: Trace, body: Body, cut: float, damped: bool) -> float:
     """Largest error of the bore's angle against theory, in parts of the largest elastic angle."""
     time, angle = turned(trace)
     acting = time > 1e-6
@@ -158,12 +158,12 @@ def test_slices(plain: StageModel, hand: Pair, slices: int) -> None:
         assert force == pytest.approx(LOAD / hand.geometry.gears[0].r_b / slices, rel=1e-4)
 
 
-def test_coast_flank(free: StageModel, bodies: list[ReducedBody], pair: PairGeometry) -> None:
+def test_coast_flank(free: StageModel, bodies: list[Body], pair: PairGeometry) -> None:
     """A torque parts the flanks. Off: the pinion turns on, φ = τt²/2J, through the backlash and beyond. On: until it
     has crossed the backlash, then no further than the coast flanks yield."""
     both = {on: spun(free, {**HELD, **STIFF, "effect.coast_flank": on}, 600e-6) for on in (0.0, 1.0)}
     time, _ = turned(both[0.0])
-    fall = -bodies[1].r_b * (SPEED * both[0.0].time + TORQUE * 0.5 * time**2 / bodies[1].inertia[2, 2])
+    fall = -bodies[1].flank.r_b * (SPEED * both[0.0].time + TORQUE * 0.5 * time**2 / bodies[1].inertia[2, 2])
     off, on = both[0.0]["mesh.te"], both[1.0]["mesh.te"]
     assert np.allclose(off, fall, rtol=1e-4, atol=1e-9) and fall[-1] < -3 * pair.normal_backlash
     met = np.argmax(fall < -pair.normal_backlash)
@@ -178,7 +178,7 @@ def test_contact_damping(free: StageModel, hand: Pair, damping: float) -> None:
     """Rigid gears on the linear law: one oscillator, m ÿ + c b ẏ + k y = F, after a step of the torque. Off: nothing
     decays."""
     (rolls,) = hand.rolls(0.0).values()
-    pinion, wheel = ((body.inertia[2, 2], body.r_b) for body in hand.bodies)
+    pinion, wheel = ((body.inertia[2, 2], body.flank.r_b) for body in hand.bodies)
     mass = 1 / (pinion[1] ** 2 / pinion[0] + wheel[1] ** 2 / wheel[0])
     stiffness = hand.width / hand.secant(rolls)
     omega = math.sqrt(stiffness / mass)

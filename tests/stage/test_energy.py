@@ -15,7 +15,7 @@ from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Steady, simulate
 
@@ -31,7 +31,7 @@ def libraries(double_library: Path) -> dict[str, Path | None]:
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: Stage, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 

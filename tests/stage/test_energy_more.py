@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.general import Stage
@@ -19,7 +19,7 @@ CENTRAL = 3
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: Stage, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.stability.planetary import ALL_MESHES, RATIO, PlanetSet, set_bodies, set_spec
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import rewritten
@@ -30,7 +30,7 @@ ON = {"effect.film": 1.0, "oil_viscosity": OIL["viscosity"], "film_roughness": O
 
 
 @pytest.fixture(scope="module")
-def pair_free(spec: Stage, bodies: list[ReducedBody]) -> FreePair:
+def pair_free(spec: Stage, bodies: list[Body]) -> FreePair:
     return free_pair(spec, bodies)
 
 
@@ -180,7 +180,7 @@ def test_thicker_oil_leaves_less_rebound(pair_free: FreePair) -> None:
     assert np.all(np.diff(left) < 0)
 
 
-def test_integrators_agree_on_a_light_run(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_integrators_agree_on_a_light_run(spec: Stage, bodies: list[Body]) -> None:
     model, found = assemble(spec, bodies), {}
     for integrator, h in ((DG4, 1e-6), (CENTRAL, 1e-6), (RK45, 1e-6)):
         run = {"level": 1.0, "integrator": integrator, "effect.film": 1.0, "h": h}
@@ -190,7 +190,7 @@ def test_integrators_agree_on_a_light_run(spec: Stage, bodies: list[ReducedBody]
     assert found[DG4] == pytest.approx(found[RK45], abs=0.05 * scale)
 
 
-def test_off_reads_nothing_of_the_oil(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_off_reads_nothing_of_the_oil(spec: Stage, bodies: list[Body]) -> None:
     model, bits = assemble(spec, bodies), []
     for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
         trace = simulate(model, Steady(model, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
@@ -199,7 +199,7 @@ def test_off_reads_nothing_of_the_oil(spec: Stage, bodies: list[ReducedBody]) ->
     assert bits[0] == bits[1]
 
 
-def test_statics_and_the_linearised_stage_know_no_film(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_statics_and_the_linearised_stage_know_no_film(spec: Stage, bodies: list[Body]) -> None:
     model, found = assemble(spec, bodies), []
     for on in (0.0, 1.0):
         kernel = model.kernel(**{"level": 1.0, "effect.film": on})
@@ -274,7 +274,7 @@ def test_a_planetary_set_runs_on_oil() -> None:
 
 
 # ---- what a stage says -----------------------------------------------------------------------------------------------
-def test_a_stage_file_turns_the_film_on(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_a_stage_file_turns_the_film_on(spec: Stage, bodies: list[Body]) -> None:
     own = FilmSpec(viscosity=0.05, roughness=2e-6)
     stage = rewritten(spec, contact=spec.written.contact.model_copy(update={"film": own}))
     kernel = assemble(stage, bodies).kernel()
@@ -282,6 +282,6 @@ def test_a_stage_file_turns_the_film_on(spec: Stage, bodies: list[ReducedBody]) 
     assert found == [1.0, 0.05, 2e-6]
 
 
-def test_nodal_contact_refuses_the_film(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_nodal_contact_refuses_the_film(spec: Stage, bodies: list[Body]) -> None:
     with pytest.raises(ModelError, match="lines of contact"):
         assemble(spec, bodies).kernel(**{"effect.film": 1.0, "level": 4.0}).prepare()

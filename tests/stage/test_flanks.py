@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from by_hand import Pair
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.relief import ReliefCurve
@@ -83,7 +83,7 @@ def gap_by_hand(spec: Stage, pair: PairGeometry, position: float) -> float:
 @pytest.mark.parametrize("name", PROFILES)
 @pytest.mark.parametrize("gear", [0, 1])
 def test_unloaded_te_is_the_gap_of_the_modified_profile(
-    name: str, gear: int, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
+    name: str, gear: int, spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
     """A linear relief's bend is rounded over one interval of the table: by an eighth of what it changes there."""
     update = PROFILES[name]
@@ -96,7 +96,7 @@ def test_unloaded_te_is_the_gap_of_the_modified_profile(
 
 
 def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_and_the_largest_gap(
-    spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
+    spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
     """Whatever the pairs share: pressed further by more than the largest gap they would carry more than the load, by
     less than the smallest less. Axes are held, so that the pinion's rolls have grown by te."""
@@ -117,7 +117,7 @@ def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_an
 
 
 def test_without_the_effect_flanks_are_nominal_to_the_last_bit(
-    spec: Stage, bodies: list[ReducedBody], plain: StageModel
+    spec: Stage, bodies: list[Body], plain: StageModel
 ) -> None:
     off = {"effect.flank_deviations": 0.0}
     modified = assemble(changed(spec, *list(PROFILES.values())[:2]), bodies)
@@ -146,7 +146,7 @@ def orders(te: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("gear", "teeth"), [(0, 16), (1, 24)])
 @pytest.mark.parametrize("torque", [0.1, 302.0])
 def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
-    gear: int, teeth: int, torque: float, spec: Stage, bodies: list[ReducedBody]
+    gear: int, teeth: int, torque: float, spec: Stage, bodies: list[Body]
 ) -> None:
     """The projection on the line of action is e sin(φ + …), all flanks of one side alike: amplitude e at the shaft
     order, loaded or not. What it turns the line of action by is of the order e²/a."""
@@ -157,7 +157,7 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
 
 
-def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: Stage, bodies: list[Body]) -> None:
     """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
     e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
     psi, pair = 0.7, spec.written.geometry
@@ -176,7 +176,7 @@ class Turn:
     true: np.ndarray
 
     @classmethod
-    def of(cls, spec: Stage, bodies: list[ReducedBody], positions: int, torque: float, e: float) -> Turn:
+    def of(cls, spec: Stage, bodies: list[Body], positions: int, torque: float, e: float) -> Turn:
         """Where the pinion's teeth lie at C, the pair is the true one at the centre distance |C_B − C|, turned by that
         line's angle, with the torque about C. True pairs at five distances, and the polynomial between them."""
         psi, pair = 0.7, spec.written.geometry
@@ -212,7 +212,7 @@ def lagrange(nodes: np.ndarray, k: int, at: float) -> float:
     return float(np.prod((at - others) / (nodes[k] - others)))
 
 
-def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle(bodies: list[ReducedBody]) -> None:
+def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle(bodies: list[Body]) -> None:
     """Of the shipped pair with relief, within 4 %, or 0.4 nm; the page's numbers to their digits. 16 positions a pitch
     would not do: mesh orders from 8 on are folded into the first ones."""
     spec = load_stage("fzg_c/stage_relief")
@@ -235,7 +235,7 @@ def test_an_eccentric_helical_pinion_is_a_true_one_at_another_place() -> None:
     assert np.abs(turn.eccentric - turn.true).max() < 20e-9 and np.ptp(turn.true) > 35e-6
 
 
-def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: Stage, bodies: list[Body]) -> None:
     """The pinion under a constant torque, the wheel's shaft end turning evenly; one turn of the pinion of two. The
     shaft's inertia and spring carry 32 Hz without resonance."""
     e, ports = 100e-6, spec.ports | {"pinion": PortSpec(kind="torque")}
@@ -256,7 +256,7 @@ def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: Stage, bodies: lis
     assert abs(trace["energy.residual"]).max() < 1e-3 * trace["energy.stored"].max()
 
 
-def test_without_the_effect_gears_run_true(spec: Stage, bodies: list[ReducedBody], plain: StageModel) -> None:
+def test_without_the_effect_gears_run_true(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
     model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6)}), bodies)
     off = {"effect.runout": 0.0}
     assert np.array_equal(loaded_te(model, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
@@ -264,7 +264,7 @@ def test_without_the_effect_gears_run_true(spec: Stage, bodies: list[ReducedBody
 
 # ---- wobble ----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("quarter", [0, 1])
-def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodies: list[Body]) -> None:
     """Wheel at rest at angle 0, its toothing leaning towards +x (from +z: the centre distance grows) or +y: the pair
     with that parallelism error, to the last digits."""
     tilt, span = 2e-4, 0.1
@@ -281,7 +281,7 @@ def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodi
     assert np.allclose(slices, same, rtol=1e-4, atol=1e-3) and np.ptp(slices[0]) > 0.05 * slices[0].mean()
 
 
-def test_a_wobble_tips_the_load_over_once_a_turn(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_a_wobble_tips_the_load_over_once_a_turn(spec: Stage, bodies: list[Body]) -> None:
     """The first slice's share swings as a cosine of the pinion's angle; its mean is that of true running."""
     model = assemble(changed(spec, {"wobble": Wobble(amount=1e-4)}), bodies)
     kernel = statics_of(model)
@@ -312,7 +312,7 @@ def crowned(shape: GearGeometry, width: float, roll: np.ndarray, z: np.ndarray) 
 
 
 def test_a_topography_is_the_same_flank_as_its_closed_form(
-    tmp_path: Path, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
+    tmp_path: Path, spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
     """A coarse file of a flank that is a parabola both ways: splines through its points are that parabola, so that
     table and transmission error are those of `profile` and `lead`. Across the width strips take means of straight
@@ -339,7 +339,7 @@ def test_a_topography_is_the_same_flank_as_its_closed_form(
     assert same[0] == pytest.approx(same[1], rel=1e-9)
 
 
-def test_one_tooth_of_a_topography_is_met_once_a_turn(tmp_path: Path, spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_one_tooth_of_a_topography_is_met_once_a_turn(tmp_path: Path, spec: Stage, bodies: list[Body]) -> None:
     """Tooth 3 of the pinion stands 5 µm out on its left flanks: te falls by 5 µm while it is in mesh, as if it were out
     of its place, and nowhere else; right flanks are driven the other way round and stay."""
     rows = ["tooth,flank,roll_mm,z_mm,deviation_um"]
@@ -386,7 +386,7 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     assert te == pytest.approx(found, abs=0.3e-6)
 
 
-def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: Stage, bodies: list[Body]) -> None:
     """Lead and profile crowning as said and as a topography: nodes of flanks run alike; and not as without."""
     pair = spec.written.geometry
     shape, gear = pair.gears[0], spec.written.gears[0]
@@ -403,7 +403,7 @@ def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: Stage, bodies:
     assert runs[0] == pytest.approx(runs[1], abs=2e-9) and np.abs(runs[0] - runs[2]).max() > 0.5e-6
 
 
-def test_end_relief_kinds(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_end_relief_kinds(spec: Stage, bodies: list[Body]) -> None:
     """Depth of the lead's table at the ends and half way in."""
     for kind, halfway in (("linear", 0.5), ("parabolic", 0.25), ("arc", 0.25)):
         relief = EndRelief(amount=8e-6, length=spec.written.gears[0].face_width / 8, kind=kind)
@@ -423,7 +423,7 @@ def test_te_over_several_pitches_is_that_of_one_after_the_other(plain: StageMode
     assert two.harmonics(3) == pytest.approx(one.harmonics(3), rel=1e-6)
 
 
-def test_the_kernel_refuses_what_are_no_deviations(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_the_kernel_refuses_what_are_no_deviations(spec: Stage, bodies: list[Body]) -> None:
     update = {"profile": ProfileSpec(slope=4e-6), "eccentricity": Eccentricity(amount=5e-6)}
     sections = read_blob(assemble(changed(spec, update), bodies).blob)
     size, depth = np.asarray(sections["flank_size0"]), np.asarray(sections["flank0"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.forms.general import Stage
@@ -27,7 +27,7 @@ TORQUE, SPEED, RATIO = 302.0, 200.0, 24 / 16  # of the pair: N·m and rad/s of t
 
 
 @pytest.fixture(scope="module")
-def pair(relief_spec: Stage, bodies: list[ReducedBody]) -> StageModel:
+def pair(relief_spec: Stage, bodies: list[Body]) -> StageModel:
     return assemble(with_ports(relief_spec, {"pinion": GIVEN, "wheel": GIVEN}), bodies)
 
 

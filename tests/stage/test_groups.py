@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from gearfmu.stage.build.assembly import assemble, general_sections
 from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.compact import ground_rows
-from gearfmu.stage.build.free import read_tables, turn_tables
+from gearfmu.stage.build.ground_part import read_tables, turn_tables
 from gearfmu.stage.build.groups import SPIN, mount
 from gearfmu.stage.build.layout import stage_layout
 from gearfmu.stage.build.tables import OFFSETS, blend, resampling, symmetric_functions
@@ -68,10 +68,10 @@ class Direct:
     def __init__(self, body, shape, loads, angle, compliance):
         self.shape, self.body, self.angle = shape, body, angle
         degrees = symmetric_functions(5)
-        grid = resampling(body.roll, shape.s_form, shape.s_tip)
-        step = 2 * np.pi / body.teeth
-        static = blend(grid, blend(grid, body.static_ff[..., degrees, :][..., degrees], 3), 4)
-        bore = blend(grid, body.static_fb[:, :, degrees], 1)
+        grid = resampling(body.flank.roll, shape.s_form, shape.s_tip)
+        step = 2 * np.pi / body.flank.teeth
+        static = blend(grid, blend(grid, body.flank.static[..., degrees, :][..., degrees], 3), 4)
+        bore = blend(grid, body.flank.node[:, :, degrees], 1)
         n = len(loads)
         self.c = np.zeros((n + 3, n + 3))  # flanks, moment, bore x, y
         for i, (j, f, p, a) in enumerate(loads):
@@ -80,7 +80,7 @@ class Direct:
             x, y, about = bore[f, p, a][[0, 1, SPIN]]
             self.c[i, n] = self.c[n, i] = about
             self.c[i, n + 1 :] = self.c[n + 1 :, i] = turn(j * step) @ [x, y]
-        self.c[n:, n:] = body.static_bb[np.ix_([SPIN, 0, 1], [SPIN, 0, 1])]
+        self.c[n:, n:] = body.static[np.ix_([SPIN, 0, 1], [SPIN, 0, 1])]
         normals = [normal(shape, load, load[0] * step) * (load[3] == 0) for load in loads]
         self.rigid = np.vstack([*normals, np.zeros((1, 2)), np.eye(2)])
         self.spring = turn(-angle) @ compliance @ turn(angle)
@@ -90,7 +90,7 @@ class Direct:
         axes."""
         c = self.c if dynamic is None else self.c + dynamic
         n = len(c) - 2
-        inertia = -(omega**2) * self.body.mass * np.eye(2)
+        inertia = -(omega**2) * self.body.total_mass * np.eye(2)
         # unknowns: translation, force on the body at its bore
         system = np.block([[inertia, -np.eye(2)], [np.eye(2), c[n:, n:] + self.spring]])
         load = np.vstack([self.rigid[:n].T, -c[n:, :n]])
@@ -103,7 +103,7 @@ class Grouped:
     """The same answer from the sections of a gear and a set."""
 
     def __init__(self, body, shape, group, index, loads, angle):
-        step, flank = 2 * np.pi / body.teeth, group.layout.bodies[index].flank
+        step, flank = 2 * np.pi / body.flank.teeth, group.layout.bodies[index].flank
         rows, supports = group.flank_rows(index), group.flank_supports(index)
         turning, node, n = [], flank.node[0], len(loads)
         self.w, c_s, c_p = [], [], []
@@ -114,7 +114,7 @@ class Grouped:
             self.w.append(centre + e)
             c_s.append(read_tables(supports[:, f, p, a], psi))
             c_p.append(node[f, p, a, SPIN])
-            member, nu = body.part[flank.chosen], body.nodal_diameter[flank.chosen]
+            member, nu = body.flank.part[flank.chosen], body.flank.diameter[flank.chosen]
             tables = turn_tables(flank.turning[f, p, a], member)
             tables[0][member == 0] *= np.cos(nu[member == 0] * j * step)
             turning.append(tables[0] + tables[1] * np.cos(nu * j * step) + tables[2] * np.sin(nu * j * step))
@@ -162,7 +162,7 @@ def test_held_frequencies_are_zeros_of_the_free_body_s_compliance_at_the_bore(la
     row, static = place @ free.rows[0], place @ free.residual @ place
 
     def compliance(x):
-        return static - 1 / (body.mass * x**2) + (row**2 / (free.omega**2 - x**2)).sum()
+        return static - 1 / (body.total_mass * x**2) + (row**2 / (free.omega**2 - x**2)).sum()
 
     poles = np.unique(np.round(np.concatenate([[1e3], free.omega[np.abs(row) > 1e-3]]), 3))
     zeros = [
@@ -221,7 +221,7 @@ def test_sections_hold_the_groups(spec, bodies, layout):
     want = group.flank_rows(1)[..., read]
     assert np.abs(rows - want).max() < 1e-13 * np.abs(want).max()
     assert np.all(np.diff(sections["omega_ground0"]) >= 0) and np.all(np.diff(sections["omega0"]) >= 0)
-    masses = [body.mass for body in bodies]
+    masses = [body.total_mass for body in bodies]
     assert sections["damper0"] == pytest.approx(2 * 0.03 * np.sqrt(3e8 * np.repeat(masses, 2)))
     assert not sections["damper_rows1"].any()
     assert sections["displacement_names"] == "pinion.gear.x|pinion.gear.y|wheel.gear.x|wheel.gear.y"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
@@ -48,7 +48,7 @@ def stage_at(beta: float) -> Stage:
 
 
 @lru_cache(maxsize=4)
-def bodies_at(beta: float) -> tuple[ReducedBody, ...]:
+def bodies_at(beta: float) -> tuple[Body, ...]:
     return tuple(reduced_gear(member, "0" * 64) for member in members(stage_at(beta)).values())
 
 

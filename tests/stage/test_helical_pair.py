@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import rewritten, with_ports
 from gearfmu.spec.forms.general import Stage
@@ -105,9 +105,7 @@ def with_bearings(spec: Stage) -> Stage:
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0])
-def test_spur_gears_that_may_tilt_are_those_that_may_not(
-    relief_spec: Stage, bodies: list[ReducedBody], level: float
-) -> None:
+def test_spur_gears_that_may_tilt_are_those_that_may_not(relief_spec: Stage, bodies: list[Body], level: float) -> None:
     """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give."""
     planar = assemble(with_ports(relief_spec, HELD), bodies)
     spatial = assemble(with_bearings(relief_spec), bodies)
@@ -123,7 +121,7 @@ def test_spur_gears_that_may_tilt_are_those_that_may_not(
     assert results[1] == pytest.approx(results[0], rel=1e-6)
 
 
-def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: Stage, bodies: list[Body]) -> None:
     """The same bodies on flanks of 1e-10 rad: the rows of the kernel go over continuously."""
     spur = assemble(with_bearings(relief_spec), bodies)
     blobs = dict(read_blob(spur.blob))
@@ -146,7 +144,7 @@ def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.nda
 
 
 @pytest.mark.parametrize("change", ["slope", "out_of_plane", "in_plane"])
-def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[ReducedBody], change: str) -> None:
+def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Body], change: str) -> None:
     """A helix slope of f over the face width opens one end of the flanks as much as axes out of parallel that are
     turned about the direction across the line of action; the other end carries more."""
     spec = with_bearings(relief_spec)

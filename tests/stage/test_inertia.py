@@ -28,12 +28,10 @@ def test_sizes_of_a_small_gear() -> None:
     modes = elastic_modes(body, 16)
     shown = SimpleNamespace(
         spin=modes.spin,
-        part=modes.part,
         frequency=modes.frequency,
         modes=modes.frequency.size,
-        roll=np.zeros(4),
         inertia=body.inertia[3:, 3:],
-        static_ff=np.full((2, 2, 12, 4, 4, 3, 3), 1e-9),
+        toothed=SimpleNamespace(part=modes.part, roll=np.zeros(4), static=np.full((2, 2, 12, 4, 4, 3, 3), 1e-9)),
     )
     slow, fast = (gear_inertia("gear", shown, speed, force, 1e6) for speed in (500.0, 1000.0))
     assert slow is not None and fast is not None

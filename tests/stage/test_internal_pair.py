@@ -14,7 +14,7 @@ from by_hand import BORE, _at, slice_weights
 from inner import Inner
 from scipy.optimize import minimize, minimize_scalar
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
@@ -58,12 +58,12 @@ def mesh(stage: Stage) -> RingMesh:
 
 
 @pytest.fixture(scope="module")
-def bodies(stage: Stage) -> list[ReducedBody]:
+def bodies(stage: Stage) -> list[Body]:
     return [reduced_gear(member, "0" * 64) for member in members(stage).values()]
 
 
 @pytest.fixture(scope="module")
-def model(stage: Stage, bodies: list[ReducedBody]) -> StageModel:
+def model(stage: Stage, bodies: list[Body]) -> StageModel:
     return assemble(stage, bodies)
 
 
@@ -337,13 +337,13 @@ def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMe
     assert result.te[0, alone] == pytest.approx(force * total + local, rel=4e-3)  # slices share unevenly
 
 
-def held_compliance(body: ReducedBody, roll: float, hollow: int) -> float:
+def held_compliance(body: Body, roll: float, hollow: int) -> float:
     """m/N of the drive flank of tooth 0 under a load uniform over the width, the bore (hollow −1: the rim) held."""
-    weights = slice_weights(5, body.flank_rows.shape[2])
-    flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
-    cross, bore = _at(body, roll, body.static_fb[DRIVE][:, :, BORE]), body.static_bb[np.ix_(BORE, BORE)]
-    t = body.psi_b - roll / body.r_b
-    held = -hollow * np.array([-math.sin(t), math.cos(t), body.r_b])
+    weights = slice_weights(5, body.flank.rows.shape[2])
+    flank = _at(body, roll, _at(body, roll, body.flank.static[DRIVE, DRIVE, 0]))
+    cross, bore = _at(body, roll, body.flank.node[DRIVE][:, :, BORE]), body.static[np.ix_(BORE, BORE)]
+    t = body.flank.psi_b - roll / body.flank.r_b
+    held = -hollow * np.array([-math.sin(t), math.cos(t), body.flank.r_b])
     side = weights @ cross @ held
     return float(np.mean(weights @ flank @ weights.T + side[:, None] + side[None, :] + held @ bore @ held))
 

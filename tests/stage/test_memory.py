@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import instance
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
@@ -40,19 +40,14 @@ def test_nothing_is_written_beyond_the_buffers(monkeypatch: pytest.MonkeyPatch, 
         assert ctypes.string_at(end, GUARD) == bytes([PATTERN]) * GUARD
 
 
-def of_few_modes(body: ReducedBody) -> ReducedBody:
+def of_few_modes(body: Body) -> Body:
     """The body with its first dozen modes."""
-    count = 12 if body.part[12] != 2 else 11
-    return replace(
-        body,
-        frequency=body.frequency[:count],
-        damping_ratio=body.damping_ratio[:count],
-        nodal_diameter=body.nodal_diameter[:count],
-        part=body.part[:count],
-        parity=body.parity[:count],
-        flank_rows=body.flank_rows[..., :count],
-        bore_rows=body.bore_rows[:, :count],
+    n = 12 if body.flank.part[12] != 2 else 11
+    flank = replace(
+        body.flank,
+        **{name: getattr(body.flank, name)[:n] for name in ("diameter", "part", "parity")},
+        rows=body.flank.rows[..., :n].copy(),
         tangent=None,
-        spin=None,
-        shapes=None,
     )
+    own = {name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio")}
+    return replace(body, **own, rows=body.rows[:, :n].copy(), flank=flank, spin=None, picture=None)

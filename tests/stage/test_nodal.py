@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evidence.energy.free import Rattle, energies, free_pair, started
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
@@ -42,7 +42,7 @@ def test_default_penalty_gives_hertz_half_width(relief_spec: Stage, pair: PairGe
     assert [flank_nodes(stage, gear) for gear in stage.gears] == [(41, 13), (41, 13)]
 
 
-def rigid_error(spec: Stage, bodies: list[ReducedBody], along: int, nodes_of: str = "both") -> float:
+def rigid_error(spec: Stage, bodies: list[Body], along: int, nodes_of: str = "both") -> float:
     """Largest error of the force (share of the largest) while rigid teeth meet and part, one pair in contact."""
     pair = spec.written.geometry
     a = pair.gears[0]
@@ -62,7 +62,7 @@ def rigid_error(spec: Stage, bodies: list[ReducedBody], along: int, nodes_of: st
     return float(np.abs(force - exact).max() / force.max())
 
 
-def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[Body]) -> None:
     """f = 4/3 b k √(2R) δ^(3/2): the error falls with the distance of the nodes, of one gear or of both."""
     errors = {along: rigid_error(spec, bodies, along) for along in (41, 161, 513)}
     one_sided = rigid_error(spec, bodies, 513, "a")
@@ -71,7 +71,7 @@ def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[Reduce
 
 
 @pytest.mark.parametrize("elastic", [0.0, 1.0])
-def test_energy_through_impacts_on_both_flanks(spec: Stage, bodies: list[ReducedBody], elastic: float) -> None:
+def test_energy_through_impacts_on_both_flanks(spec: Stage, bodies: list[Body], elastic: float) -> None:
     """Undamped free rattle, places of contact moving: what is left is the error of the integrator, which central
     differences have at second order (tests/kernel/test_nodal_blocks.py)."""
     free = free_pair(with_nodes(spec, along=81), bodies)
@@ -92,7 +92,7 @@ def mean_te(model: StageModel, torque: float, **parameters: float) -> tuple[floa
     return float(trace["mesh.te"][-200:].mean()), float(trace["mesh.force"][-200:].mean())
 
 
-def test_mean_transmission_is_that_of_line_contact(relief_spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_mean_transmission_is_that_of_line_contact(relief_spec: Stage, bodies: list[Body]) -> None:
     """Same truncated modes, one mesh period: 81 nodes against five slices with the local law of Hertz. Measured: 0.2 %
     of the mean transmission error, 0.1 % of the mean force."""
     model = assemble(with_nodes(relief_spec, along=81), bodies)

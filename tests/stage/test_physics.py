@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
@@ -25,7 +25,7 @@ SPEED = 15.0  # rad/s of the pinion before free rattle
 UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 
-def free(spec: Stage, bodies: list[ReducedBody], bearing_damping: float) -> StageModel:
+def free(spec: Stage, bodies: list[Body], bearing_damping: float) -> StageModel:
     """Both shafts free, torque ports; bearings with the damping ratio given."""
     gears = tuple(
         gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})})
@@ -36,11 +36,11 @@ def free(spec: Stage, bodies: list[ReducedBody], bearing_damping: float) -> Stag
 
 
 def rattle(
-    model: StageModel, bodies: list[ReducedBody], duration: float = 0.03, speed: float = SPEED, **parameters: float
+    model: StageModel, bodies: list[Body], duration: float = 0.03, speed: float = SPEED, **parameters: float
 ) -> Trace:
     """Gears thrown together, the pinion at `speed` in rad/s, so that they bounce between drive and coast flanks where
     they are: their momenta along the mesh cancel."""
-    pinion, wheel = ((body.inertia[2, 2], body.r_b) for body in bodies)
+    pinion, wheel = ((body.inertia[2, 2], body.flank.r_b) for body in bodies)
     start = {"pinion.w_start": speed, "wheel.w_start": speed * pinion[0] / pinion[1] * wheel[1] / wheel[0]}
     return simulate(model, lambda time: {}, duration, 30e-6, {"level": FAST, "h": 5e-6, **start, **parameters})
 
@@ -59,7 +59,7 @@ def compliance(model: StageModel, positions: float | np.ndarray, torque: float, 
 
 @pytest.mark.parametrize("level, h", [(0, 7.5e-6), (1, 5e-6), (1, 7.5e-6), (2, 5e-6)])
 def test_free_rattle_keeps_its_energy_and_its_backlash(
-    spec: Stage, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float
+    spec: Stage, bodies: list[Body], pair: PairGeometry, level: int, h: float
 ) -> None:
     """Some 80 impacts without damping, from three speeds: how often they meet in one run is chance. The energy goes up
     and down with the place on the flanks where the gears meet, by the same at every step size: rows depend on the roll,
@@ -81,7 +81,7 @@ def test_free_rattle_keeps_its_energy_and_its_backlash(
     assert np.median(impacts) > 40
 
 
-def test_energy_of_free_rattle_does_not_run_away(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_energy_of_free_rattle_does_not_run_away(spec: Stage, bodies: list[Body]) -> None:
     """Five times as long: the same bounds, no trend."""
     stored = rattle(free(spec, bodies, 0.0), bodies, duration=0.15, **UNDAMPED)["energy.stored"][1:]
     first, last = np.array_split(stored / stored[0], 5)[::4]
@@ -89,7 +89,7 @@ def test_energy_of_free_rattle_does_not_run_away(spec: Stage, bodies: list[Reduc
     assert np.ptp(stored) < 2e-3 * stored[0] and abs(last.mean() - first.mean()) < 5e-4
 
 
-def test_damping_only_ever_takes_energy(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_damping_only_ever_takes_energy(spec: Stage, bodies: list[Body]) -> None:
     trace = rattle(free(spec, bodies, 0.03), bodies)
     stored = trace["energy.stored"][1:]
     assert np.diff(stored).max() < 1e-6 * stored[0] and stored[-1] < 0.9 * stored[0]
@@ -99,7 +99,7 @@ def test_damping_only_ever_takes_energy(spec: Stage, bodies: list[ReducedBody]) 
     )
 
 
-def test_coast_flank_off(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_coast_flank_off(spec: Stage, bodies: list[Body]) -> None:
     trace = rattle(free(spec, bodies, 0.03), bodies, **{"effect.coast_flank": 0.0})
     assert np.all(trace["mesh.force_coast"] == 0) and trace["mesh.te"].min() < -1e-3  # one impact, then apart for good
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
@@ -36,13 +36,13 @@ def with_deviations(spec: Stage, *tables: dict[int, float]) -> Stage:
     return rewritten(spec, gears=gears)
 
 
-def light_te(spec: Stage, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT) -> np.ndarray:
+def light_te(spec: Stage, bodies: list[Body], *tables: dict[int, float], torque: float = LIGHT) -> np.ndarray:
     return loaded_te(assemble(with_deviations(spec, *tables), bodies), [torque], POSITIONS).te[0]
 
 
 @pytest.mark.parametrize("gear", [0, 1])
 def test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh(
-    gear: int, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
+    gear: int, spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
     """Unloaded te is −F_pi cos α as long as tooth 0 is on its flank, 0 once only its neighbour is in mesh, and never
     below; in mesh for the contact ratio less the stretch at the other end where the neighbours have not come yet."""
@@ -58,7 +58,7 @@ def test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh(
 
 @pytest.mark.parametrize("gear", [0, 1])
 def test_a_receding_tooth_matters_only_where_it_is_alone(
-    gear: int, spec: Stage, bodies: list[ReducedBody], pair: PairGeometry
+    gear: int, spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
     """Neighbours take over before the pinion has moved by F_pi cos α: their tip corners reach in from off the line of
     action."""
@@ -69,7 +69,7 @@ def test_a_receding_tooth_matters_only_where_it_is_alone(
     assert np.mean(np.abs(te) < 2e-9) > pair.contact_ratio - 1 and te.max() > 0.2 * ALONG_NORMAL
 
 
-def test_coast_flanks_see_the_other_side(spec: Stage, bodies: list[ReducedBody], pair: PairGeometry) -> None:
+def test_coast_flanks_see_the_other_side(spec: Stage, bodies: list[Body], pair: PairGeometry) -> None:
     """The flank that leads on the drive side trails on the coast side: what protrudes there has a negative sign."""
     te = light_te(spec, bodies, {0: -DEVIATION}, {}, torque=-LIGHT)
     held = np.abs(te + pair.normal_backlash - ALONG_NORMAL) < 5e-9
@@ -78,7 +78,7 @@ def test_coast_flanks_see_the_other_side(spec: Stage, bodies: list[ReducedBody],
     assert np.all(receding < -pair.normal_backlash + 5e-9)
 
 
-def test_deviations_of_mating_teeth_cancel(spec: Stage, bodies: list[ReducedBody], plain: StageModel) -> None:
+def test_deviations_of_mating_teeth_cancel(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
     """A wheel tooth that gives way by as much as the pinion's protrudes: the pair runs as if both were in place, but
     for the slight roll along the flanks."""
     te = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {0: -DEVIATION}), bodies), [LOAD], 16).te[0]
@@ -87,14 +87,14 @@ def test_deviations_of_mating_teeth_cancel(spec: Stage, bodies: list[ReducedBody
 
 
 def test_a_protruding_tooth_carries_all_until_its_deflection_brings_the_next_one_in(
-    spec: Stage, bodies: list[ReducedBody]
+    spec: Stage, bodies: list[Body]
 ) -> None:
     result = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {}), bodies), [80.0, 1500.0], 16)
     tooth_0 = result.shares[:, :4, 2]
     assert np.all(tooth_0[0] == 1.0) and np.all(tooth_0[1] < 1.0)
 
 
-def test_all_teeth_out_by_the_same_are_a_turned_gear(spec: Stage, bodies: list[ReducedBody], plain: StageModel) -> None:
+def test_all_teeth_out_by_the_same_are_a_turned_gear(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
     """But for the elastic rows, which stay with the teeth's nominal places and directions (F_pi/r = 1.4 mrad)."""
     tables = ({k: DEVIATION for k in range(TEETH[0])}, {})
     te = loaded_te(assemble(with_deviations(spec, *tables), bodies), [LOAD], 16).te[0]
@@ -102,7 +102,7 @@ def test_all_teeth_out_by_the_same_are_a_turned_gear(spec: Stage, bodies: list[R
 
 
 def test_bodies_and_models_without_deviations_are_what_they_were(
-    spec: Stage, bodies: list[ReducedBody], plain: StageModel
+    spec: Stage, bodies: list[Body], plain: StageModel
 ) -> None:
     changed = with_deviations(spec, {3: DEVIATION}, {})
     assert [body_hash(body_inputs(changed, name)) for name in ("pinion", "wheel")] == [
@@ -113,7 +113,7 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
     assert all(np.array_equal(none[name], own[name]) for name in own if name not in ("made_of", "guid"))
 
 
-def test_the_kernel_refuses_what_are_no_index_deviations(spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_the_kernel_refuses_what_are_no_index_deviations(spec: Stage, bodies: list[Body]) -> None:
     sections = read_blob(assemble(with_deviations(spec, {3: DEVIATION}, {}), bodies).blob)
     angles = sections["index0"]
     for wrong in (angles[:-1], np.append(angles, 0.0), np.full(angles.size, 0.1)):

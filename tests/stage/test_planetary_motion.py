@@ -60,7 +60,7 @@ def test_energy_is_kept_through_changes_of_contact(
 def test_pins_hold_the_planets_against_their_centrifugal_load(model: StageModel) -> None:
     """m a Ω² outward, at once and exactly: the set is unloaded, no mesh touches."""
     planet, radius, speed = load_bodies(load_stage("planetary54"))[1], 0.045, 85.0
-    load = planet.mass * radius * speed**2
+    load = planet.total_mass * radius * speed**2
     for on in (1.0, 0.0):
         kernel = started(model, 0.0, speed, 4 * speed, **{"effect.centrifugal": on})
         outward = [kernel.get("pin.planet1.fx"), kernel.get("pin.planet2.fy"), -kernel.get("pin.planet3.fx")]

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody
+from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import with_ports
@@ -157,7 +157,7 @@ def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
         assert np.abs(found).max() < 2e-5 and np.median(np.abs(found)) < 2e-6
 
 
-def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[ReducedBody]) -> None:
+def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[Body]) -> None:
     """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
     chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
     ports = {shaft: port.model_copy(update={"chain": chain}) for shaft, port in spec.ports.items()}
@@ -190,9 +190,7 @@ def test_tip_relief_unloads_the_ends_of_contact(plain: StageModel, relieved: Sta
 
 
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
-def test_smooth_over_the_pitch(
-    name: str, torque: float, spec: Stage, relief_spec: Stage, bodies: list[ReducedBody]
-) -> None:
+def test_smooth_over_the_pitch(name: str, torque: float, spec: Stage, relief_spec: Stage, bodies: list[Body]) -> None:
     """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the
     tip corners have real harmonics, and the grid of rolls must not add to them."""
     chosen = {"relieved": relief_spec, "plain": spec}[name]

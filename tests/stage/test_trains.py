@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.linalg as sl
+from handmade import on_axis
 
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
-from gearfmu.stage.build.free import FreeBody, free_gear, free_shaft, read_tables
+from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part, read_tables
 from gearfmu.stage.build.groups import Layout, Support, mount, node_directions
 from gearfmu.stage.build.tables import OFFSETS, resampling
 
@@ -29,7 +30,7 @@ ALL = (0, 1, 2, 3, 4, 5)
 def disc(name, mass, across, polar):
     """A rigid body: no modes, no residual."""
     inertia = np.diag([mass, mass, mass, across, across, polar])
-    return FreeBody(name, inertia, np.zeros(0), np.zeros(0), np.zeros(1), np.zeros((1, 6, 0)), np.zeros((6, 6)))
+    return GroundPart(name, inertia, np.zeros(0), np.zeros(0), on_axis(0.0), np.zeros((1, 6, 0)), np.zeros((6, 6)))
 
 
 def seat(name, first, second):
@@ -41,7 +42,7 @@ def bearing(name, first, stiffness=BEARING):
 
 
 def train(cut):
-    bodies = [free_shaft(f"shaft{i}", reduce_shaft(shaft, cut), 0.01) for i, shaft in enumerate(SHAFTS)]
+    bodies = [ground_part(reduce_shaft(shaft, cut, None, f"shaft{i}", 0.01)) for i, shaft in enumerate(SHAFTS)]
     bodies += [disc(f"disc{i}", *numbers) for i, (_, _, *numbers) in enumerate(DISCS)]
     supports = [seat(f"seat{i}", (2 + i, 0), (s, node)) for i, (s, node, *_) in enumerate(DISCS)]
     supports += [bearing(f"bearing{i}", end) for i, end in enumerate(BEARINGS)]
@@ -131,7 +132,7 @@ def load_rows(shape, body, load, psi):
     s = np.linspace(shape.s_form, shape.s_tip, 12)[roll]
     t = psi + sign * (shape.psi_b - s / shape.r_b)
     n = sign * np.array([-np.sin(t), np.cos(t), 0.0])
-    along = body.face_width / 6 * (degree == 1)
+    along = body.flank.face_width / 6 * (degree == 1)
     about = np.array([-n[1], n[0], 0.0]) * along + np.array([0, 0, sign * shape.r_b]) * (degree == 0)
     return np.concatenate([n * (degree == 0), about])
 
@@ -142,12 +143,12 @@ def unreduced(layout, loads, rigid_of_load, compliance):
     n, bodies = len(loads), len(layout.bodies)
     c_ll, c_ln = compliance
     support_rigid = np.hstack(
-        [node_directions(layout, b) @ np.vstack([body.rigid_rows(k) for k in range(len(body.place))])
+        [node_directions(layout, b) @ np.vstack([node.rigid_rows for node in body.nodes])
          for b, body in enumerate(layout.bodies)]
     )  # fmt: skip
     yields = sl.block_diag(*[s.compliance for s in layout.supports])
     for b, body in enumerate(layout.bodies):
-        rows = body.rows.reshape(6 * len(body.place), body.omega.size)
+        rows = body.rows.reshape(6 * len(body.nodes), body.omega.size)
         static = body.residual + rows / body.omega**2 @ rows.T
         yields = yields + node_directions(layout, b) @ static @ node_directions(layout, b).T
     spins = np.zeros((6 * bodies, len(layout.rotors)))
@@ -177,9 +178,9 @@ def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair
     """Statics in space: gear of finite elements, rigid seat, stepped shaft, two bearings with tilt, disc on the same
     shaft."""
     body, shape, rolls, step = bodies[0], pair.gears[0], 12, 2 * np.pi / 16
-    grid, degrees = resampling(body.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
-    gear = free_gear(body, np.arange(body.modes), degrees, grid)
-    shaft = free_shaft("shaft", reduce_shaft(SHAFTS[1], 60e3), 0.01)
+    grid, degrees = resampling(body.flank.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
+    gear = ground_part(body, Reading(np.arange(body.modes), degrees, grid))
+    shaft = ground_part(reduce_shaft(SHAFTS[1], 60e3, damping_ratio=0.01))
     supports = [seat("seat.gear", (1, 0), (0, 1)), seat("seat.disc", (2, 0), (0, 2))]
     supports += [bearing("b1", (0, 0)), bearing("b2", (0, 3))]
     layout = Layout([shaft, gear, disc("disc", *DISCS[2][2:])], [(0, 1, 2)], supports, planar=False)
@@ -193,9 +194,9 @@ def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair
     for i, (j, f, p, a) in enumerate(LOADS):
         e.append(read_tables(rows[:, f, p, a], angle + j * step))
         c_fs.append(read_tables(to_supports[:, f, p, a], angle + j * step))
-        c_ln[i] = turn6(angle + j * step) @ (grid[p] @ body.static_fb[f, :, a])
+        c_ln[i] = turn6(angle + j * step) @ (grid[p] @ body.flank.node[f, :, a])
         for k, (m, g, q, b) in enumerate(LOADS):
-            c_ll[i, k] = grid[p] @ body.static_ff[f, g, (m - j) % body.static_ff.shape[2], :, :, a, b] @ grid[q]
+            c_ll[i, k] = grid[p] @ body.flank.static[f, g, (m - j) % body.flank.static.shape[2], :, :, a, b] @ grid[q]
             residual[i, k] = flank.residual[f, g, OFFSETS.index(m - j), p, q, a, b]
     want, want_force = unreduced(layout, LOADS, rigid, (c_ll, c_ln))
     w, c_fs = rigid @ group.rigid(1) + np.array(e), np.array(c_fs)

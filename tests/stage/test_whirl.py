@@ -10,7 +10,7 @@ import scipy.linalg as sl
 from test_trains import STEEL, bearing, disc, train
 
 from gearfmu.body.beam import Section, Shaft, reduce_shaft
-from gearfmu.stage.build.free import free_shaft
+from gearfmu.stage.build.ground_part import ground_part
 from gearfmu.stage.build.groups import Group, Layout, Support, mount
 from gearfmu.stage.build.spinning import skew_pairs
 from gearfmu.stage.build.whirls import whirl_rows
@@ -38,7 +38,7 @@ def test_a_hinged_shaft_whirls_as_a_spinning_timoshenko_beam() -> None:
     forward and backward whirl of the first three bending modes."""
     hinge = [Support(f"end{i}", (0, i), None, (0, 1), np.zeros((2, 2)), np.zeros(2)) for i in (0, 1)]
     held = Support("along", (0, 0), None, (2,), np.full((1, 1), 1e-9), np.zeros(1))
-    shaft = free_shaft("shaft", reduce_shaft(Shaft([SECTION], STEEL, [0.0, LENGTH]), 200e3), 0.0)
+    shaft = ground_part(reduce_shaft(Shaft([SECTION], STEEL, [0.0, LENGTH]), 200e3))
     group = mount(Layout([shaft], [(0,)], [*hinge, held], planar=False))
     speed = 3000.0
     found = whirling(group, {0: speed})

@@ -31,7 +31,7 @@ from evidence.peers.calculix.helical_section import Zone, twisted
 from evidence.peers.calculix.positions import NUDGES, PENALTY, read, write
 from evidence.peers.calculix.section import Fineness
 from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_forces, write_spatial_deck
-from gearfmu.body import ReducedBody, load_body
+from gearfmu.body import Body, load_body
 from gearfmu.body.store import save_body
 from gearfmu.geometry import PairGeometry, hertz
 from gearfmu.spec.forms.expand import rewritten
@@ -117,7 +117,7 @@ def stage(helix: int = 20, axes: str = "parallel") -> Stage:
     return rewritten(demo, gears=tuple(gears), pair=pair)
 
 
-def bodies(work: Path, helix: int = 20) -> list[ReducedBody]:
+def bodies(work: Path, helix: int = 20) -> list[Body]:
     """The reduced gears with rigid bores, kept in the work folder."""
     files = [work / f"helical_{helix}_{name}.h5" for name in ("pinion", "wheel")]
     if not all(file.exists() for file in files):
@@ -127,7 +127,7 @@ def bodies(work: Path, helix: int = 20) -> list[ReducedBody]:
     return [load_body(file) for file in files]
 
 
-def ours(case: Case, gears: list[ReducedBody]) -> Ours:
+def ours(case: Case, gears: list[Body]) -> Ours:
     """The kernel's answer with bores held."""
     spec, torque = stage(case.helix, case.axes), case.torque
     model = assemble(spec, gears)
@@ -190,7 +190,7 @@ def problem_at(case: Case, te: float) -> Problem:
     )
 
 
-def row(case: Case, gears: list[ReducedBody], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+def row(case: Case, gears: list[Body], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
     2 % where ccx does not settle. RuntimeError when ccx gives up."""
     mine, r_b = ours(case, gears), stage(case.helix, case.axes).written.geometry.gears[0].r_b

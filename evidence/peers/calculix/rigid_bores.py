@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -16,16 +16,17 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_geometry
 
 
-def rigid_bore_bodies(spec: Stage) -> list[ReducedBody]:
+def rigid_bore_bodies(spec: Stage) -> list[Body]:
     """The stored bodies of a pair with the static tables of gears whose bores are rigid. Their modes stay as they were:
     of use at level rigid only."""
     return [_with_rigid_bore(spec, index, body) for index, body in enumerate(load_bodies(spec))]
 
 
-def _with_rigid_bore(spec: Stage, index: int, stored: ReducedBody) -> ReducedBody:
+def _with_rigid_bore(spec: Stage, index: int, stored: Body) -> Body:
     gear = spec.gears[index]
     geometry = gear_geometry(gear, spec.written.pair, (1, -1)[index])
     sector = gear_sector(geometry, gear.face_width, gear.body.mesh)
     body = SectorBody(sector, gear.material, *tooth_flank(geometry, gear), rigid_bore=True)
     tables = static_tables(body, [])
-    return replace(stored, static_ff=tables.static_ff, static_fb=tables.static_fb, static_bb=tables.static_bb)
+    flank = replace(stored.flank, static=tables.static_ff, node=tables.static_fb)
+    return replace(stored, flank=flank, static=tables.static_bb)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.body import ReducedBody, load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.planetary import SetGearSpec
@@ -26,6 +26,6 @@ def _gear(form: GearSpec, gear: SetGearSpec) -> GearSpec:
     return form.model_copy(update=fields | {"name": form.name, "tip_relief": None})
 
 
-def set_bodies() -> list[ReducedBody]:
+def set_bodies() -> list[Body]:
     """The two reduced gears of the set, as they are shipped."""
     return load_bodies(load_stage("planetary54"))[:2]

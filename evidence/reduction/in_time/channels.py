@@ -7,6 +7,7 @@ import numpy as np
 from evidence.reduction.in_time.scenes import Scene
 from evidence.reduction.in_time.transient import Motion
 
+QUARTER = "tooth13"  # of 54
 LATE = 0.2  # the last part of a run whose error stands apart
 
 
@@ -19,6 +20,15 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
     def speed(name: str, component: str) -> np.ndarray:
         return np.gradient(read(name, "bore", component), motion.time)
 
+    if "ring" in scene.solids:
+        force = -motion.tension[:, scene.kinds == "contact"].sum(axis=1)
+        return {
+            "mesh force, N": force,
+            "planet speed, rad/s": speed("planet", "rz"),
+            "pin deflection, µm": 1e6 * read("planet", "bore", "uy"),
+            "tooth of the ring, µm": 1e6 * read("ring", "tooth0", "uy"),
+            "ring a quarter away, µm": 1e6 * read("ring", QUARTER, "uy"),
+        }
     radius = scene.solids["planet"].centre[0]
     bolt = read("carrier", "bolt0", "uy")
     found = {

@@ -25,13 +25,24 @@ RUNS = {
         "krylov 120 | modal 400": "reduced as in the paper",
         "krylov 120 | modal 400 + residual": "with static residual",
     },
+    "ring_hammering": {
+        "modal 400 | whole": "modal truncation",
+        "craig_bampton 400 | whole": "Craig–Bampton",
+        "rubin 400 | whole": "Rubin / MacNeal",
+        "modal 400 + residual | whole": "modes with static residual",
+    },
 }
 SHOWN = {
     "carrier_planet": ("bolt deflection, µm", "bolt tilt, mrad", "pin elongation, µm"),
     "hammering": ("mesh force, N", "planet speed, rad/s", "sun speed, rad/s"),
+    "ring_hammering": ("mesh force, N", "planet speed, rad/s", "tooth of the ring, µm"),
 }
 FLOOR = 1e-8  # of the differences shown
-DIFFERENCE = {"carrier_planet": "bolt deflection, µm", "hammering": "planet speed, rad/s"}
+DIFFERENCE = {
+    "carrier_planet": "bolt deflection, µm",
+    "hammering": "planet speed, rad/s",
+    "ring_hammering": "tooth of the ring, µm",
+}
 
 
 def draw(name: str) -> None:

@@ -1,9 +1,10 @@
 """The paper's reductions in the time domain against the unreduced finite elements (its Figs. 3 and 4).
 
-    python -m evidence.reduction.in_time.compare [carrier_planet] [hammering] [--work DIR] [--chart]
+    python -m evidence.reduction.in_time.compare [SCENE …] [--work DIR] [--chart]
 
 carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method and to several sizes.
 hammering      : carrier + planet + sun through their backlash, 0.5 ms; the carrier by each method, gears by eigenmodes.
+ring_hammering : planet and ring on its mounts through their backlash, 0.5 ms; the ring by each method (ring_scene.py).
 
 A line that reduces one kind of body has the others unreduced, or reduced so that a line of their own shows them to be
 without influence (planet: Rubin 60; carrier: Krylov 120).
@@ -26,6 +27,7 @@ import numpy as np
 
 from evidence.reduction.in_time.channels import channels, errors
 from evidence.reduction.in_time.chart import RUNS, draw
+from evidence.reduction.in_time.ring_scene import ring_hammering
 from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
 from evidence.reduction.in_time.tables import read_rows, write_columns, write_rows
 from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
@@ -42,7 +44,8 @@ EVERY = 2  # steps of a curve's points
 
 @dataclass(frozen=True)
 class Run:
-    """One line of a table: how each kind of body is reduced, "whole" or method and number; see `reduced`."""
+    """One line of a table: how each kind of body is reduced, "whole" or method and number; see `reduced`. carrier: of
+    the carrier, or of the ring in its own scene."""
 
     carrier: str = "whole"
     gears: str = "whole"
@@ -64,6 +67,7 @@ class Study:
 
 
 SIZES, PAPER = (60, 120, 240), 120
+OF_RING = 400  # the paper's 162 constraint modes and 238 eigenmodes
 PLANET = "rubin 60"
 CARRIER = f"krylov {PAPER}"
 STUDIES = {
@@ -90,6 +94,18 @@ STUDIES = {
             *(Run(CARRIER, f"modal {n}{rest}") for n in (400, 200, 100) for rest in ("", " + residual")),
             Run(CARRIER, "rubin 400"),
             *(Run(f"{method} {PAPER}", "modal 400 + residual") for method in FOUR if method != "krylov"),
+        ),
+    ),
+    "ring_hammering": Study(
+        ring_hammering,
+        Meshes(gear=0.17, ring=0.17),
+        Scheme(1e-6, 0.5e-3),
+        (
+            Run(),
+            Run(half_step=True),
+            *(Run(f"{method} {OF_RING}") for method in FOUR[:3]),
+            Run(f"modal {OF_RING} + residual"),
+            Run(f"rubin {OF_RING}", "modal 400 + residual"),
         ),
     ),
 }
@@ -145,12 +161,12 @@ def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Asse
     """The scene's assembly with its bodies reduced as the run says; `made` keeps what was reduced before."""
     others = []
     for name, solid in scene.solids.items():
-        text = run.carrier if name == "carrier" else run.gears
+        text = run.carrier if name in ("carrier", "ring") else run.gears
         if text == "whole":
             continue
         if (name, text) not in made:
             method, number, *extra = text.split(" ", 2)
-            basis = METHODS[method](solid.full, Size(int(number)))
+            basis = METHODS[method](solid.inputs or solid.full, Size(int(number)))
             model = oscillators(solid.full, basis, damping_ratio=0.0)
             made[name, text] = Member.reduced(model, residual=bool(extra))
         others.append(made[name, text])

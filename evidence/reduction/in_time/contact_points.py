@@ -1,9 +1,10 @@
-"""Contact points of two external gears in the position where a run begins: gaps, areas, and rows at their nodes.
+"""Contact points of two gears in the position where a run begins: gaps, areas, and rows at their nodes.
 
 A point of gear A at P finds its foot on the involute of gear B in closed form (theory, eq. 8h): with D = P − C_B,
 ℓ = √(D² − r_b²), t = arg D − sg arctan(ℓ/r_b) and s = r_b (ψ_b − sg (t − θ)) of the tooth at θ, the gap is ℓ − s along
 the normal sg e_t(t). To first order in small displacements it grows by n · (u_P − u_foot), displacements of the points
-being those of the faces that they lie on.
+being those of the faces that they lie on. Gear B may be a ring: its spaces are bounded by the flanks of the gear that
+would fill them, so gap and normal turn their signs.
 """
 
 from __future__ import annotations
@@ -17,14 +18,16 @@ from gearfmu.fem import surface
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.mesh import FlankGrid
 from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A spur gear where it stands: sector mesh, shape, centre (2,) m and angle (rad) of tooth 0 from +x."""
+    """A spur gear where it stands: sector mesh, shape, centre (2,) m, and angle (rad) of tooth 0 (a ring: space 0) from
+    +x."""
 
     sector: FeMesh
-    geometry: GearGeometry
+    geometry: GearGeometry | InternalGearGeometry
     centre: np.ndarray
     angle: float
 
@@ -69,10 +72,15 @@ def contact_points(a: Placed, b: Placed, grid: Grid, allowance: dict[int, float]
     return Points(gap + np.where(side > 0, allowance[1], allowance[-1]), area, side, rows)
 
 
+def is_ring(gear: Placed) -> bool:
+    return isinstance(gear.geometry, InternalGearGeometry)
+
+
 def _face_each_other(a: Placed, b: Placed, i: int, j: int) -> bool:
-    """Whether tooth i of A and tooth j of B lie within two pitches of the line of centres."""
+    """Whether tooth i of A and tooth (or space) j of B lie within two pitches of where the gears meet."""
     towards = np.arctan2(*(b.centre - a.centre)[::-1])
-    off = [gear.tooth_angle(k) - direction for gear, k, direction in ((a, i, towards), (b, j, towards + np.pi))]
+    both = (towards + np.pi,) * 2 if is_ring(b) else (towards, towards + np.pi)
+    off = [gear.tooth_angle(k) - direction for gear, k, direction in zip((a, b), (i, j), both, strict=True)]
     return all(abs(np.angle(np.exp(1j * o))) < 4 * np.pi / g.geometry.z for o, g in zip(off, (a, b), strict=True))
 
 
@@ -89,9 +97,11 @@ def _between(a: Placed, b: Placed, teeth: tuple[int, int], side: int, grid: Grid
     direction = np.arctan2(offset[:, 1], offset[:, 0]) - side * np.arctan2(tangent, base)
     turn = np.angle(np.exp(1j * (direction - b.tooth_angle(teeth[1]))))
     foot = base * (b.geometry.psi_b - side * turn)
-    gap = tangent - foot
-    near = np.flatnonzero((np.abs(gap) < grid.reach) & (foot > b.geometry.s_form) & (foot < b.geometry.s_tip))
-    normal = side * np.stack([-np.sin(direction), np.cos(direction), np.zeros_like(direction)], axis=1)
+    inside = -1.0 if is_ring(b) else 1.0
+    gap = inside * (tangent - foot)
+    first, last = sorted((b.geometry.s_form, b.geometry.s_tip))
+    near = np.flatnonzero((np.abs(gap) < grid.reach) & (foot > first) & (foot < last))
+    normal = inside * side * np.stack([-np.sin(direction), np.cos(direction), np.zeros_like(direction)], axis=1)
     other = b.sector.flank[0 if side > 0 else 1]
     area = np.outer(_trapezoid(arc / (2 * a.geometry.r_b)), _trapezoid(across)).ravel()
     return (

@@ -37,12 +37,17 @@ FIVE = ("ux", "uy", "uz", "rx", "ry")  # what a bearing holds
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A body: elements and couplings in axes of the set about `centre` (3,) m, and the whole body as FullOrder."""
+    """A body: elements and couplings in axes of the set about `centre` (3,) m, and the whole body as FullOrder.
+
+    elements : None of a body that no deck is written of. inputs : of a ring, `full` with the interfaces alone by which
+    it is reduced, without the points of its flanks.
+    """
 
     centre: np.ndarray
-    elements: Elements
+    elements: Elements | None
     couplings: tuple[Coupling, ...]
     full: FullOrder
+    inputs: FullOrder | None = None
 
     def index(self, interface: str, component: str) -> int:
         """Number of a row among all rows of the interfaces."""
@@ -68,6 +73,7 @@ class Meshes:
 
     carrier: float = 0.5
     gear: float = 0.25
+    ring: float = 0.25
 
 
 def carrier_planet(meshes: Meshes) -> Scene:
@@ -96,7 +102,9 @@ def hammering(meshes: Meshes) -> Scene:
         "sun": gear("sun", sun, spec.written.sun.material, points.rows[1]),
     }
     joints, kinds = _supports(spec, solids)
-    joints, kinds = touching(joints, kinds, solids, points, _penalty(spec, mesh))
+    roll = mesh.path["C"]
+    penalty = foundation(spec, roll * (mesh.length - roll) / mesh.length)
+    joints, kinds = touching(joints, kinds, solids, points, penalty)
     turning, a = SPEED * np.eye(6)[5], spec.written.set.center_distance
     start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
     return Scene("hammering", solids, _driven(solids, joints, start), kinds, _steel(spec), points)
@@ -223,15 +231,14 @@ def nominal_play(mesh: Any) -> float:
     return mesh.nominal_backlash * np.cos(mesh.alpha_wt)
 
 
-def _penalty(spec: Any, mesh: Any) -> float:
-    """N/m³, 3π E*/(8 b): an elastic foundation with Hertz's half-width b under TORQUE (theory, eq. 8j)."""
+def foundation(spec: Any, radius: float) -> float:
+    """N/m³, 3π E*/(8 b): an elastic foundation with Hertz's half-width b under TORQUE (theory, eq. 8j), for a relative
+    radius of curvature (m)."""
     a, b = spec.written.sun.material, spec.written.planet.material
     modulus = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
-    roll = mesh.path["C"]
-    load = (
+    force = (
         TORQUE
         / (1 + spec.written.ring.teeth / spec.written.sun.teeth)
-        / mesh.gears[0].r_b
-        / spec.written.planet.face_width
+        / set_geometry(spec.written).sun_mesh.gears[0].r_b
     )
-    return 3 * np.pi * modulus / (8 * half_width(load, roll * (mesh.length - roll) / mesh.length, modulus))
+    return 3 * np.pi * modulus / (8 * half_width(force / spec.written.planet.face_width, radius, modulus))

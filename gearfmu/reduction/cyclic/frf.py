@@ -14,7 +14,8 @@ body's elastic part.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,21 +33,33 @@ _AT_ONCE = 5  # nodal diameters whose loads the interior answers together
 
 @dataclass(frozen=True)
 class FrfError:
-    """Relative Frobenius error of the reduced body: frequency (F,) Hz, error (F,) with the bore held, error_free (F,).
+    """Relative Frobenius error of a reduced body: frequency (F,) Hz, error (F,) with the nodes `ground` held.
 
     band : Hz, in which `max_error` is the largest error. trusted_to : Hz, up to which the error stays below 1 %.
-    cut : Hz, modes below it are dynamic, their number is `size`. length : m, scale of the bore's rotations.
+    length : m, scale of the rotations. Of a gear also error_free (F,); cut : Hz, modes below it are dynamic, their
+    number is `size`.
     """
 
     frequency: np.ndarray
     error: np.ndarray
-    error_free: np.ndarray
     band: tuple[float, float]
     max_error: float
     trusted_to: float
-    cut: float
-    size: int
     length: float
+    ground: tuple[str, ...] = ()
+    error_free: np.ndarray | None = None
+    cut: float | None = None
+    size: int | None = None
+
+    @classmethod
+    def of(
+        cls, frequency: np.ndarray, error: np.ndarray, band: tuple[float, float], length: float, ground: Sequence[str]
+    ) -> FrfError:
+        """The error over frequency, summed up."""
+        inside = (frequency >= band[0]) & (frequency <= band[1] * (1 + 1e-12))
+        bad = np.flatnonzero(error > TRUSTED_ERROR)
+        trusted = frequency[-1] if len(bad) == 0 else frequency[max(bad[0] - 1, 0)]
+        return cls(frequency, error, band, float(error[inside].max()), float(trusted), length, tuple(ground))
 
 
 @dataclass(frozen=True)
@@ -100,21 +113,8 @@ def compare(full: Series, reduced: Series, rigid: np.ndarray, case: FrfCase) -> 
         ours = _transfer(reduced.rows[:, kept], reduced.frequency[kept], reduced.moments, s) * s / squared
         free.append(_relative(exact, ours))
         held.append(_relative(_bore_held(exact - rigid / squared), _bore_held(ours - rigid / squared)))
-    error = np.array(held)
-    in_band = (frequency >= BAND[0]) & (frequency <= BAND[1] * (1 + 1e-12))
-    bad = np.flatnonzero(error > TRUSTED_ERROR)
-    trusted = frequency[-1] if len(bad) == 0 else frequency[max(bad[0] - 1, 0)]
-    return FrfError(
-        frequency,
-        error,
-        np.array(free),
-        BAND,
-        float(error[in_band].max()),
-        float(trusted),
-        cut,
-        int(kept.sum()),
-        case.length,
-    )
+    found = FrfError.of(frequency, np.array(held), BAND, case.length, ("bore",))
+    return replace(found, error_free=np.array(free), cut=cut, size=int(kept.sum()))
 
 
 def frf_inputs(rolls: int, functions: int) -> np.ndarray:

@@ -33,7 +33,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Modes:
-    """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
+    """n real elastic modes by ascending frequency; conventions of `body.body.Flank`.
 
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
     and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are

@@ -18,7 +18,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 
 @dataclass(frozen=True)
 class Statics:
-    """Static compliance, conventions of `body.ReducedBody`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
+    """Static compliance, conventions of `body.body.Flank`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
     1/N; C_bb (6, 6), m/N … 1/(N·m). pictures : (p, z, 3N) displacement of all sectors, in sector frames, under the
     unit flank loads asked for, m/N. Of a ring also static_fp (2, z, R, A, 3), flank row of tooth 0 per unit force x, y,
     z (sector frame) on the rim patch of sector m, and static_pp (z, 3, 3), m/N; empty (last index 0) of a gear.

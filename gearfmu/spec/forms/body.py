@@ -27,6 +27,8 @@ def body_inputs(stage: Stage, name: str) -> dict[str, Any]:
     """
     if isinstance(stage.written, PlanetarySpec):
         return _set_inputs(stage.written, name)
+    if name in {housing.name for housing in stage.housings}:
+        return _housing_inputs(stage, name)
     member = member_of(stage, name)
     inputs = _ring_inputs(member.gear) if isinstance(member.gear, RingBody) else _gear_inputs(member.gear)
     return inputs | _imported_inputs(member, inputs["body"], stage.source)
@@ -58,6 +60,13 @@ def _ring_inputs(ring: RingBody) -> dict[str, Any]:
     if not inputs["helix_angle"]:
         inputs.pop("helix_angle")  # files of spur rings are older than helical ones
     return inputs | ({"rim_coupling": ring.rim_coupling} if ring.rigid_bore else {})
+
+
+def _housing_inputs(stage: Stage, name: str) -> dict[str, object]:
+    """Everything that shapes a housing: not its name, nor what of it is dynamic."""
+    housing = next(own for own in stage.housings if own.name == name)
+    tables = housing.model_dump(exclude={"name", "imported", "dynamic_to"})
+    return tables | {"import": import_inputs(housing.imported, stage.source, f"bodies.{name}.import")}
 
 
 def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from gearfmu.spec.tables.gear import (
     PressureAngle,
     SurfaceCoupling,
 )
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.spec.tables.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, PortSpec
 from gearfmu.spec.tables.supports import Place, SupportSpec
@@ -224,10 +225,10 @@ class Stage(LaterFields):
     kind: Literal["general"] = Field(default="general", description="kind of stage")
     slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
     nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
-    bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody, Field(discriminator="kind")]] = Field(
-        description="bodies by name"
-    )
-    rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
+    bodies: dict[
+        Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody | HousingBody, Field(discriminator="kind")]
+    ] = Field(description="bodies by name")
+    rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body but a housing in one of them")
     engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
     supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
     bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the supports, by name")
@@ -295,14 +296,19 @@ class Stage(LaterFields):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Names of the reduced bodies: toothed ones, then carriers. Shafts need no reduction."""
-        return tuple(dict.fromkeys(self.file_of(body.name) for body in (*self.gears, *self.carriers)))
+        """Names of the reduced bodies: toothed ones, carriers, the housing. Shafts need no reduction."""
+        return tuple(dict.fromkeys(self.file_of(body.name) for body in self.reduced))
 
     def by_name(self, bodies: Sequence[Of]) -> dict[str, Of]:
         """One of `bodies` (or of what stands for them, such as their hashes), in the order of `files`, for every
-        toothed body and carrier by name."""
+        reduced body by name."""
         own = dict(zip(self.files, bodies, strict=True))
-        return {body.name: own[self.file_of(body.name)] for body in (*self.gears, *self.carriers)}
+        return {body.name: own[self.file_of(body.name)] for body in self.reduced}
+
+    @property
+    def reduced(self) -> tuple[ToothedBody | CarrierBody | HousingBody, ...]:
+        """Bodies that have a file: toothed ones, carriers, the housing."""
+        return (*self.gears, *self.carriers, *self.housings)
 
     @property
     def gears(self) -> tuple[ToothedBody, ...]:
@@ -342,6 +348,23 @@ class Stage(LaterFields):
     def carriers(self) -> tuple[CarrierBody, ...]:
         """Planet carriers in the order of the file."""
         return tuple(body for body in self.bodies.values() if isinstance(body, CarrierBody))
+
+    @property
+    def housings(self) -> tuple[HousingBody, ...]:
+        """The housing that carries the bearings, or nothing."""
+        return tuple(body for body in self.bodies.values() if isinstance(body, HousingBody))
+
+    def on_rigid_ground(self) -> Stage:
+        """The stage whose bearings stand on the ground, without its housing; itself where it has none."""
+        if not (names := {housing.name for housing in self.housings}):
+            return self
+        supports = [
+            support.model_copy(update={"to": None, "node": None}) if support.to in names else support
+            for support in self.supports
+            if support.body not in names
+        ]
+        bodies = {name: body for name, body in self.bodies.items() if name not in names}
+        return self.model_copy(update={"bodies": bodies, "supports": tuple(supports)})
 
     def carrier_of(self, rotor: str) -> str | None:
         """Name of the rotor in whose axes a rotor stands; None: the ground."""

@@ -13,11 +13,13 @@ from gearfmu.ranges import kernel_limits
 from gearfmu.spec.forms.bearing_checks import unused_problems, use_problems, uses_of_supports
 from gearfmu.spec.forms.flank_checks import with_rolls
 from gearfmu.spec.forms.general import EngagementSpec, RingBody, ShaftBody, Stage, ToothedBody
+from gearfmu.spec.forms.housing_checks import housing_problems
 from gearfmu.spec.forms.pair_checks import geometry_problems, millimetres
 from gearfmu.spec.forms.planetary_checks import RingPair, ring_pair_problems
 from gearfmu.spec.forms.shapes import centre_distance, mesh_shape, toothed
 from gearfmu.spec.tables.bearings import BallBearing, RollerBearing
 from gearfmu.spec.tables.gear import PairSpec
+from gearfmu.spec.tables.housing import HousingBody
 
 Found = Iterator[tuple[str, str, str]]
 _SAME_RACK = ("normal_module", "pressure_angle")
@@ -30,6 +32,7 @@ def general_problems(file: str, stage: Stage) -> list[Problem]:
         *unused_problems(stage.supports),
     )
     problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage), *rolling)]
+    problems += [Problem(file, *entry) for entry in housing_problems(stage)]
     known = _what_can_be_judged(stage)
     problems += [Problem(file, *entry) for entry in (*_places(known), *_held(known))]
     for engagement in known.engagements:
@@ -40,17 +43,20 @@ def general_problems(file: str, stage: Stage) -> list[Problem]:
 def _what_can_be_judged(stage: Stage) -> Stage:
     """The stage without what names a body that there is not, or one that has no rotor of its own."""
     counts = Counter(name for rotor in stage.rotors.values() for name in rotor.bodies)
-    good = {name for name in stage.bodies if counts[name] == 1}
+    standing = {housing.name for housing in stage.housings}
+    good = {name for name in stage.bodies if counts[name] == 1} | standing
     gears = {gear.name for gear in stage.gears} & good
     rotors = {
-        name: rotor.model_copy(update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good}})
+        name: rotor.model_copy(
+            update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good - standing}}
+        )
         for name, rotor in stage.rotors.items()
     }
     kept = {
         "rotors": {name: rotor for name, rotor in rotors.items() if rotor.bodies},
         "engagements": tuple(mesh for mesh in stage.engagements if set(mesh.gears) <= gears),
         "supports": tuple(s for s in stage.supports if {s.body, s.to} - {None} <= good),
-        "ports": {name: port for name, port in stage.ports.items() if port.body in good},
+        "ports": {name: port for name, port in stage.ports.items() if port.body in good - standing},
     }
     return stage.model_copy(update=kept)
 
@@ -90,10 +96,10 @@ def _rotors(stage: Stage) -> Found:
         for body in rotor.bodies:
             if body not in stage.bodies:
                 yield f"rotors.{name}.bodies.{body}", body, _unknown_body(stage)
-    for body in stage.bodies:
-        if counts[body] != 1:
+    for own in stage.bodies:
+        if counts[own] != 1 and not isinstance(stage.bodies[own], HousingBody):
             remedy = "a body belongs to one rotor: name it in the bodies of one [rotors.…]"
-            yield f"bodies.{body}", f"in {counts[body]} rotors", remedy
+            yield f"bodies.{own}", f"in {counts[own]} rotors", remedy
 
 
 def _names(stage: Stage) -> Found:
@@ -126,10 +132,12 @@ def _names(stage: Stage) -> Found:
 
 
 def _places(stage: Stage) -> Found:
-    """Nodes lie on their bodies: at a gear's mid-width, on a shaft's length."""
+    """Nodes lie on their bodies: at a gear's mid-width, on a shaft's length. Those of a housing its mesh has."""
     nodes = [(f"supports.{s.name}.at", body, s.at) for s in stage.supports for body in (s.body, s.to) if body]
     nodes += [(f"ports.{name}.at", port.body, port.at) for name, port in stage.ports.items()]
     for field, name, at in nodes:
+        if isinstance(stage.bodies[name], HousingBody):
+            continue
         body, origin = stage.bodies[name], stage.place(name, None)
         if isinstance(body, ShaftBody):
             at = _on_shaft(stage, field, at)
@@ -156,7 +164,10 @@ def _on_shaft(stage: Stage, field: str, at: float | None) -> float | None:
 
 def _held(stage: Stage) -> Found:
     """What is held to what: bodies of one rotor with torsion, bodies of two without."""
+    standing = {housing.name for housing in stage.housings}
     for support in stage.supports:
+        if support.body in standing or support.to in standing:
+            continue
         if support.to is None:
             if support.torsion is not None and not stage.rotors[stage.rotor_of(support.body)].stands:
                 remedy = "a support on the ground cannot hold a spin: take torsion away, write a port, or stands = true"

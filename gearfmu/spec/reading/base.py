@@ -27,7 +27,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
-_KINDS = ("gear", "shaft", "ball", "roller", "springs", "catalogue")  # pydantic's marks of classes that were chosen
+_KINDS = ("gear", "shaft", "housing", "ball", "roller", "springs", "catalogue")  # pydantic's marks of chosen classes
 _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 

@@ -26,7 +26,9 @@ class SupportSpec(LaterFields):
     body: Name = Field(description="body that is held")
     to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
     at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
-    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
+    node: Name | None = Field(
+        default=None, description="node of a carrier: bore, bolt0, bolt1 …; of a housing: name of a seat or foot"
+    )
     radial: RadialSpring | None = Field(default=None, description="stiffness along x and y")
     axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
     tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.interface_body import InterfaceBody
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape
@@ -22,8 +22,9 @@ from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.build.far import far_sections
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.flanks import deviation_sections
-from gearfmu.stage.build.free import Flank
+from gearfmu.stage.build.ground_part import PartFlank
 from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
+from gearfmu.stage.build.housed import Sensed, sensor_sections, widened
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
 from gearfmu.stage.build.meshes import stage_sections, tooth_phases
@@ -39,7 +40,7 @@ from gearfmu.stage.build.teeth import gear_section, mismatches
 from gearfmu.stage.build.whirls import whirl_rows
 
 MODEL_VERSION = 5
-VARIABLES = "8f777a572eab"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256
+VARIABLES = "e5b3cafe899b"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256
 _KEPT = 16  # stages whose bearings are remembered
 _SETTLED: dict[str, Settled] = {}
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -48,7 +49,7 @@ FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is h
 
 def assemble(
     stage: Stage,
-    bodies: Sequence[Any],
+    bodies: Sequence[Body],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
 ) -> StageModel:
@@ -59,7 +60,7 @@ def assemble(
     gear, and for a name in `observe` that is no gear of the stage.
     """
     stage.require_motion()
-    hashes = tuple(body.input_hash for body in bodies)
+    hashes = tuple(body.how.hash for body in bodies)
     made_of = {"made_of": _made_of(stage, bodies, rolls, observe)}
     found = general_sections(stage, bodies, rolls, observe, tangents_of(stage, bodies))
     sections = order_sections(with_guid(found | made_of))
@@ -68,18 +69,18 @@ def assemble(
     return model.with_starts(starts) if starts else model
 
 
-def _made_of(stage: Stage, bodies: Sequence[Any], rolls: int, observe: Sequence[str]) -> str:
+def _made_of(stage: Stage, bodies: Sequence[Body], rolls: int, observe: Sequence[str]) -> str:
     """Hash of all that a model and the variables of its FMU are made of but the kinds of its ports."""
     tables = stored(stage) | {"description": ""}
     for port in tables["ports"].values():
         port.pop("kind", None)
-    hashes = {name: body.input_hash for name, body in stage.by_name(bodies).items()}
+    hashes = {name: body.how.hash for name, body in stage.by_name(bodies).items()}
     return origin(MODEL_VERSION, VARIABLES, tables, stored_files(stage), hashes, rolls, list(observe))
 
 
 def general_sections(
     stage: Stage,
-    bodies: Sequence[Any],
+    bodies: Sequence[Body],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
     tangents: Tangents = MappingProxyType({}),
@@ -87,13 +88,16 @@ def general_sections(
     """Every section of the blob of `assemble`, by name. tangents: of the rolling bearings."""
     bodies, carriers = _parted(stage, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
-    problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
+    teeth = [body.toothed for body in bodies]
+    problems = [p for entry in zip(stage.gears, shapes, teeth, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
     flanks = [stored_points(body, s.s_form, s.s_tip, rolls) for body, s in zip(bodies, shapes, strict=True)]
-    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks], tangents)
+    points = [points for points, _ in flanks]
+    layout = stage_layout(stage, bodies, carriers, points, tangents)
+    bare = stage_layout(stage.on_rigid_ground(), bodies, carriers, points, tangents) if stage.housings else None
     nodes = port_nodes(stage, carriers)
-    groups = mount_sets(layout)
+    groups = mount_sets(layout, bare)
     degrees = width_degrees(stage, bodies)
     sections = stage_sections(stage) | nodal_sections(stage) | _port_sections(stage, groups[0], nodes)
     sections |= {
@@ -118,7 +122,8 @@ def general_sections(
             sections[f"smeared_tip{i}"] = smeared_tip(gear, shape, degrees)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
-        sections |= set_sections(s, group, nodes)
+        sections |= widened(set_sections(s, group, nodes), s, len(layout.support_names()))
+    sections |= sensor_sections(_sensed(stage, carriers, layout), groups[0])
     lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
@@ -128,28 +133,34 @@ def general_sections(
     return sections
 
 
-def stage_group(stage: Stage, bodies: Sequence[Any]) -> Group:
+def stage_group(stage: Stage, bodies: Sequence[Body]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    return mount(layout_of(stage, bodies))
+
+
+def layout_of(stage: Stage, bodies: Sequence[Body]) -> Layout:
+    """Its free bodies and what holds them."""
     tangents = tangents_of(stage, bodies)
     bodies, carriers = _parted(stage, bodies)
-    return mount(stage_layout(stage, bodies, carriers=carriers, tangents=tangents))
+    return stage_layout(stage, bodies, carriers=carriers, tangents=tangents)
 
 
-def tangents_of(stage: Stage, bodies: Sequence[object]) -> Tangents:
+def tangents_of(stage: Stage, bodies: Sequence[Body]) -> Tangents:
     """(d, d) stiffness of every rolling bearing at the operating torque, by the name of its support; bodies as of
     `assemble`. ModelError: `settle`."""
     return settled(stage, bodies).tangents if stage.rolling else {}
 
 
-def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None) -> Settled:
-    """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None. ModelError where
-    it has none, and as of `settle`."""
+def settled(stage: Stage, bodies: Sequence[Body], torque: float | None = None) -> Settled:
+    """The rolling bearings of a stage under a torque on its input (N·m), that of the file when None; on rigid ground,
+    so that a housing changes no bearing. ModelError where it has none, and as of `settle`."""
     if not stage.rolling:
         raise ModelError(
             f"{stage.name} has no rolling bearings: give some of its supports one (docs/howto-bearings.md)"
         )
     assert stage.operating is not None
     at = stage.operating.torque if torque is None else torque
+    stage, bodies = stage.on_rigid_ground(), bodies[: len(bodies) - len(stage.housings)]
     key = f"{_made_of(stage, bodies, ROLLS, ())} {at!r}"
     if key not in _SETTLED:
 
@@ -163,10 +174,11 @@ def settled(stage: Stage, bodies: Sequence[object], torque: float | None = None)
     return _SETTLED[key]
 
 
-def _parted(stage: Stage, bodies: Sequence[Any]) -> tuple[Sequence[Any], dict[str, InterfaceBody]]:
-    """The bodies of the stage's gears in their order, and its carriers' by name."""
+def _parted(stage: Stage, bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Body]]:
+    """The bodies of the stage's gears in their order, and those of carriers and housing by name."""
     found = stage.by_name(bodies)
-    return [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
+    others = [own.name for own in stage.carriers] + [own.name for own in stage.housings]
+    return [found[gear.name] for gear in stage.gears], {name: found[name] for name in others}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
@@ -189,13 +201,25 @@ def _carried_sections(layout: Layout) -> dict[str, Any]:
     }
 
 
-def mount_sets(layout: Layout) -> list[Group]:
-    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there."""
-    held = replace(layout, supports=[support.hold() for support in layout.supports])
+def mount_sets(layout: Layout, bare: Layout | None = None) -> list[Group]:
+    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there. bare:
+    the layout without its housing; the supports that are held are its own then, and it is the third set."""
+    standing = layout if bare is None else bare
+    held = replace(standing, supports=[support.hold() for support in standing.supports])
+    groups = [mount(layout)]
     try:
-        return [mount(layout), mount(held)]
+        groups.append(mount(held))
     except RigidSupportError:
-        return [mount(layout)]
+        groups += [] if bare is None else [mount(bare)]
+    return groups + ([] if bare is None else [mount(bare)])
+
+
+def _sensed(stage: Stage, carriers: Mapping[str, Body], layout: Layout) -> Sensed | None:
+    for housing in stage.housings:
+        if (sensors := carriers[housing.name].sensors) is not None:
+            body = len(layout.bodies) - 1
+            return Sensed(body, len(layout.bodies[body].nodes) - len(sensors.names), sensors.names)
+    return None
 
 
 def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
@@ -239,7 +263,7 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
 def _gear_sections(
     stage: Stage,
     index: int,
-    body: Any,
+    body: Body,
     groups: Sequence[Group],
     nodes: Sequence[tuple[int, int]],
     degrees: np.ndarray,
@@ -253,23 +277,23 @@ def _gear_sections(
     rates = turn_rates(body, chosen)
     turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
-    size = [rotor, body.teeth, chosen.size, reads, meshes > 1, *flank_sizes(flank, degrees)]
+    size = [rotor, body.toothed.teeth, chosen.size, reads, meshes > 1, *flank_sizes(flank, degrees)]
     return tables | turning | mode_sections(index, body, flank) | {f"size{index}": np.array(size, np.int32)}
 
 
-def mode_sections(index: int, body: Any, flank: Flank) -> dict[str, np.ndarray]:
+def mode_sections(index: int, body: Body, flank: PartFlank) -> dict[str, np.ndarray]:
     """What the kernel knows of the modes that turn with gear `index`, but for their rows."""
     chosen = flank.chosen
     return {
         f"omega{index}": 2 * np.pi * body.frequency[chosen],
         f"zeta{index}": body.damping_ratio[chosen],
-        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
-        f"member{index}": body.part[chosen].astype(np.int32),
+        f"diameter{index}": body.toothed.diameter[chosen].astype(np.int32),
+        f"member{index}": body.toothed.part[chosen].astype(np.int32),
         f"level_modes{index}": np.searchsorted(flank.level, (RIGID, FAST, STANDARD), "right").astype(np.int32),
     }
 
 
-def flank_sizes(flank: Flank, degrees: np.ndarray) -> tuple[int, int, bool]:
+def flank_sizes(flank: PartFlank, degrees: np.ndarray) -> tuple[int, int, bool]:
     """The last of "size": points that are stored, ground modes, whether flank 1 is the image of flank 0."""
     return flank.residual.shape[3], flank.low.size, is_mirrored(flank, degrees)
 
@@ -284,9 +308,7 @@ def flank_sections(
     assert flank is not None
     port = np.zeros((*flank.node.shape[1:4], len(nodes)))
     port[..., [p for p, (own, _) in enumerate(nodes) if own == index]] = flank.node[0][..., SPIN, None]
-    family = families(layout)[index]
-    reads = [np.flatnonzero(group.owner == family) for group in groups]
-    assert len({read.size for read in reads}) == 1
+    reads = [np.flatnonzero(group.owner == families(group.layout)[index]) for group in groups]
     found = flank_tables(index, flank, degrees) | {
         f"node_support{index}": node_directions(layout, index).T,
         f"port_residual{index}": port,
@@ -324,7 +346,7 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
     )
 
 
-def port_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> list[tuple[int, int]]:
+def port_nodes(stage: Stage, carriers: Mapping[str, Body] = MappingProxyType({})) -> list[tuple[int, int]]:
     """(body, node) of every port, in the order of the stage. carriers: reduced, by name."""
     nodes = stage_nodes(stage, carriers)
     return [nodes.find(stage, port.body, port.at, port.node) for port in stage.ports.values()]

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gearfmu.stage.build.free import Flank, products, read_tables, turn_tables
+from gearfmu.stage.build.ground_part import PartFlank, products, read_tables, turn_tables
 from gearfmu.stage.build.groups import Group, node_directions
 from gearfmu.stage.build.tables import OFFSETS
 
@@ -23,14 +23,14 @@ FURTHER = range(1, max(OFFSETS) + 1)
 ACROSS = [(0, 1, 0)] + [(f, 1 - f, m) for m in FURTHER for f in (0, 1)]  # from flank, to flank, offset
 
 
-def is_mirrored(flank: Flank, degrees: np.ndarray) -> bool:
+def is_mirrored(flank: PartFlank, degrees: np.ndarray) -> bool:
     """Whether flank 1 of a gear is the image of its flank 0."""
     along = flank.along
     tables = [flank.residual] + ([along.normal[:, :, None], along.own[:, :, None]] if along else [])
     return all(_is_own_image(table, degrees) for table in tables)
 
 
-def flank_tables(index: int, flank: Flank, degrees: np.ndarray) -> dict[str, np.ndarray]:
+def flank_tables(index: int, flank: PartFlank, degrees: np.ndarray) -> dict[str, np.ndarray]:
     """Sections of gear `index` that its body alone decides."""
     along, mirrored = flank.along, is_mirrored(flank, degrees)
     found = {

@@ -99,7 +99,7 @@ def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     """`sections` in the order of the table, floats in the precision in which they are stored. AssertionError that lists
     every section that is missing, unknown, or of another type or shape: the writer's mistake, not the user's."""
     sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
-    found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference"}
+    found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference", "sensors": "sensed"}
     sizes |= {word: len(sections.get(name, ())) for word, name in found.items()}
     ordered, problems = {}, []
     for field, name, known in _instances(sections, sizes):
@@ -132,7 +132,9 @@ def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[t
             yield from ((field, f"{field.name}{s}", known) for s, known in of_set.items())
         else:
             yield from (
-                (field, f"{field.name}{g}_{s}", known | of_set[s]) for g, known in of_gear.items() for s in of_set
+                (field, f"{field.name}{g}_{s}", known | of_set[s] | {"reads": len(sections[f"ground_list{g}_{s}"])})
+                for g, known in of_gear.items()
+                for s in of_set
             )
 
 

@@ -30,7 +30,7 @@ import scipy.linalg as sl
 from scipy.sparse.csgraph import connected_components
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.build.free import FreeBody
+from gearfmu.stage.build.ground_part import GroundPart
 
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -68,13 +68,14 @@ class Support:
 
 @dataclass(frozen=True)
 class Layout:
-    """Bodies, rotors (bodies that spin together, every body in one) and supports; planar: motion x and y alone.
+    """Bodies, rotors (bodies that spin together, every body but a housing in one) and supports; planar: motion x and y
+    alone.
 
     stands: rotors that do not spin; carried: rotor → the rotor in whose axes it stands, and x and y (m) of its axis
     there.
     """
 
-    bodies: Sequence[FreeBody]
+    bodies: Sequence[GroundPart]
     rotors: Sequence[tuple[int, ...]]
     supports: Sequence[Support]
     planar: bool
@@ -85,8 +86,8 @@ class Layout:
         """Rigid freedoms of a body among the unknowns: its own rotation too where other bodies share its spin."""
         if self.planar:
             return PLANAR
-        rotor = next(r for r, own in enumerate(self.rotors) if body in own)
-        own_rotation = len(self.rotors[rotor]) > 1 or rotor in self.stands or rotor in self.frames
+        rotor = next((r for r, own in enumerate(self.rotors) if body in own), -1)  # -1: a housing
+        own_rotation = rotor < 0 or len(self.rotors[rotor]) > 1 or rotor in self.stands or rotor in self.frames
         return (*SPATIAL, SPIN) if own_rotation else SPATIAL
 
     @property
@@ -122,8 +123,9 @@ class Layout:
         return float(sum(self.bodies[b].mass[SPIN, SPIN] for b in self.rotors[rotor]) + carried)
 
     def mass(self, body: int, direction: int) -> float:
-        """Mass, or moments of inertia of the single bodies, of the rotor that a body belongs to, kg or kg·m²."""
-        own = next(rotor for rotor in self.rotors if body in rotor)
+        """Mass, or moments of inertia of the single bodies, of the rotor that a body belongs to, kg or kg·m²; of a
+        housing its own."""
+        own = next((rotor for rotor in self.rotors if body in rotor), (body,))
         return float(sum(self.bodies[b].mass[direction, direction] for b in own))
 
     def support_names(self) -> list[str]:
@@ -207,7 +209,7 @@ def mount(layout: Layout) -> Group:
     residual = np.zeros((len(rows), len(rows)))
     for b, body in enumerate(layout.bodies):
         sides = node_directions(layout, b)
-        nodes = np.vstack([_node_row(layout, b, k, d) for k in range(len(body.place)) for d in range(6)])
+        nodes = np.vstack([_node_row(layout, b, k, d) for k in range(len(body.nodes)) for d in range(6)])
         rows[:, at[b]] = sides @ nodes
         residual += sides @ body.residual @ sides.T
     own = sl.block_diag(*[s.compliance for s in layout.supports])
@@ -236,7 +238,7 @@ def mount(layout: Layout) -> Group:
 def node_directions(layout: Layout, body: int) -> np.ndarray:
     """(s, 6K): elongation of every support direction per motion of the body's nodes: +1 of the first body, −1 of the
     second."""
-    rows = np.zeros((len(layout.support_names()), 6 * len(layout.bodies[body].place)))
+    rows = np.zeros((len(layout.support_names()), 6 * len(layout.bodies[body].nodes)))
     start = 0
     for support in layout.supports:
         for sign, end in ((1.0, support.first), (-1.0, support.second)):
@@ -266,7 +268,7 @@ def _places(layout: Layout) -> list[slice]:
 def _node_row(layout: Layout, body: int, node: int, direction: int) -> np.ndarray:
     """(unknowns of the body,): motion of a node, residual and spin left out."""
     free = layout.bodies[body]
-    rigid = free.rigid_rows(node)[direction, list(layout.freedoms(body))]
+    rigid = free.nodes[node].rigid_rows[direction, list(layout.freedoms(body))]
     return np.concatenate([rigid, free.rows[node, direction]])
 
 

@@ -6,18 +6,19 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
-from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import ShaftBody, Stage, ToothedBody
 from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.supports import SupportSpec
-from gearfmu.stage.build.free import FreeBody, free_carrier, free_gear, free_shaft
+from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.build.groups import Layout, Support
+from gearfmu.stage.build.housed import housing_part, meetings
 from gearfmu.stage.build.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
 
 SAME_PLACE = 1e-9  # m
@@ -29,8 +30,8 @@ SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites
 @dataclass(frozen=True)
 class Nodes:
     """Where bodies are held and driven. numbers: name of a body → its number, gears first in the order of the stage,
-    then shafts and carriers; places: name of a shaft → places (K,) m of its nodes in the stage, ascending; names: of a
-    carrier → names of its nodes."""
+    then shafts, carriers, the housing; places: name of a shaft → places (K,) m of its nodes in the stage, ascending;
+    names: of a carrier → names of its nodes, of a housing → the supports that meet it."""
 
     numbers: dict[str, int]
     places: dict[str, list[float]]
@@ -46,16 +47,18 @@ class Nodes:
         return self.numbers[body], int(np.argmin(np.abs(np.array(self.places[body]) - wanted)))
 
 
-def stage_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> Nodes:
-    """The nodes of all bodies: those that supports and ports name. carriers: reduced, by name."""
+def stage_nodes(stage: Stage, carriers: Mapping[str, Body] = MappingProxyType({})) -> Nodes:
+    """The nodes of all bodies: those that supports and ports name. carriers: reduced, by name, the housing too."""
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
-    ordered = [body.name for body in (*stage.gears, *shafts, *stage.carriers)]
+    ordered = [body.name for body in (*stage.gears, *shafts, *stage.carriers, *stage.housings)]
     places: dict[str, list[float]] = {}
     for shaft in shafts:
         wanted = [place_of(stage, s) for s in stage.supports if shaft.name in (s.body, s.to)]
         wanted += [stage.place(shaft.name, port.at) for port in stage.ports.values() if port.body == shaft.name]
         places[shaft.name] = _distinct(wanted)
-    names = {name: [str(i["name"]) for i in body.interfaces] for name, body in carriers.items()}
+    names = {own.name: [node.name for node in carriers[own.name].nodes] for own in stage.carriers}
+    for housing in stage.housings:
+        names[housing.name] = [s.name for s in stage.supports if housing.name in (s.body, s.to)]
     return Nodes({name: i for i, name in enumerate(ordered)}, places, names)
 
 
@@ -68,10 +71,10 @@ def place_of(stage: Stage, support: SupportSpec) -> float:
     return stage.place((gears or names)[0], None)
 
 
-def width_degrees(stage: Stage, bodies: Sequence[Any]) -> np.ndarray:
+def width_degrees(stage: Stage, bodies: Sequence[Body]) -> np.ndarray:
     """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width.
     ModelError where bodies have more of them than the kernel takes."""
-    count = min(body.width_functions for body in bodies)
+    count = min(body.toothed.width_functions for body in bodies)
     degrees = symmetric_functions(count) if stage.even else np.arange(count)
     if degrees.size > MOST_FUNCTIONS:
         most = 2 * MOST_FUNCTIONS if stage.even else MOST_FUNCTIONS
@@ -84,24 +87,27 @@ def width_degrees(stage: Stage, bodies: Sequence[Any]) -> np.ndarray:
 
 def stage_layout(
     stage: Stage,
-    bodies: Sequence[Any],
-    carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
+    bodies: Sequence[Body],
+    carriers: Mapping[str, Body] = MappingProxyType({}),
     points: Sequence[np.ndarray] | None = None,
     tangents: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> Layout:
     """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
-    `carriers`. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read; the even
-    grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
+    `carriers` and housing. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read;
+    the even grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     points = even_grids(stage, bodies, ROLLS) if points is None else points
-    free: list[FreeBody] = []
+    free: list[GroundPart] = []
     for i, gear in enumerate(stage.gears):
         same = next((k for k in range(i) if bodies[k] is bodies[i] and np.array_equal(points[k], points[i])), None)
         free.append(_gear(stage, bodies[i], degrees, points[i]) if same is None else free[same])
         free[i] = replace(free[i], name=gear.name)  # a body's file may come from another stage
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
-    free += [replace(free_carrier(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
+    free += [replace(ground_part(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
+    for own in stage.housings:
+        body = carriers[own.name]
+        free.append(replace(housing_part(body, meetings(stage, own, body), own.dynamic_to), name=own.name))
     names = list(stage.rotors)
     bare = Layout(
         free,
@@ -115,37 +121,44 @@ def stage_layout(
             if rotor.carried_by is not None
         },
     )
-    springs = [_springs(bare, nodes.numbers[s.body], s, tangents.get(s.name)) for s in stage.supports]
-    return replace(bare, supports=[_support(stage, nodes, *of) for of in zip(stage.supports, springs, strict=True)])
+    supports = _feet_last(stage)
+    springs = [_springs(bare, nodes.numbers[s.body], s, tangents.get(s.name)) for s in supports]
+    return replace(bare, supports=[_support(stage, nodes, *of) for of in zip(supports, springs, strict=True)])
 
 
-def even_grids(stage: Stage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
+def _feet_last(stage: Stage) -> list[SupportSpec]:
+    """The supports in order, those of a housing behind the others: without it they are as if it were not there."""
+    standing = {housing.name for housing in stage.housings}
+    return sorted(stage.supports, key=lambda support: support.body in standing)
+
+
+def even_grids(stage: Stage, bodies: Sequence[Body], rolls: int) -> list[np.ndarray]:
     """(rolls, R) of every gear: weights of its body's rolls on the even grid."""
     shapes = [gear_shape(gear) for gear in stage.gears]
-    return [resampling(body.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
+    return [resampling(body.toothed.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
 
 
-def _gear(stage: Stage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
+def _gear(stage: Stage, body: Body, degrees: np.ndarray, weights: np.ndarray) -> GroundPart:
     chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
-    return free_gear(body, chosen, degrees, weights, stage.levels)
+    return ground_part(body, Reading(chosen, degrees, weights, stage.levels))
 
 
-def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
+def _all_modes(body: Body, degrees: np.ndarray) -> np.ndarray:
     """Modes that flanks or bore see, pairs whole."""
-    rows = np.abs(body.flank_rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
-    bore = np.abs(body.bore_rows)
-    seen = (rows > SEEN) | (bore > SEEN * bore.max(axis=1, keepdims=True)).any(axis=0)
-    second = np.flatnonzero(body.part == 2)
+    flank, node = body.toothed, np.abs(body.rows)
+    rows = np.abs(flank.rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(flank.rows).max()
+    seen = (rows > SEEN) | (node > SEEN * node.max(axis=1, keepdims=True)).any(axis=0)
+    second = np.flatnonzero(flank.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)
 
 
-def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
+def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> GroundPart:
     m, origin = shaft.material, stage.place(shaft.name, None)
     sections = [Section(s.length, s.outer_diameter, s.bore_diameter) for s in shaft.sections]
     steel = Steel(m.youngs_modulus, m.poisson_ratio, m.density)
-    beam = reduce_shaft(Shaft(sections, steel, [place - origin for place in places]), shaft.stored_to)
-    return free_shaft(shaft.name, beam, shaft.modal_damping)
+    whole = Shaft(sections, steel, [place - origin for place in places])
+    return ground_part(reduce_shaft(whole, shaft.stored_to, None, shaft.name, shaft.modal_damping))
 
 
 @dataclass(frozen=True)
@@ -187,20 +200,32 @@ def _inverse(stiffness: np.ndarray) -> np.ndarray:
 
 
 def _support(stage: Stage, nodes: Nodes, support: SupportSpec, springs: _Springs) -> Support:
-    at = place_of(stage, support)
+    at = None if _is_foot(stage, support) else place_of(stage, support)
+
+    def end(body: str, node: str | None) -> tuple[int, int]:
+        housed = isinstance(stage.bodies[body], HousingBody)
+        return nodes.find(stage, body, at, support.name if housed else node)
+
     return Support(
         name=f"{_kind(stage, support)}.{support.name}",
-        first=nodes.find(stage, support.body, at, support.node if support.to is None else None),
-        second=None if support.to is None else nodes.find(stage, support.to, at, support.node),
+        first=end(support.body, support.node if support.to is None else None),
+        second=None if support.to is None else end(support.to, support.node),
         directions=springs.directions,
         compliance=springs.compliance,
         damping=springs.damping,
     )
 
 
+def _is_foot(stage: Stage, support: SupportSpec) -> bool:
+    return isinstance(stage.bodies[support.body], HousingBody)
+
+
 def _kind(stage: Stage, support: SupportSpec) -> str:
-    """What a support is called: a bearing on the ground, a pin between a carrier and what it carries, else a seat."""
-    if support.to is None:
+    """What a support is called: a foot of a housing is a mount; on the ground or a housing it is a bearing, between a
+    carrier and what it carries a pin, else a seat."""
+    if _is_foot(stage, support):
+        return "mount"
+    if support.to is None or isinstance(stage.bodies[support.to], HousingBody):
         return "bearing"
     return "pin" if stage.rotor_of(support.body) != stage.rotor_of(support.to) else "seat"
 

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.free import NODE_MEMBERS
+from gearfmu.stage.build.ground_part import NODE_MEMBERS
 from gearfmu.stage.build.groups import Group, families
 from gearfmu.stage.build.model import StageModel
 
@@ -29,27 +30,27 @@ def observed_number(stage: Stage, name: str) -> int:
     return names.index(name)
 
 
-def observed_sections(index: int, bodies: Sequence[Any], groups: Sequence[Group]) -> dict[str, Any]:
+def observed_sections(index: int, bodies: Sequence[Body], groups: Sequence[Group]) -> dict[str, Any]:
     """Sections of the blob that make the motion of gear `index` outputs. bodies: reduced gears of the stage."""
     layout, body = groups[0].layout, bodies[index]
-    flank, family = layout.bodies[index].flank, families(layout)[index]
+    flank = layout.bodies[index].flank
     assert flank is not None
     found: dict[str, Any] = {
         f"observed{index}": layout.bodies[index].name,
         f"own_number{index}": np.concatenate([-1 - np.arange(6), flank.low + 1]).astype(np.int32),
-        f"own_member{index}": np.concatenate([NODE_MEMBERS, body.part[flank.low]]).astype(np.int32),
+        f"own_member{index}": np.concatenate([NODE_MEMBERS, body.toothed.part[flank.low]]).astype(np.int32),
         f"mode_number{index}": (flank.chosen + 1).astype(np.int32),
-        f"mode_scale{index}": np.array([1 / math.sqrt(body.mass)]),
+        f"mode_scale{index}": np.array([1 / math.sqrt(body.total_mass)]),
     }
     for s, group in enumerate(groups):
-        read = np.flatnonzero(group.owner == family)
+        read = np.flatnonzero(group.owner == families(group.layout)[index])
         elastic = group.shapes[group.at[index]][len(layout.freedoms(index)) :]
-        rows = np.vstack([group.rigid(index), elastic / math.sqrt(body.mass)])
+        rows = np.vstack([group.rigid(index), elastic / math.sqrt(body.total_mass)])
         found[f"own_rows{index}_{s}"] = np.ascontiguousarray(rows[:, read])
     return found
 
 
-def gear_bodies(stage: Stage, bodies: Sequence[Any]) -> dict[str, Any]:
+def gear_bodies(stage: Stage, bodies: Sequence[Body]) -> dict[str, Body]:
     """`Stage.by_name` of the gears alone."""
     found = stage.by_name(bodies)
     return {gear.name: found[gear.name] for gear in stage.gears}
@@ -57,4 +58,5 @@ def gear_bodies(stage: Stage, bodies: Sequence[Any]) -> dict[str, Any]:
 
 def gear_hashes(model: StageModel) -> dict[str, str]:
     """Hash of the reduced body of every gear of a model."""
-    return gear_bodies(model.stage, model.body_hashes)
+    found = model.stage.by_name(model.body_hashes)
+    return {gear.name: found[gear.name] for gear in model.stage.gears}

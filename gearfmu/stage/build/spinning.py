@@ -16,12 +16,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 
-from gearfmu.body.beam import BeamBody
+from gearfmu.body.body import Body
 
 RX, RY, RZ, RIGID = 3, 4, 5, 6
 HIGHEST = 2 * math.pi * 100e3  # rad/s: patterns above it feel 2Ω/ω < 2e-3 at 600 rad/s, and are left out
@@ -45,20 +44,17 @@ def rigid_spinning(mass: np.ndarray, patterns: int) -> Spinning:
     return Spinning(h - h.T, q - q.T)
 
 
-def shaft_spinning(beam: BeamBody) -> Spinning:
-    """Of a shaft, whose sections tilt."""
-    return Spinning(beam.gyroscopic, rigid_spinning(beam.mass, beam.omega.size).coriolis)
-
-
-def gear_spinning(body: Any, mass: np.ndarray, low: np.ndarray) -> Spinning:
-    """Of a reduced gear with the patterns `low` of nodal diameter 0 and 1; elastic where its file tells
-    (`ReducedBody.spin`), else rigid."""
-    rigid = rigid_spinning(mass, low.size)
-    if getattr(body, "spin", None) is None:
-        return rigid
+def body_spinning(body: Body, low: np.ndarray) -> Spinning | None:
+    """Of a body with the patterns `low`: sections of a beam tilt, patterns of a gear feel what `Body.spin` tells; None
+    of one that turns as if rigid."""
+    if body.exact is not None:
+        return Spinning(body.exact.gyroscopic, rigid_spinning(body.mass, low.size).coriolis)
+    if body.spin is None:
+        return None
+    rigid, flank = rigid_spinning(body.mass, low.size), body.toothed
     h, q = rigid.gyroscopic, rigid.coriolis
-    own = (body.nodal_diameter[low] == 1) & (2 * np.pi * body.frequency[low] < HIGHEST)
-    first = np.flatnonzero(own & (body.part[low] == 1))
+    own = (flank.diameter[low] == 1) & (2 * np.pi * body.frequency[low] < HIGHEST)
+    first = np.flatnonzero(own & (flank.part[low] == 1))
     quarter = np.zeros((low.size, low.size))
     quarter[first + 1, first] = 1.0
     quarter -= quarter.T
@@ -69,12 +65,12 @@ def gear_spinning(body: Any, mass: np.ndarray, low: np.ndarray) -> Spinning:
     return rigid
 
 
-def turn_rates(body: Any, chosen: np.ndarray) -> np.ndarray | None:
+def turn_rates(body: Body, chosen: np.ndarray) -> np.ndarray | None:
     """(m,): Coriolis coupling of the pairs among the modes `chosen` of a gear group, first member into second; other
     couplings move frequencies by the square of Ω/ω. None where its file does not tell."""
-    if getattr(body, "spin", None) is None:
+    if body.spin is None:
         return None
-    part = body.part[chosen]
+    part = body.toothed.part[chosen]
     rates = np.zeros(chosen.size)
     first = np.flatnonzero(part == 1)
     rates[first] = rates[first + 1] = body.spin.coupling[chosen[first + 1], chosen[first]]

@@ -3,9 +3,9 @@ width functions that the stage can excite."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from gearfmu.body import Body
 
 ROLLS = 48  # error and price of the grid: docs/decisions.md
 MOST_FUNCTIONS = 6
@@ -29,14 +29,14 @@ def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS
     return terms / sum(terms.T)[:, None]
 
 
-def stored_points(body: Any, s_form: float, s_tip: float, rolls: int) -> tuple[np.ndarray, np.ndarray]:
+def stored_points(body: Body, s_form: float, s_tip: float, rolls: int) -> tuple[np.ndarray, np.ndarray]:
     """Where a model stores what a flank reads: at the body's own R points, or on the even grid where that has fewer.
 
     (P, R) weights from the body's points to those that are stored, (rolls, P) from these to the even grid.
     """
-    to_grid = resampling(body.roll, s_form, s_tip, rolls)
-    own = body.roll.size < rolls
-    return (np.eye(body.roll.size), to_grid) if own else (to_grid, np.eye(rolls))
+    to_grid = resampling(body.toothed.roll, s_form, s_tip, rolls)
+    own = body.toothed.roll.size < rolls
+    return (np.eye(body.toothed.roll.size), to_grid) if own else (to_grid, np.eye(rolls))
 
 
 def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
@@ -65,12 +65,13 @@ def symmetric_functions(count: int) -> np.ndarray:
     return np.arange(0, count, 2)
 
 
-def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
+def excited_modes(body: Body, degrees: np.ndarray) -> np.ndarray:
     """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay
     together. Of modes of no parity (imported bodies without a mirror at mid-width) the rows of the chosen functions
     count."""
-    rows = np.abs(body.flank_rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
-    seen = (rows > 1e-9) & (body.parity >= 0)
-    second = np.flatnonzero(body.part == 2)
+    flank = body.toothed
+    rows = np.abs(flank.rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(flank.rows).max()
+    seen = (rows > 1e-9) & (flank.parity >= 0)
+    second = np.flatnonzero(flank.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from gearfmu.body.body import Flank
 from gearfmu.spec.forms.general import RingBody
 from gearfmu.spec.forms.shapes import GearShape
 from gearfmu.spec.tables.gear import GearSpec
@@ -44,13 +44,13 @@ def gear_section(gear: GearSpec | RingBody, shape: GearShape, phase: float, plac
     )
 
 
-def mismatches(gear: GearSpec | RingBody, shape: GearShape, body: Any) -> list[str]:
-    """What says that a reduced body is not that of a gear, one sentence each; empty when it is."""
+def mismatches(gear: GearSpec | RingBody, shape: GearShape, flank: Flank) -> list[str]:
+    """What says that a body's teeth are not those of a gear, one sentence each; empty when it is."""
     pairs = {
-        "teeth": (gear.teeth, body.teeth),
-        "base radius": (shape.r_b, body.r_b),
-        "face width": (gear.face_width, body.face_width),
-        "load strip": (gear.body.strip_half_width, body.strip_half_width),
+        "teeth": (gear.teeth, flank.teeth),
+        "base radius": (shape.r_b, flank.r_b),
+        "face width": (gear.face_width, flank.face_width),
+        "load strip": (gear.body.strip_half_width, flank.strip_half_width),
     }
     found = [
         f"body of {gear.name}: {what} {have:g} instead of {want:g}"
@@ -58,9 +58,9 @@ def mismatches(gear: GearSpec | RingBody, shape: GearShape, body: Any) -> list[s
         if not math.isclose(want, have, rel_tol=1e-9)
     ]
     low, high = sorted((shape.s_form, shape.s_tip))
-    if not low - 1e-9 <= body.roll.min() <= body.roll.max() <= high + 1e-9:
+    if not low - 1e-9 <= flank.roll.min() <= flank.roll.max() <= high + 1e-9:
         found.append(
-            f"body of {gear.name}: its rolls {body.roll.min():g} … {body.roll.max():g} m "
+            f"body of {gear.name}: its rolls {flank.roll.min():g} … {flank.roll.max():g} m "
             f"leave the flank {low:g} … {high:g} m"
         )
     return found

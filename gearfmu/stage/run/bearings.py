@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, pass_orders, pass_swing
+from gearfmu.body import Body
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.assembly import settled
 from gearfmu.stage.build.rolling import BALL_NUMBERS, ROLLER_NUMBERS, filled
@@ -86,7 +87,7 @@ class Bearings(Shown):
         return found
 
 
-def stage_bearings(stage: Stage, bodies: Sequence[object], torque: float | None = None) -> Bearings:
+def stage_bearings(stage: Stage, bodies: Sequence[Body], torque: float | None = None) -> Bearings:
     """The rolling bearings of a stage under a torque on its input, N·m; that of the file when None. ModelError where it
     has none, and where one cannot carry its load."""
     found = settled(stage, bodies, torque)

@@ -1,7 +1,7 @@
 """How large the terms of turning axes are in a stage, those that the kernel computes and those that it leaves out: at
 the largest speed and load, from the formula of each (docs/theory.md 3.11).
 
-A gear's numbers need its file's group "spin" (`ReducedBody.spin`); what has none is not listed.
+A gear's numbers need its file's group "spin" (`Body.spin`); what has none is not listed.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from gearfmu.body import Body
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.forms.turning import turns
@@ -84,13 +84,13 @@ def largest_speeds(stage: Stage) -> dict[str, float]:
     return {name: speed * min(units, default=0.0) for name, speed in per.items()}
 
 
-def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -> GearInertia | None:
+def gear_inertia(name: str, body: Body, speed: float, force: float, cut: float) -> GearInertia | None:
     """Of a reduced gear under a normal force (N), modes up to `cut` (Hz); None where its file does not tell."""
     rates, spin = turn_rates(body, np.arange(body.modes)), body.spin
-    if rates is None:
+    if rates is None or spin is None:
         return None
     omega, low = 2 * np.pi * body.frequency, body.frequency < cut
-    middle, polar = len(body.roll) // 2, body.inertia[2, 2]
+    middle, polar = len(body.toothed.roll) // 2, body.inertia[2, 2]
     growth = float(np.abs(spin.growth[0, middle, 0]))
     return GearInertia(
         name=name,
@@ -98,13 +98,13 @@ def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -
         whirl=float((2 * speed * np.abs(rates) / omega)[low].max(initial=0.0)),
         stiffening=float((0.5 * np.abs(spin.stiffening) * (speed / omega) ** 2)[low].max(initial=0.0)),
         growth=growth * speed**2,
-        deflection=float(body.static_ff[0, 0, 0, middle, middle, 0, 0]) * force,
+        deflection=float(body.toothed.static[0, 0, 0, middle, middle, 0, 0]) * force,
         by_load=2 * growth * force / polar,
         by_speed=spin.inertia * speed**2 / polar,
     )
 
 
-def inertia_terms(stage: Stage, bodies: Mapping[str, Any]) -> list[GearInertia]:
+def inertia_terms(stage: Stage, bodies: Mapping[str, Body]) -> list[GearInertia]:
     """Of the gears of a stage whose files tell; bodies: by name (`observed.gear_bodies`)."""
     speeds, force = largest_speeds(stage), largest_forces(stage)
     found = [
@@ -126,7 +126,7 @@ def largest_forces(stage: Stage) -> dict[str, float]:
     return forces
 
 
-def whirling(stage: Stage, bodies: Sequence[Any]) -> tuple[float, float, list[str]]:
+def whirling(stage: Stage, bodies: Sequence[Body]) -> tuple[float, float, list[str]]:
     """At the largest speeds `whirl_shift` below WHIRL_BAND, the largest `GearInertia.whirl`, and gears whose files do
     not tell; bodies as of `assemble`."""
     toothed = gear_bodies(stage, bodies)

@@ -126,11 +126,16 @@ typedef gk_real gk_four __attribute__((vector_size(4 * sizeof(gk_real)), may_ali
 #define GK_WIDENED(four) __builtin_convertvector(four, gk_quad)
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
                                        aligned(sizeof(gk_real)))); /* states start anywhere */
+/* halves that hold n numbers; numbers in them */
+static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
+static inline int gk_whole_halves(int n) { return gk_halves(n) * (LANES / 2); }
 /* x, or 0 where it is less than `least` in magnitude: numbers that fade end at 0 before products of them are denormal,
  * which many processors compute slowly; by the same bits on all */
 typedef gk_whole gk_half_bits
     __attribute__((vector_size(LANES / 2 * sizeof(gk_whole)), may_alias, aligned(sizeof(gk_whole))));
 #define GK_HALF_FADED(x, least) ((gk_half)((gk_half_bits)(x) & (((x) >= (least)) | ((x) <= -(least)) | GK_SIGN)))
+#define GK_HALF_MAGNITUDE(x) ((gk_half)((gk_half_bits)(x) & ~GK_SIGN))
+#define GK_HALF_LARGER(x, y) ((gk_half)(((gk_half_bits)(x) & ((x) > (y))) | ((gk_half_bits)(y) & ~((x) > (y)))))
 #define GK_QUAD_FADED(x, least) ((gk_quad)((gk_bits)(x) & (((x) >= (least)) | ((x) <= -(least)) | INT64_MIN)))
 /* a half in double, to and fro, and its quads: the form that compilers turn into single instructions */
 typedef double gk_eight __attribute__((vector_size(LANES / 2 * sizeof(double)), may_alias, aligned(sizeof(double))));
@@ -174,6 +179,39 @@ static inline double gk_across(const gk_half *sum)
 {
     const gk_four *half = (const gk_four *)sum, s = half[0] + half[1];
     return (s[0] + s[2]) + (s[1] + s[3]);
+}
+
+/* y += Σ x_i rows_i over a few halves, which stay in registers */
+GK_INLINE void gk_sum_some(const gk_half *rows, int width, const gk_real *x, int count, gk_half *y, const int halves)
+{
+    gk_half sum[8];
+    for (int k = 0; k < halves; k++) sum[k] = y[k];
+    int i = 0;
+    for (; i + 2 <= count; i += 2, rows += 2 * width)
+        for (int k = 0; k < halves; k++) sum[k] = (sum[k] + x[i] * rows[k]) + x[i + 1] * rows[width + k];
+    for (int k = 0; k < halves && i < count; k++) sum[k] += x[i] * rows[k];
+    for (int k = 0; k < halves; k++) y[k] = sum[k];
+}
+
+/* the same of whole rows, `width` halves each */
+static inline void gk_sum_rows(const gk_real *rows, int width, const gk_real *x, int count, gk_real *y)
+{
+    GK_ASSERT(count >= 0 && width >= 0);
+    const gk_half *from = (const gk_half *)rows;
+    gk_half *to = (gk_half *)y;
+    int k = 0;
+    for (; k + 8 <= width; k += 8) gk_sum_some(from + k, width, x, count, to + k, 8);
+    for (; k + 4 <= width; k += 4) gk_sum_some(from + k, width, x, count, to + k, 4);
+    if (width - k == 3) gk_sum_some(from + k, width, x, count, to + k, 3), k += 3;
+    if (k + 2 <= width) gk_sum_some(from + k, width, x, count, to + k, 2), k += 2;
+    if (k < width) gk_sum_some(from + k, width, x, count, to + k, 1);
+}
+
+static inline double gk_half_largest(const gk_half *x)
+{
+    double most = 0.0;
+    for (int i = 0; i < LANES / 2; i++) most = gk_max(most, (*x)[i]);
+    return most;
 }
 
 /* to[i] += row·rows[i], four rows side by side; rows are `width` halves apart, of which the product takes `halves` */

@@ -44,6 +44,13 @@ static double tilting(const gk_posed *q)
     return q->e->width * angle;
 }
 
+/* what may close of the gaps of a side beside its nearest: tilts, of spur teeth as they are */
+static double leaning(const gk_posed *q)
+{
+    if (!q->setup->spatial) return 0.0;
+    return q->mesh->helix[0] == 0.0 && q->mesh->helix[1] == 0.0 ? gk_min(LEAN, tilting(q)) : LEAN;
+}
+
 /* Every slice by itself; 0 when none comes within `search_distance`. Slices of spur teeth with the same deviations have
  * one section; those of helical ones, for nodal contact, touch where they are nearest to the flanks. */
 static int slices_of(const gk_posed *q, gk_tooth_flanks *f, const double roll[2], double search_distance,
@@ -160,8 +167,7 @@ static int find_side(const gk_posed *q, const gk_flank_side *s, double search_di
 {
     double ends[2];
     int found = 0;
-    const double leaning = q->setup->spatial ? LEAN : 0.0;
-    if (!(s->gap - q->mesh->protrusion - leaning < search_distance))
+    if (!(s->gap - q->mesh->protrusion - leaning(q) < search_distance))
         return 0; /* the whole side is open: it costs this one comparison */
     if (!teeth(q, s, ends)) return -1;
     for (int k = (int)gk_floor(ends[0]) + 1; k <= (int)gk_floor(ends[1]) && found < room; k++)
@@ -215,7 +221,7 @@ static int coast_is_open(const gk_posed *q, const gk_mesh *mesh, const gk_flank_
                          double search_distance)
 {
     const double apart = a - mesh->distance, sum = mesh->clearance + mesh->clearance_slope * apart;
-    return sum - drive->gap - mesh->protrusion - (q->setup->spatial ? LEAN : 0.0) >
+    return sum - drive->gap - mesh->protrusion - leaning(q) >
            search_distance + SURE + BENDS * apart * apart / mesh->distance;
 }
 

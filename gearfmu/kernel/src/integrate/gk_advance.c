@@ -2,6 +2,7 @@
  * as if alone and in closed form. Predicted with the forces of the last step, corrected with those that were found.
  * Around both, half a step each, what turns speeds or damps supports (Strang). */
 #include "integrate/gk_advance.h"
+#include "integrate/gk_crowd.h"
 #include "integrate/gk_integrate.h"
 #include "problem/gk_exchange.h"
 
@@ -22,11 +23,11 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
                             double *v)
 {
     const int n = setup->base.n;
-    double taken = 0.0;
+    double taken = setup->base.crowd_dampers ? gk_crowd_damp(model, &setup->base, k, f, v) : 0.0;
     for (int d = 0; d < model->supports; d++) {
         const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
         const gk_span span = setup->base.damper_span[d];
-        if (!(k->ground.decay[d] > 0.0)) continue;
+        if (!(k->ground.decay[d] > 0.0) || gk_in_crowd(&setup->base, span)) continue;
         const double held = gk_dot_span(span, k->ground.holds + d * n, f), speed = gk_dot_span(span, e, v) - held;
         gk_axpy_span(span, -k->ground.decay[d] * speed, pulls, v);
         taken += speed * (k->ground.loss[d] * speed + k->ground.gain[d] * held);

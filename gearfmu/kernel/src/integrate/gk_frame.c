@@ -3,6 +3,7 @@
  * elastic bodies (17l): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
  * by Cayley's form, without energy; one after the other, in the other half step in the other order. Centrifugal load
  * m Ω² a (17g). */
+#include "integrate/gk_crowd.h"
 #include "integrate/gk_integrate.h"
 
 static int carries(const gk_model *model, int rotor)
@@ -34,11 +35,14 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
 {
     GK_ASSERT(k->h > 0.0 && v);
     const gk_base *base = &setup->base;
+    if (base->crowd.width && !back) gk_crowd_turn(base, k, data, v);
     for (int j = 0; j < base->turns; j++) {
         const int i = back ? base->turns - 1 - j : j;
         const double speed = GK_OF(data, v)[base->turn_rotor[i]];
-        if (speed != 0.0) turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
+        if (speed != 0.0 && !gk_in_crowd(base, base->turn_span[i]))
+            turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
     }
+    if (base->crowd.width && back) gk_crowd_turn(base, k, data, v);
 }
 
 /* ---- gear groups ------------------------------------------------------------------------------------------------- */
@@ -138,17 +142,19 @@ double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coe
     GK_ASSERT(k && v);
     const gk_base *base = &setup->base;
     const gk_ground_flow *f = &k->ground;
-    double work = 0.0;
+    gk_quad work = {0}, *to = (gk_quad *)v;
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++) {
-        const double *outward = base->outward + r * base->n, speed2 = GK_OF(data, v)[r] * GK_OF(data, v)[r];
-        for (int i = 0; i < base->n && carries(model, r); i++) {
-            if (outward[i] == 0.0 || !(f->a12[i] != 0.0)) continue;
-            const double kick = -f->d11[i] / (f->a12[i] * base->omega2[i]) * speed2 * outward[i];
-            work += f->inverse_s2[i] * (v[i] + 0.5 * kick) * kick;
-            v[i] += kick;
+        const gk_quad *outward = (const gk_quad *)(base->outward + r * base->n), *press = (const gk_quad *)f->press,
+                      *weight = (const gk_quad *)f->inverse_s2;
+        const double speed2 = GK_OF(data, v)[r] * GK_OF(data, v)[r];
+        if (!carries(model, r)) continue;
+        for (int q = 0; q < base->n / 4; q++) {
+            const gk_quad kick = press[q] * speed2 * outward[q];
+            work += weight[q] * (to[q] + 0.5 * kick) * kick;
+            to[q] += kick;
         }
     }
-    return work;
+    return (work[0] + work[2]) + (work[1] + work[3]);
 }
 
 /* adds the centrifugal loads themselves */

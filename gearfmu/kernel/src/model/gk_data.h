@@ -75,7 +75,7 @@ typedef struct gk_energy {
 } gk_energy;
 
 typedef double gk_shaft_values[SHAFT_VARS], gk_rotor_values[ROTOR_VARS], gk_mesh_values[MESH_VARS],
-    gk_support_values[SUPPORT_VARS];
+    gk_support_values[SUPPORT_VARS], gk_sensor_values[SENSOR_VARS];
 typedef gk_joint_state gk_joint_states[JOINTS];
 
 /* Arrays behind the head of gk_data: GK_ARRAY(name, type of an element, how many). What `mesh` and those before it hold
@@ -90,6 +90,7 @@ typedef gk_joint_state gk_joint_states[JOINTS];
     GK_ARRAY(shaft, gk_shaft_values, model->ports)                                                                     \
     GK_ARRAY(rotor, gk_rotor_values, model->rotors)                                                                    \
     GK_ARRAY(support, gk_support_values, model->supports)                                                              \
+    GK_ARRAY(sensor, gk_sensor_values, model->sensors)                                                                 \
     GK_ARRAY(mesh, gk_mesh_values, model->engagements)                                                                 \
     GK_ARRAY(x, double, spins)                                                                                         \
     GK_ARRAY(v, double, spins)                                                                                         \

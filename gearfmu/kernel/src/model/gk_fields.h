@@ -15,6 +15,7 @@ enum {
 #define GK_SYMBOLS(S)                                                                                                  \
     S(rotors) S(gears) S(engagements) S(ports) S(supports) S(functions) S(rolls) S(z) S(modes) S(reads)     \
     S(ground) S(carried) S(whirls) S(own) S(starts) S(flank_teeth) S(flank_places) S(flank_rolls)                      \
+    S(sensors) /* directions of points of the housing */                                                               \
     S(points) /* of a flank where rows are stored */                                                                   \
     S(low)    /* modes of nodal diameter 0 and 1 */                                                                    \
     S(flanks) /* with tables of their own */                                                                           \

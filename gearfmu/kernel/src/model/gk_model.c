@@ -176,6 +176,19 @@ static int is_spatial(const gk_model *m)
     return 0;
 }
 
+/* directions of points of the housing */
+static void read_sensors(gk_reader *r, gk_model *m)
+{
+    const uint64_t count = gk_read_count(r, F_MODEL_sensed);
+    gk_read_demand(r, count <= MAX_SENSORS, "number of sensors");
+    r->shape.size[SYMBOL_sensors] = count;
+    const int32_t *sensed = gk_read_take(r, F_MODEL_sensed);
+    if (r->outcome) return;
+    for (uint64_t i = 0; i < count; i++) gk_read_demand(r, gk_read_counted(sensed + i, 0, 2), "directions of sensors");
+    if (count) read_names(r, F_MODEL_sensor_names, (int)count, m->sensor_name);
+    m->sensors = (int)count;
+}
+
 static void read_ground(gk_reader *r, gk_model *m, int set)
 {
     gk_ground *g = &m->ground[set];
@@ -189,9 +202,12 @@ static void read_ground(gk_reader *r, gk_model *m, int set)
     g->rigid_share = gk_read_bounded(r, F_SET_rigid_share, 1.001);
     g->damper_rows = gk_read_bounded(r, F_SET_damper_rows, 1e6), g->damper = gk_read_take(r, F_SET_damper);
     g->support_rows = gk_read_bounded(r, F_SET_support_rows, 1e6), g->kappa = gk_read_bounded(r, F_SET_kappa, 1e17);
+    g->carrying = g->kappa ? m->supports : 0;
+    while (g->carrying && g->kappa[(g->carrying - 1) * (m->supports + 1)] == 0.0) g->carrying--;
     g->support_compliance = gk_read_bounded(r, F_SET_support_compliance, 1e3);
     g->support_coupling = gk_read_bounded(r, F_SET_support_coupling, 1e3);
     g->port_rows = gk_read_bounded(r, F_SET_port_rows, 1e6);
+    g->sensor_rows = gk_read_bounded(r, F_SET_sensor_rows, 1e6);
     g->carried_rows = gk_read_bounded(r, F_SET_carried_rows, 1e6);
     if (m->carried && !g->carried_rows) gk_read_refuse(r, "motion of carried bodies", "is missing");
     g->whirl_rows = gk_read_bounded(r, F_SET_whirl_rows, 1e6);
@@ -291,6 +307,8 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     read_names(&r, F_MODEL_rotor_names, model->rotors, model->rotor_name);
     read_names(&r, F_MODEL_support_names, model->supports, model->support_name);
     read_names(&r, F_MODEL_displacement_names, model->supports, model->displacement_name);
+    model->housed = model->sets > 2;
+    if (!r.outcome) read_sensors(&r, model);
     if (!r.outcome) read_stage(&r, model);
     if (!r.outcome) read_ports(&r, model);
     for (int i = 0; i < model->sets && !r.outcome; i++) read_ground(&r, model, i);

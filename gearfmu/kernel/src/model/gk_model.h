@@ -12,6 +12,7 @@ enum {
     MAX_ENGAGEMENTS = GK_HIGH_ENGAGEMENTS,
     MAX_PORTS = GK_HIGH_PORTS,
     MAX_SUPPORTS = GK_HIGH_SUPPORTS, /* directions */
+    MAX_SENSORS = 255, /* directions in which points of the housing are felt */
     MAX_SLICES = GK_HIGH_SLICES,
     MAX_FUNCTIONS = 8,
     LEADS = 33,       /* places across the face width where a lead is given */
@@ -25,7 +26,7 @@ enum {
     MAX_LOW = 1000,   /* modes of nodal diameter 0 and 1 of a gear */
     MAX_OWN = 1000,   /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
     OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual */
-    SETS = 2,         /* of ground oscillators: as supported; with the supports held */
+    SETS = 3,         /* of ground oscillators: as supported; with the supports held; without a housing */
     NAME_LENGTH = 32,
     MAX_NODES = GK_HIGH_NODES, /* of a flank along or across */
     MAX_FLANK_ROLLS = 1025,
@@ -40,7 +41,7 @@ typedef struct gk_observed {
     int from, own;                               /* its first amplitude among those of the model; rows of `rows` */
     const int32_t *own_number, *member, *number; /* (own), (own), (modes of the gear group) */
     double scale;
-    const double *rows[2]; /* by set: (own, reads) */
+    const double *rows[SETS]; /* by set: (own, reads) */
 } gk_observed;
 
 /* what the flanks of a gear are beside their involutes */
@@ -113,9 +114,9 @@ typedef struct gk_port {
 
 /* ground oscillators of one set */
 typedef struct gk_ground {
-    int n;
+    int n, carrying; /* supports that carry: behind them the feet of a housing that is left out */
     const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance,
-        *support_coupling, *kappa, *port_rows, *carried_rows, *whirl_rows;
+        *support_coupling, *kappa, *port_rows, *carried_rows, *whirl_rows, *sensor_rows;
 } gk_ground;
 
 struct gk_model {
@@ -126,9 +127,11 @@ struct gk_model {
     const int32_t *start_reference;
     const double *start_value;
     int slices, rotors, gears, engagements, ports, supports, functions, rolls, sets, chains;
+    int sensors;    /* directions of points of the housing */
+    int housed;     /* a housing carries the bearings; it can be left out */
     int amplitudes; /* of observed gears, together */
     char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],
-        displacement_name[MAX_SUPPORTS][NAME_LENGTH];
+        displacement_name[MAX_SUPPORTS][NAME_LENGTH], sensor_name[MAX_SENSORS][NAME_LENGTH];
     int spatial; /* something moves along the axis or tilts, or the teeth are not the same all over the width */
     double cut[2], h_max, period_min;
     int degree[MAX_FUNCTIONS];

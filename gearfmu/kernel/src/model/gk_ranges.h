@@ -15,7 +15,7 @@
 #define GK_LOW_PORTS 0
 #define GK_HIGH_PORTS 16
 #define GK_LOW_SUPPORTS 0 /* directions in which bodies are held */
-#define GK_HIGH_SUPPORTS 64
+#define GK_HIGH_SUPPORTS 256
 #define GK_LOW_TEETH 1
 #define GK_HIGH_TEETH 1000
 #define GK_USUAL_H 1e-4 /* s: communication step of a model description */

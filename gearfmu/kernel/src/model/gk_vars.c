@@ -17,6 +17,7 @@ typedef enum {
     DEVIATING,
     RUNNING_OUT,
     RUBBING,
+    HOUSED,
     OBSERVED
 } gk_exists;
 enum {
@@ -25,6 +26,7 @@ enum {
     ROTOR = SCOPE_ROTOR,
     MESH = SCOPE_MESH,
     SUPPORT = SCOPE_SUPPORT,
+    SENSOR = SCOPE_SENSOR,
     MODE = SCOPE_MODE
 };
 typedef struct gk_row {
@@ -56,6 +58,7 @@ static int instances(const gk_model *model, gk_scope scope)
     case SCOPE_ROTOR: return model->rotors;
     case SCOPE_MESH: return model->engagements;
     case SCOPE_SUPPORT: return model->supports;
+    case SCOPE_SENSOR: return model->sensors;
     case SCOPE_MODE: return model->amplitudes;
     default: return 1;
     }
@@ -79,6 +82,7 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     case DEVIATING: return model->deviating;
     case RUNNING_OUT: return model->running_out;
     case RUBBING: return model->rubbing;
+    case HOUSED: return model->housed;
     }
     return 0;
 }
@@ -104,6 +108,7 @@ static double *value_of(gk_data *data, const gk_row *row, int instance)
     case SCOPE_ROTOR: return &GK_OF(data, rotor)[instance][row->place];
     case SCOPE_MESH: return &GK_OF(data, mesh)[instance][row->place];
     case SCOPE_SUPPORT: return &GK_OF(data, support)[instance][row->place];
+    case SCOPE_SENSOR: return &GK_OF(data, sensor)[instance][row->place];
     case SCOPE_MODE: return GK_OF(data, oscillator) + data->amplitudes + instance;
     default: return &data->stage[row->place];
     }
@@ -134,6 +139,7 @@ static const char *instance_name(const gk_model *model, const gk_row *row, int i
     case SCOPE_ROTOR: return model->rotor_name[instance];
     case SCOPE_MESH: return model->engagement[instance].name;
     case SCOPE_SUPPORT: return model->support_name[instance];
+    case SCOPE_SENSOR: return model->sensor_name[instance];
     default: return "";
     }
 }
@@ -189,10 +195,10 @@ int gk_variable_count(const gk_model *model)
     return count;
 }
 
-/* shafts, rotors, engagements, supports one after the other, then the stage */
+/* shafts, rotors, supports, sensors, engagements one after the other, then the stage */
 static const gk_row *listed(const gk_model *model, int index, int *instance)
 {
-    static const gk_scope order[SCOPES] = {SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_SUPPORT,
+    static const gk_scope order[SCOPES] = {SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_SUPPORT, SCOPE_SENSOR,
                                            SCOPE_MESH,  SCOPE_STAGE, SCOPE_MODE};
     for (int s = 0; s < SCOPES; s++)
         for (int k = 0; k < instances(model, order[s]); k++)

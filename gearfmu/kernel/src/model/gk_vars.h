@@ -4,7 +4,16 @@
 #include "gk.h"
 #include "model/gk_effects.h"
 
-typedef enum gk_scope { SCOPE_STAGE, SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_MESH, SCOPE_SUPPORT, SCOPE_MODE, SCOPES } gk_scope;
+typedef enum gk_scope {
+    SCOPE_STAGE,
+    SCOPE_SHAFT,
+    SCOPE_ROTOR,
+    SCOPE_MESH,
+    SCOPE_SUPPORT,
+    SCOPE_SENSOR,
+    SCOPE_MODE,
+    SCOPES
+} gk_scope;
 
 /* places are counted from 0 in every scope */
 enum {

@@ -18,8 +18,9 @@ static const double TOLERANCE = 3e-7;          /* of the largest gap and deflect
 static const double AT_REST_TOLERANCE = 2e-8;  /* of statics */
 static const double FRICTION_TOLERANCE = 1e-7; /* of the largest normal force */
 #endif
-static const double SOON = 1e-4;        /* from here on the next pass may be the last, and reads what stores energy */
-static const double NEGLIGIBLE = 1e-12; /* m, rad: of a gap and deflection that are none */
+static const double SOON = 1e-4; /* from here on the next pass may be the last, and reads what stores energy */
+static const double BENT = 0.01, ROUGHLY = 1e-5; /* of what others do anew, of all: what a local law may bend yet */
+static const double NEGLIGIBLE = 1e-12;          /* m, rad: of a gap and deflection that are none */
 
 /* Takes what a pass has read, less what the engagement's own matrices say. Returns how much that has changed, against
  * the largest gap and deflection: of contacts where there are any, else of joints. A joint's gap may be the angle of a
@@ -119,7 +120,10 @@ static double solve_each(gk_coupled *c, int round, int in_turn, double *gaps)
     for (int e = 0; e < c->model->engagements; e++) {
         if (!gk_is_within(c, e)) continue;
         if (in_turn) read_all(c, 0);
-        *gaps = gk_max(*gaps, take_whole(c, e));
+        const double taken = take_whole(c, e), enough = c->sweeps ? AT_REST_TOLERANCE : TOLERANCE;
+        *gaps = gk_max(*gaps, taken);
+        if (!GK_ON(c->setup, friction))
+            c->work->engaged[e].system.bends = gk_clamp(BENT * taken, 0.1 * enough, ROUGHLY);
         change = gk_max(change, solve_own(c, e, round));
     }
     return change;

@@ -67,7 +67,7 @@ static void recall_forces(const gk_data *data, gk_system *s)
 {
     const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
     s->limit_reached = s->iterations = s->dashpots = s->dashpots_stand = 0;
-    s->alpha = 0.0;
+    s->alpha = s->bends = 0.0;
     gk_clear(s->direction, quads);
     gk_clear(s->delta + 4 * whole, joints); /* links know no local law */
     gk_clear(s->yield + 4 * whole, joints);

@@ -244,6 +244,8 @@ void gk_exchange_read_bores(const gk_setup *setup, const gk_engaged *engaged, co
         if (gk_rows_at_bore(setup, s, i)) read[i] += bores->turned[s->port_of[i]];
     for (int w = 0; w < 2; w++) {
         const int port = setup->mesh[engaged->index].side[w].port_of;
-        for (int i = 0; i < s->contacts && port >= 0; i++) read[i] -= engaged->bore[w][i] * bores->moment[port];
+        const int whole = port < 0 || bores->moment[port] == 0.0 ? 0 : s->contacts / 4;
+        if (whole) gk_axpy(-bores->moment[port], engaged->bore[w], read, 0, whole);
+        for (int i = 4 * whole; i < s->contacts && port >= 0; i++) read[i] -= engaged->bore[w][i] * bores->moment[port];
     }
 }

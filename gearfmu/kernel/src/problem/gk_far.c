@@ -67,14 +67,19 @@ static void list_teeth(const gk_coupled *c, gk_engaged *from, int v, gk_engaged 
 /* Lists pairs of teeth that feel each other in an island */
 void gk_far_list(const gk_coupled *c)
 {
-    const gk_mesh *mesh = c->setup->mesh;
     c->work->far_pairs = 0;
-    for (int i = 0; i < 2 * c->model->engagements; i++)
-        for (int j = 0; j < 2 * c->model->engagements; j++) {
-            const int a = i / 2, b = j / 2, w = i % 2, v = j % 2, g = mesh[a].side[w].gear;
-            if (a == b || mesh[a].island != c->island || mesh[b].side[v].gear != g || !c->setup->far_on[g]) continue;
-            list_teeth(c, &c->work->engaged[b], v, &c->work->engaged[a], w);
+    for (int g = 0; g < c->model->gears; g++) {
+        int side[2 * MAX_ENGAGEMENTS], count = 0;
+        for (int i = 0; i < 2 * c->model->engagements && c->setup->far_on[g]; i++) {
+            const gk_mesh *mesh = &c->setup->mesh[i / 2];
+            if (mesh->island == c->island && mesh->side[i % 2].gear == g) side[count++] = i;
         }
+        for (int i = 0; i < count; i++)
+            for (int j = 0; j < count; j++)
+                if (side[i] / 2 != side[j] / 2)
+                    list_teeth(c, &c->work->engaged[side[j] / 2], side[j] % 2, &c->work->engaged[side[i] / 2],
+                               side[i] % 2);
+    }
 }
 
 /* what loads on teeth move at those that were listed */

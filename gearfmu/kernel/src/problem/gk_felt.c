@@ -62,18 +62,6 @@ void gk_felt_rows(const gk_setup *setup, gk_work *work, int e, int w)
     }
 }
 
-/* y += forces x by the columns of a matrix (rows, columns) */
-GK_INLINE void add_columns(const gk_real *matrix, const gk_real *x, int rows, int columns, gk_real *y, const int halves)
-{
-    gk_half sum[MOST_PATTERNS * 2 / LANES];
-    for (int k = 0; k < halves; k++) sum[k] = ((gk_half *)y)[k];
-    for (int i = 0; i < rows; i++) {
-        const gk_half *row = (const gk_half *)(matrix + i * columns);
-        for (int k = 0; k < halves; k++) sum[k] += x[i] * row[k];
-    }
-    for (int k = 0; k < halves; k++) ((gk_half *)y)[k] = sum[k];
-}
-
 typedef struct between { /* from the patterns of one gear to those of another */
     const gk_real *matrix;
     int rows, columns;
@@ -86,12 +74,7 @@ static between between_of(const gk_setup *setup, const gk_work *work, int to, in
 
 static void add_between(between b, const gk_real *x, int kind, gk_real *y)
 {
-    const gk_real *m = b.matrix + (size_t)(kind * b.rows * b.columns);
-    switch (2 * b.columns / LANES) {
-    case 4: add_columns(m, x, b.rows, b.columns, y, 4); break;
-    case 5: add_columns(m, x, b.rows, b.columns, y, 5); break;
-    default: add_columns(m, x, b.rows, b.columns, y, 2 * b.columns / LANES);
-    }
+    gk_sum_rows(b.matrix + (size_t)(kind * b.rows * b.columns), 2 * b.columns / LANES, x, b.rows, y);
 }
 
 /* what forces on the patterns of all gears do to those of each: in the step, at once */
@@ -101,7 +84,8 @@ void gk_felt_move(const gk_coupled *c, int whole, int at_once)
     gk_work *work = c->work;
     for (int to = 0; to < c->model->gears; to++) {
         gk_real *moved[MOVES] = {work->move_pattern[WHOLE][to], work->move_pattern[YIELDED][to]};
-        for (int t = 0; t < MOVES; t++) memset(moved[t], 0, (size_t)base->patterns[to] * sizeof(gk_real));
+        for (int t = 0; t < MOVES; t++)
+            for (int k = 0; k < gk_halves(base->patterns[to]); k++) ((gk_half *)moved[t])[k] = (gk_half){0};
         for (int from = 0; from < c->model->gears; from++) {
             const between b = between_of(c->setup, work, to, from);
             if (!base->patterns[to] || !gk_patterns_meet(base, to, from)) continue;
@@ -112,33 +96,22 @@ void gk_felt_move(const gk_coupled *c, int whole, int at_once)
     }
 }
 
-/* adds forces on the patterns of a gear to those on its oscillators, `wide` quads of these from `first` on */
-GK_INLINE void scatter_quads(const gk_base *base, int g, const double (*by)[MAX_GEARS][MOST_PATTERNS], int first,
-                             gk_quad *const to[2], const int wide)
-{
-    gk_quad sum[2][4];
-    for (int t = 0; t < 2; t++)
-        for (int q = 0; q < wide; q++) sum[t][q] = to[t][first + q];
-    for (int i = 0; i < base->patterns[g]; i++) {
-        const gk_quad *pattern = (const gk_quad *)(base->pattern[g] + i * base->width[g]) + first;
-        for (int t = 0; t < 2; t++)
-            for (int q = 0; q < wide; q++) sum[t][q] += by[t][g][i] * pattern[q];
-    }
-    for (int t = 0; t < 2; t++)
-        for (int q = 0; q < wide; q++) to[t][first + q] = sum[t][q];
-}
-
-/* forces that were pushed on patterns act on the oscillators */
+/* Forces that were pushed on patterns act on the oscillators: those of flanks in single precision, rigid motion and
+ * ports, few of which are loaded, in double */
 void gk_felt_scatter(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     const gk_base *base = &setup->base;
-    for (int g = 0; g < model->gears; g++) {
-        const int from = base->from[g], quads = base->patterns[g] ? base->width[g] / 4 : 0;
-        gk_quad *const to[2] = {(gk_quad *)(work->ground_force + from), (gk_quad *)(work->ground_next + from)};
-        const double (
-            *by)[MAX_GEARS][MOST_PATTERNS] = (const double (*)[MAX_GEARS][MOST_PATTERNS])work->scatter_pattern;
-        int q = 0;
-        for (; q + 4 <= quads; q += 4) scatter_quads(base, g, by, q, to, 4);
-        for (; q < quads; q++) scatter_quads(base, g, by, q, to, 1);
-    }
+    for (int g = 0; g < model->gears; g++)
+        for (int t = 0; t < 2 && base->patterns[g]; t++) {
+            const int width = base->width[g], wide = gk_whole_halves(width), flanks = base->patterns[g] - FIRST_PATTERN;
+            const double *by = work->scatter_pattern[t][g];
+            double *to = (t ? work->ground_next : work->ground_force) + base->from[g];
+            gk_real sum[MAX_GROUND + 4 * MAX_ROTORS + LANES], x[MOST_PATTERNS];
+            for (int i = 0; i < flanks; i++) x[i] = (gk_real)by[FIRST_PATTERN + i];
+            memset(sum, 0, (size_t)wide * sizeof *sum);
+            gk_sum_rows(base->flanks[g], 2 * wide / LANES, x, flanks, sum);
+            for (int q = 0; q < width / 4; q++) ((gk_quad *)to)[q] += GK_WIDENED(((const gk_four *)sum)[q]);
+            for (int i = 0; i < FIRST_PATTERN; i++)
+                if (by[i] != 0.0) gk_axpy(by[i], base->pattern[g] + i * width, to, 0, width / 4);
+        }
 }

@@ -7,7 +7,7 @@
 #include "problem/gk_far.h"
 #include "problem/gk_rows.h"
 
-enum { KEPT_STEPS = 8 }; /* steps for which an engagement of an island keeps D and K */
+enum { KEPT_STEPS = 4 }; /* steps for which an engagement of an island keeps D and K */
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work,

@@ -44,6 +44,11 @@ static gk_real *ground_of(const gk_coupled *c, const gk_engaged *engaged, int w,
     return engaged->by_patterns[w] ? patterns[t][mesh->side[w].gear] : oscillators[t] + mesh->part[w].from;
 }
 
+static void clear_halves(gk_real *x, int n)
+{
+    for (int k = 0; k < gk_halves(n); k++) ((gk_half *)x)[k] = (gk_half){0};
+}
+
 /* gear by gear: nothing has been pushed yet */
 static void clear_gear(const gk_coupled *c, int g)
 {
@@ -51,10 +56,10 @@ static void clear_gear(const gk_coupled *c, int g)
     const gk_base *base = &c->setup->base;
     for (int t = 0; t < PUSHES; t++)
         if (work->by_tables && base->patterns[g])
-            memset(work->push_pattern[t][g], 0, (size_t)base->patterns[g] * sizeof(gk_real));
+            clear_halves(work->push_pattern[t][g], base->patterns[g]);
         else
             memset(work->push_ground[t] + base->from[g], 0, (size_t)base->width[g] * sizeof(gk_real));
-    for (int t = 0; t < MOVES; t++) memset(work->move_modes[t][g], 0, (size_t)GK_LANES(c->setup, g) * sizeof(gk_real));
+    for (int t = 0; t < MOVES; t++) clear_halves(work->move_modes[t][g], GK_LANES(c->setup, g));
 }
 
 static void push_spins(const gk_coupled *c, int e, int first, int last)
@@ -71,44 +76,49 @@ static void push_spins(const gk_coupled *c, int e, int first, int last)
         }
 }
 
-typedef struct acting { /* rows whose forces are not zero, those of contacts first */
-    int count, contacts, row[MAX_ROWS];
+typedef struct acting { /* forces of rows, those of contacts first; kinds that are not pushed are not read */
+    int count, contacts, any;
     gk_real by[PUSHES][MAX_ROWS];
 } acting;
 
 static void list_acting(const double (*by)[MAX_STRIDE], int kinds, const gk_system *s, acting *p)
 {
-    int n = 0;
-    for (int i = 0; i < (kinds == PUSHES ? s->n : s->contacts); i++) {
-        const double x = by[STEP][i], y = by[ONCE][i], u = kinds == PUSHES ? by[AT_ONCE][i] : 0.0;
-        if (i == s->contacts) p->contacts = n;
-        p->row[n] = i, p->by[STEP][n] = (gk_real)x, p->by[ONCE][n] = (gk_real)y, p->by[AT_ONCE][n] = (gk_real)u;
-        n += x != 0.0 || y != 0.0 || u != 0.0;
-    }
-    p->count = n;
-    if (kinds < PUSHES || s->n == s->contacts) p->contacts = n;
+    p->contacts = s->contacts, p->count = kinds == PUSHES ? s->n : s->contacts, p->any = 0;
+    for (int t = 0; t < kinds; t++)
+        for (int i = 0; i < p->count; i++) p->by[t][i] = (gk_real)by[t][i], p->any |= by[t][i] != 0.0;
 }
 
-typedef struct half_block { /* `count` of the rows that act, on some oscillators, `width` halves each */
+/* the first halves of a gear's lanes, of each part, that κ reaches; one more is cheaper pushed with them */
+static int yielding(const gk_coupled *c, int g)
+{
+    const int half = GK_LANES(c->setup, g) / LANES, yields = gk_halves(c->k->flow[g].softest);
+    return yields && yields + 1 == half ? half : yields;
+}
+
+typedef struct half_block { /* the first `count` rows on some oscillators, `width` halves each */
     const gk_half *row;
     int width, count;
     const acting *by;
 } half_block;
 
-/* sums of rows over `wide` halves from `at` on, with forces of the kinds `first` … `last` */
+/* sums of rows over `wide` halves from `at` on, with forces of the kinds `first` … `last`, two rows at once */
 GK_INLINE void sum_halves(half_block of, int at, gk_half *const out[PUSHES], const int wide, const int first,
                           const int last)
 {
     gk_half sum[PUSHES][8];
+    const gk_half *row = of.row + at, *next = row + of.width;
+    int r = 0;
     for (int t = first; t <= last; t++)
         for (int k = 0; k < wide; k++) sum[t][k] = (gk_half){0};
-    for (int r = 0; r < of.count; r++) {
-        const gk_half *row = of.row + of.by->row[r] * of.width + at;
+    for (; r + 2 <= of.count; r += 2, row += 2 * of.width, next += 2 * of.width)
         for (int t = first; t <= last; t++)
-            for (int k = 0; k < wide; k++) sum[t][k] += of.by->by[t][r] * row[k];
-    }
+            for (int k = 0; k < wide; k++)
+                sum[t][k] = (sum[t][k] + of.by->by[t][r] * row[k]) + of.by->by[t][r + 1] * next[k];
     for (int t = first; t <= last; t++)
-        for (int k = 0; k < wide; k++) out[t][at + k] = sum[t][k];
+        for (int k = 0; k < wide; k++) {
+            if (r < of.count) sum[t][k] += of.by->by[t][r] * row[k];
+            out[t][at + k] = sum[t][k];
+        }
 }
 
 GK_INLINE void sum_blocks(half_block of, gk_span halves, gk_half *const out[PUSHES], const int first, const int last)
@@ -118,7 +128,8 @@ GK_INLINE void sum_blocks(half_block of, gk_span halves, gk_half *const out[PUSH
     if (first == last)
         for (; at + 8 <= end; at += 8) sum_halves(of, at, out, 8, first, last);
     for (; at + 4 <= end; at += 4) sum_halves(of, at, out, 4, first, last);
-    for (; at + 2 <= end; at += 2) sum_halves(of, at, out, 2, first, last);
+    if (end - at == 3) sum_halves(of, at, out, 3, first, last), at += 3;
+    if (at + 2 <= end) sum_halves(of, at, out, 2, first, last), at += 2;
     if (at < end) sum_halves(of, at, out, 1, first, last);
 }
 
@@ -139,7 +150,7 @@ static void move_modes(const gk_coupled *c, int e, int w, gk_half *const sum[PUS
     const int g = c->setup->mesh[e].side[w].gear;
     const gk_modal *m = &c->setup->modal[g];
     const gk_flow *flow = &c->k->flow[g];
-    const int half = m->n / LANES, yields = gk_halves(flow->softest), tooth = c->work->engaged[e].position[w].tooth;
+    const int half = m->n / LANES, yields = yielding(c, g), tooth = c->work->engaged[e].position[w].tooth;
     const gk_half *cosine = (const gk_half *)m->cosine + tooth * half, *sine = (const gk_half *)m->sine + tooth * half;
     const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
     gk_half *to = (gk_half *)c->work->move_modes[WHOLE][g], *once = (gk_half *)c->work->move_modes[YIELDED][g];
@@ -165,7 +176,7 @@ static void push_rows(const gk_coupled *c, const gk_engaged *engaged, const acti
     int at = 0;
     for (int w = 0; w < 2; w++) {
         const int g = c->setup->mesh[engaged->index].side[w].gear, half = GK_LANES(c->setup, g) / LANES;
-        const int yields = gk_halves(c->k->flow[g].softest);
+        const int yields = yielding(c, g);
         const half_block modes = {(const gk_half *)basis[w], 2 * half, p->contacts, p};
         if (!half || c->k->timeless || (parts == 2 && !yields)) continue;
         for (int from = 0; from < 2 * half; from += half) {
@@ -209,10 +220,10 @@ static void push_engagement(const gk_coupled *c, int e, int parts)
         if (parts & (1 << t)) push_bores(c, engaged, t);
     gk_far_push(c->setup, engaged, f->of[AT_ONCE]);
     list_acting(f->of, PUSHES, &engaged->system, &p);
-    if (p.count) push_rows(c, engaged, &p, 0, parts);
+    if (p.any) push_rows(c, engaged, &p, 0, parts);
     if (!GK_ON(c->setup, friction) || !(parts & 1)) return;
     list_acting(f->along, AT_ONCE, &engaged->system, &p);
-    if (p.count) push_rows(c, engaged, &p, 1, 1);
+    if (p.any) push_rows(c, engaged, &p, 1, 1);
 }
 
 /* ---- what moves -------------------------------------------------------------------------------------------------- */
@@ -257,8 +268,11 @@ GK_INLINE void read_some(const seen *parts, int count, int i, double *read, cons
     for (int p = 0; p < count; p++) {
         const int width = parts[p].width;
         const gk_half *rows = parts[p].row + i * width, *y = parts[p].y;
-        for (int k = 0; k < parts[p].halves; k++)
-            for (int l = 0; l < each; l++) sum[l] += rows[l * width + k] * y[k];
+        int k = 0;
+        for (; k + 2 <= parts[p].halves; k += 2)
+            for (int l = 0; l < each; l++)
+                sum[l] = (sum[l] + rows[l * width + k] * y[k]) + rows[l * width + k + 1] * y[k + 1];
+        for (int l = 0; l < each && k < parts[p].halves; l++) sum[l] += rows[l * width + k] * y[k];
     }
     for (int l = 0; l < each; l++) read[i + l] += gk_across(&sum[l]);
 }
@@ -357,6 +371,7 @@ void gk_pass(const gk_coupled *c, int whole, int at_once)
 {
     GK_ASSERT(whole || at_once);
     const gk_base *base = &c->setup->base;
+    GK_LAP(c->work, PHASE_SOLVE);
     push_all(c, whole + 2 * at_once);
     move_spins(c);
     for (int g = 0; g < c->model->gears; g++)
@@ -371,6 +386,7 @@ void gk_pass(const gk_coupled *c, int whole, int at_once)
         if (at_once) read_rows(c, e, YIELDED, far);
         if (whole && GK_ON(c->setup, friction)) read_along(c, e);
     }
+    GK_LAP(c->work, PHASE_PASS);
 }
 
 void gk_pass_unit(const gk_coupled *c, int from, int row)

@@ -146,7 +146,9 @@ GK_INLINE void ground_rows_of(const ground_fill *f, const int motions, const int
 GK_INLINE void ground_rows(const ground_fill *f, const int spatial, const int what, const int strips)
 {
     const int motions = f->base->motions[f->side->gear];
-    if (spatial)
+    if (spatial && motions == 5)
+        ground_rows_of(f, 5, 1, strips, what);
+    else if (spatial)
         ground_rows_of(f, motions, 1, strips, what);
     else if (motions == 2)
         ground_rows_of(f, 2, strips, strips, what);
@@ -178,14 +180,15 @@ static void joint_rows(const gk_setup *setup, const gk_mesh *mesh, gk_engaged *e
 /* rows in single precision, those of either side in whole halves */
 static void round_rows(const gk_engaged *engaged, const double *rows, int count, gk_real *near)
 {
-    const gk_quad *from = (const gk_quad *)rows;
-    gk_four *to = (gk_four *)near;
+    gk_half *to = (gk_half *)near;
     for (int i = 0; i < count; i++)
-        for (int w = 0; w < 2; w++) {
-            const int quads = engaged->wide[w] / 4;
-            for (int q = 0; q < quads; q++) to[q] = __builtin_convertvector(from[q], gk_four);
-            if (quads % 2) to[quads] = (gk_four){0};
-            from += quads, to += (quads + 1) / 2 * 2;
+        for (int w = 0; w < 2; rows += engaged->wide[w++]) {
+            const gk_eight *from = (const gk_eight *)rows;
+            const int whole = engaged->wide[w] / 8;
+            for (int k = 0; k < whole; k++) *to++ = GK_ROUNDED(from[k]);
+            if (engaged->wide[w] % 8 == 0) continue;
+            *to = (gk_half){0};
+            *(gk_four *)to++ = __builtin_convertvector(*(const gk_quad *)(from + whole), gk_four);
         }
 }
 

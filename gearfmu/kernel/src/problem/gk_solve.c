@@ -188,8 +188,15 @@ static int move(gk_system *s, const double *x, double *e, double *change)
         size = GK_LARGER(size, now);
     }
     gk_law_apply(s);
-    for (int q = 0; q < quads; q++) bent[q] += delta[q];
+    gk_quad worst = {0}, deepest = {0};
+    for (int q = 0; q < quads; q++) {
+        bent[q] += delta[q];
+        const gk_quad off = GK_MAGNITUDE(bent[q]), deep = GK_MAGNITUDE(delta[q]);
+        worst = GK_LARGER(worst, off);
+        deepest = GK_LARGER(deepest, deep);
+    }
     *change = gk_largest(&most);
+    if (s->bends > 0.0 && !gk_film_on(s)) return gk_largest(&worst) > s->bends * gk_largest(&deepest);
     return ((GK_HAS(hertz) && s->curved) || gk_film_on(s)) && *change > SOLVED * gk_largest(&size);
 }
 

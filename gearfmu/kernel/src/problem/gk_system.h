@@ -79,8 +79,9 @@ typedef struct gk_system {
     int coupled, factored;     /* it has neighbours; the tangent's factors are those of its status */
     int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
     int dashpots_stand;                          /* where they are: no search for what limits them */
-    int films;                                   /* rows whose gap is open at the start of the step, with oil in it */
-    struct gk_film *film;                        /* with the squeeze film */
+    double bends; /* in an island: what the law may still bend, of the largest local deflection; 0: moves tell */
+    int films;    /* rows whose gap is open at the start of the step, with oil in it */
+    struct gk_film *film; /* with the squeeze film */
     double outer[MAX_STRIDE],
         beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
                                                      deflection at once */

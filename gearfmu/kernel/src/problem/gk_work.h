@@ -10,7 +10,17 @@
 
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
 /* phases of a step, for the profile */
-enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
+enum {
+    PHASE_PREDICT,
+    PHASE_FIND,
+    PHASE_ROWS,
+    PHASE_SYSTEM,
+    PHASE_SOLVE,
+    PHASE_PASS,
+    PHASE_CORRECT,
+    PHASE_REMEMBER,
+    PHASES
+};
 typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
     double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
@@ -70,9 +80,7 @@ typedef struct gk_forces { /* of an engagement; along: the same along the profil
     double of[PUSHES][MAX_STRIDE], along[2][MAX_STRIDE];
 } gk_forces;
 
-/* halves of LANES that hold n */
 enum { MAX_NEAR = (MAX_GROUND + 4 * MAX_ROTORS) / 8 + 1 };
-static inline int gk_halves(int n) { return (n + LANES / 2 - 1) / (LANES / 2); }
 
 typedef struct gk_far_tooth { /* load on a tooth by patterns, and what others move of it */
     gk_real load[LANES], moved[LANES];

@@ -34,7 +34,8 @@ static gk_motion carried(gk_motion m, gk_motion jump, double tau, double H)
 int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycles)
 {
     GK_ASSERT(work && name && cycles);
-    static const char *const names[PHASES] = {"predict", "find", "rows", "system", "solve", "correct", "remember"};
+    static const char *const names[PHASES] = {"predict", "find", "rows",    "system",
+                                              "solve",   "pass", "correct", "remember"};
     if (phase < 0 || phase >= PHASES) return 0;
     *name = names[phase];
     *cycles = work->cycles[phase];

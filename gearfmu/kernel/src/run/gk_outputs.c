@@ -1,6 +1,7 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
 #include "integrate/gk_energy.h"
 #include "run/gk_run.h"
+#include "run/gk_sensors.h"
 
 static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped … */
@@ -269,6 +270,7 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
     [e][V_FRICTION_POWER] = (GK_OF(data, meshing)[e].rubbed - GK_OF(data, mesh)[e][V_FRICTION_LOSS]) / H;
     for (int e = 0; e < model->engagements; e++) watch_limits(model, data, e, H, tally->mesh[e]);
     outputs(model, setup, work, data, h);
+    gk_sensors_means(model, setup, work, data, H, tally->sensed);
     for (int p = 0; p < model->ports; p++) {
         double *v = GK_OF(data, shaft)[p];
         v[V_TAU_NEXT] = 2.0 * v[V_TAU] - v[V_TAU_MEAN];

@@ -65,6 +65,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(work, 0, sizeof *work);
     gk_layout_work(model, setup, work);
     setup->step = hot->step[setup->integrator], setup->count = hot->count, setup->moves = hot->moves;
+    setup->supports = hot->supports;
     gk_setup_fill(model, setup, work, data, which);
     fill_sides(model, setup, work, hot->fill);
     gk_patterns_find(model, setup, work->columns);

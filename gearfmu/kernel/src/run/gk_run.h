@@ -9,6 +9,7 @@ struct gk_tally { /* integrals over a communication step */
     double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
     double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* forces that contacts and joints put on the supports directly;
                                                          last: at the end of the step before */
+    double sensed[MAX_SENSORS];                       /* speeds of the sensors at the beginning */
     double *moved, *speed, *last_moved, *last_speed;  /* (ground oscillators) what moves springs and dashpots of the
                                                         supports */
     double *now[2];                                   /* scratch of the same size */
@@ -30,8 +31,7 @@ void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const 
 /* gk_supports.c: vectors of the ground oscillators, and of the supports */
 GK_HOT void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved,
                                double *speed);
-GK_HOT void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved,
-                                  const double *speed, double *out);
+GK_HOT gk_supports_function gk_supports_by_motion;
 GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work,
                                    const gk_data *data, double *out);
 GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,

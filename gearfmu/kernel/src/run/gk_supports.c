@@ -95,7 +95,7 @@ void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_w
     const gk_base *base = &setup->base;
     double *const moved = work->tally + 4 * base->n, *const speed = moved + base->n;
     gk_supports_motion(setup, work, data, moved, speed);
-    gk_supports_by_motion(model, setup, moved, speed, out);
+    setup->supports(model, setup, moved, speed, out);
     gk_supports_add_direct(model, setup, work, data, out);
     for (int s = 0; s < model->supports; s++)
         of_spring[s] = out[s] - model->ground[base->set].damper[s] *

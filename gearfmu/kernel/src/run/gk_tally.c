@@ -1,5 +1,6 @@
 /* Integrals over a communication step: forces of meshes, ports and supports. */
 #include "run/gk_run.h"
+#include "run/gk_sensors.h"
 
 void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
 {
@@ -12,7 +13,8 @@ void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work,
     memset(tally->moved, 0, 2 * n * sizeof *tally->moved);
     if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
     gk_supports_motion(setup, work, data, tally->last_moved, tally->last_speed);
-    gk_supports_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
+    setup->supports(model, setup, tally->last_moved, tally->last_speed, tally->last);
+    gk_sensors_speed(model, setup, tally->last_speed, tally->sensed);
     double now[MAX_SUPPORTS];
     for (int s = 0; s < model->supports; s++) now[s] = GK_OF(data, support)[s][V_FORCE];
     gk_supports_turn(model, data, -1.0, now);
@@ -78,7 +80,7 @@ void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data,
     for (int p = 0; p < model->ports; p++)
         if (!setup->given_torque[p]) GK_OF(data, shaft)[p][V_TAU_MEAN] = tally->port[p] / H;
     double force[MAX_SUPPORTS];
-    gk_supports_by_motion(model, setup, tally->moved, tally->speed, force);
+    setup->supports(model, setup, tally->moved, tally->speed, force);
     for (int s = 0; s < model->supports; s++) force[s] = (force[s] + tally->support[s]) / H;
     gk_supports_turn(model, data, 1.0, force);
     for (int s = 0; s < model->supports; s++) GK_OF(data, support)[s][V_FORCE_MEAN] = force[s];

@@ -54,6 +54,7 @@
 #include "problem/gk_couple.c"
 #include "problem/gk_nodal.c"
 #include "problem/gk_engage.c"
+#include "integrate/gk_crowd.c"
 #include "integrate/gk_frame.c"
 #include "integrate/gk_advance.c"
 #include "integrate/gk_energy.c"
@@ -61,6 +62,7 @@
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
 #include "run/gk_supports.c"
+#include "run/gk_sensors.c"
 #include "run/gk_tally.c"
 #include "run/gk_wide.h"
 static const gk_hot AVX2 = GK_HOT_FUNCTIONS;

@@ -12,9 +12,14 @@ typedef struct gk_hot {
     gk_tally_function *count;
     gk_fill_function *fill;
     gk_moves_function *moves;
+    gk_supports_function *supports;
 } gk_hot;
 #define GK_HOT_FUNCTIONS                                                                                               \
-    {{gk_step_once, gk_step_once, gk_rk45_step, gk_central_step}, gk_tally_count, gk_side_fill, gk_side_step}
+    {{gk_step_once, gk_step_once, gk_rk45_step, gk_central_step},                                                      \
+     gk_tally_count,                                                                                                   \
+     gk_side_fill,                                                                                                     \
+     gk_side_step,                                                                                                     \
+     gk_supports_by_motion}
 
 /* those in the widest vectors of this processor; NULL: the baseline's */
 const gk_hot *gk_wide(void);

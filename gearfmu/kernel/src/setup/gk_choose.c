@@ -111,7 +111,7 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
     setup->strips = gk_strips_count(model, setup->slices);
     for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, GK_OF(data, mesh)[e][V_DAMPING]);
     if (damping == 0.0) setup->on.contact_damping = 0;
-    setup->base.set = model->sets > 1 && !setup->on.bearings;
+    setup->base.set = model->sets > 1 && !setup->on.bearings ? 1 : model->housed && !GK_ON(setup, housing) ? 2 : 0;
     if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;
     if (gk_scheme_of(setup->integrator)->is_explicit && model->chains) {
         snprintf(message, GK_MESSAGE,
@@ -158,8 +158,10 @@ int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
     }
 }
 
+/* do engagements act on each other through what is compliance at level rigid, a gear or a housing? */
 static int shares(const gk_model *model, const gk_setup *setup)
 {
+    if (model->housed && setup->base.set == 0) return model->engagements > 1;
     for (int g = 0; g < model->gears; g++)
         if (setup->engagements_of[g] > 1) return 1;
     return 0;

@@ -127,6 +127,58 @@ static void fill_turns(const gk_setup *setup, gk_coefficients *k)
     }
 }
 
+/* pairs of the crowd, members x of all before members y */
+static void fill_crowd_turns(const gk_base *base, gk_ground_flow *f)
+{
+    const int n = base->n, from = base->crowd.from, width = base->crowd.width, wide = gk_whole_halves(width);
+    const int lanes = gk_whole_halves(base->crowd_pairs), rows = 2 * lanes;
+    const double *row[2 * MOST_CROWD], *moved[2 * MOST_CROWD];
+    int at = 0;
+    memset(row, 0, sizeof row);
+    for (int i = 0; i < base->turns; i++) {
+        if (!gk_in_crowd(base, base->turn_span[i])) continue;
+        for (int member = 0; member < 2; member++) {
+            row[member * lanes + at] = f->turns + (2 * i + member) * n + from;
+            moved[member * lanes + at] = f->turned + (2 * i + member) * n + from;
+        }
+        at++;
+    }
+    for (int r = 0; r < rows; r++) {
+        for (int i = 0; i < width; i++) f->crowd.turns[i * rows + r] = row[r] ? (gk_real)row[r][i] : 0;
+        for (int i = 0; i < wide; i++) f->crowd.turned[r * wide + i] = row[r] && i < width ? (gk_real)moved[r][i] : 0;
+        for (int other = 0; other < rows; other++)
+            f->crowd.turning[r * rows + other] = row[r] && row[other]
+                                                     ? (gk_real)gk_dot_quads(moved[r], row[other], width / 4)
+                                                     : 0;
+    }
+}
+
+/* dashpots of the crowd */
+static void fill_crowd_dampers(const gk_model *model, const gk_base *base, gk_ground_flow *f)
+{
+    const int n = base->n, from = base->crowd.from, width = base->crowd.width, wide = gk_whole_halves(width);
+    const int lanes = gk_whole_halves(base->crowd_dampers);
+    const gk_crowd_flow *c = &f->crowd;
+    memset(c->damps, 0, (size_t)(width * lanes) * sizeof(gk_real));
+    memset(c->holds, 0, (size_t)(width * lanes) * sizeof(gk_real));
+    memset(c->pulls, 0, (size_t)(lanes * wide) * sizeof(gk_real));
+    memset(c->pulled, 0, (size_t)(lanes * lanes) * sizeof(gk_real));
+    for (int d = 0, r = 0; d < model->supports; d++) {
+        if (!gk_in_crowd(base, base->damper_span[d])) continue;
+        const double *pulls = f->pulls + d * n + from;
+        for (int i = 0; i < width; i++) {
+            c->damps[i * lanes + r] = (gk_real)base->damper_rows[d * n + from + i];
+            c->holds[i * lanes + r] = (gk_real)f->holds[d * n + from + i];
+            c->pulls[r * wide + i] = (gk_real)pulls[i];
+        }
+        for (int other = 0, k = 0; other < model->supports; other++)
+            if (gk_in_crowd(base, base->damper_span[other]))
+                c->pulled[r * lanes + k++] = (gk_real)gk_dot_quads(pulls, base->damper_rows + other * n + from,
+                                                                   width / 4);
+        r++;
+    }
+}
+
 static void fill_ground(const gk_model *model, const gk_setup *setup, const gk_pace *pace, gk_coefficients *k)
 {
     const gk_base *base = &setup->base;
@@ -140,9 +192,13 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, const gk_p
         f->mobility[i] = o.mobility;
         f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
         f->unit[i] = o.unit, f->lead[i] = o.lead, f->hold[i] = o.hold;
+        f->press[i] = there && o.a12 != 0.0 ? -f->d11[i] / (o.a12 * base->omega2[i]) : 0.0;
     }
     fill_dampers(model, setup, k);
     fill_turns(setup, k);
+    if (!base->crowd.width) return;
+    fill_crowd_turns(base, f);
+    fill_crowd_dampers(model, base, f);
 }
 
 /* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */

@@ -30,6 +30,7 @@ static void add_yield(const gk_node *n, const gk_grounded *g, int k)
 static void add_supports(const gk_node *n, const gk_grounded *g)
 {
     const int supports = n->model->supports, first = 6 + n->gear->low;
+    const int carrying = n->model->ground[n->setup->base.set].carrying;
     const double *kappa = n->model->ground[n->setup->base.set].kappa;
     const double *to_port = n->model->port_support + n->side->port_of * supports;
     for (int i = 0; i < 6; i++) {
@@ -40,8 +41,8 @@ static void add_supports(const gk_node *n, const gk_grounded *g)
             joint[s] += a[s];
             for (int j = 0; j < 6; j++)
                 g->yields[(size_t)(first + i) * (size_t)g->stride + (size_t)(first + j)] -=
-                    a[s] * gk_node_dot(kappa + s * supports, n->gear->node_support + j * supports, supports);
-            if (n->side->port_of >= 0) joint[supports] -= a[s] * gk_node_dot(kappa + s * supports, to_port, supports);
+                    a[s] * gk_node_dot(kappa + s * supports, n->gear->node_support + j * supports, carrying);
+            if (n->side->port_of >= 0) joint[supports] -= a[s] * gk_node_dot(kappa + s * supports, to_port, carrying);
         }
     }
 }

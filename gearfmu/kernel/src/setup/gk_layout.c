@@ -92,6 +92,7 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->support_rows = doubles(b, n * (size_t)model->supports);
     base->support_damping = doubles(b, n * (size_t)model->supports);
     base->port_rows = doubles(b, n * (size_t)model->ports);
+    base->sensor_rows = doubles(b, n * (size_t)model->sensors);
     base->carried_rows = doubles(b, 2 * n * (size_t)model->carried);
     const size_t pairs = (size_t)(model->carried + model->whirls);
     base->turn_rotor = take(b, pairs * sizeof *base->turn_rotor);
@@ -102,6 +103,8 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
     for (int g = 0; g < model->gears; g++)
         base->pattern[g] = doubles(b, model->engagements > 1 ? MOST_PATTERNS * n : 0);
+    for (int g = 0; g < model->gears; g++)
+        base->flanks[g] = reals(b, model->engagements > 1 ? MOST_PATTERNS * (n + LANES) : 0);
 }
 
 /* may flanks feel the ground group by patterns? */
@@ -199,12 +202,22 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     gk_ground_flow *f = &k->ground;
     double **array[] = FLOW_ARRAYS(f);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
+    f->press = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
     f->holds = doubles(b, (size_t)model->supports * (size_t)setup->base.n);
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
     f->turns = doubles(b, turning);
     f->turned = doubles(b, turning);
     f->products = doubles(b, 3 * (size_t)(model->carried + model->whirls));
+    const int pairs = model->carried + model->whirls;
+    const size_t width = pairs < LEAST_CROWD ? 0 : (size_t)gk_whole_halves(setup->base.n),
+                 rows = 2 * (size_t)gk_whole_halves(pairs < MOST_CROWD ? pairs : MOST_CROWD),
+                 dashpots = (size_t)gk_whole_halves(model->supports);
+    gk_crowd_flow *crowd = &f->crowd;
+    crowd->turns = reals(b, width * rows), crowd->turned = reals(b, width * rows);
+    crowd->turning = reals(b, width ? rows * rows : 0);
+    crowd->damps = reals(b, width * dashpots), crowd->holds = reals(b, width * dashpots);
+    crowd->pulls = reals(b, width * dashpots), crowd->pulled = reals(b, width ? dashpots * dashpots : 0);
 }
 
 static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)

@@ -6,8 +6,8 @@
 #include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 
-static const double TOLD = 5e-6;    /* of the longest row: what patterns leave out */
-static const double SHORT = 1e-5;   /* s: of the step that weighs oscillators */
+static const double TOLD = 3e-4;    /* of the longest row: what patterns leave out */
+static const double SHORT = 1e-4;   /* s: of the motion that weighs oscillators */
 enum { WORTH = 2 * MOST_PATTERNS }; /* least oscillators of a gear */
 
 static int same(gk_span a, int from, int width) { return a.from == from && a.width == width; }
@@ -150,10 +150,15 @@ static int find(const gk_model *model, gk_setup *setup, int g, double *room)
         share_out(&all, row, count);
     }
     const int found = left <= TOLD * longest && longest > 0.0, each = (count + 7) / 8 * 8;
+    for (int i = 0; i < count * width; i++) /* forces are scattered by the same numbers in single precision */
+        pattern[i] = (double)(gk_real)(pattern[i] * inverse[i % width]) * weight[i % width];
     if (found) close_rows(&all, pattern, count, each);
     for (int s = 0; s < all.sides; s++)
         for (int i = 0; i < all.count[s] * width; i++) all.side[s]->ground[i] *= inverse[i % width];
     for (int i = 0; i < count * width; i++) pattern[i] *= inverse[i % width];
+    const int wide = gk_whole_halves(width);
+    memset(base->flanks[g], 0, (size_t)(each * wide) * sizeof *base->flanks[g]);
+    for (int i = 0; i < count * width; i++) base->flanks[g][i / width * wide + i % width] = (gk_real)pattern[i];
     return found ? FIRST_PATTERN + each : 0;
 }
 

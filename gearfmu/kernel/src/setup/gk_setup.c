@@ -115,6 +115,22 @@ static void fill_turns(const gk_model *model, const gk_setup *setup, gk_base *ba
         add_turn(base, ground->whirl_rows + 2 * i * ground->n, ground->n, model->whirl[i]);
 }
 
+static int same_span(gk_span a, gk_span b) { return a.from == b.from && a.width == b.width; }
+
+/* oscillators that many turning pairs have in common, and the dashpots that pull just these */
+static void find_crowd(const gk_model *model, gk_base *base)
+{
+    base->crowd = (gk_span){0, 0};
+    base->crowd_pairs = base->crowd_dampers = 0;
+    for (int i = 0; i < base->turns; i++) {
+        int count = 0;
+        for (int j = 0; j < base->turns; j++) count += same_span(base->turn_span[i], base->turn_span[j]);
+        if (count < LEAST_CROWD || count > MOST_CROWD || count <= base->crowd_pairs) continue;
+        base->crowd = base->turn_span[i], base->crowd_pairs = count;
+    }
+    for (int s = 0; s < model->supports; s++) base->crowd_dampers += gk_in_crowd(base, base->damper_span[s]);
+}
+
 /* the load outward on what rotors carry */
 static void fill_carried(const gk_model *model, gk_base *base)
 {
@@ -163,6 +179,15 @@ static void fill_supports(const gk_model *model, gk_base *base)
     }
 }
 
+/* points of the housing, which stand in a set without it */
+static void fill_sensors(const gk_model *model, gk_base *base)
+{
+    const gk_ground *ground = &model->ground[base->set];
+    memset(base->sensor_rows, 0, (size_t)(model->sensors * base->n) * sizeof *base->sensor_rows);
+    if (ground->sensor_rows) select_rows(base, ground->sensor_rows, model->sensors, ground->n, base->sensor_rows);
+    for (int i = 0; i < model->sensors; i++) base->sensor_span[i] = span_of(base->sensor_rows + i * base->n, base->n);
+}
+
 static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
 {
     gk_base *base = &setup->base;
@@ -179,6 +204,8 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     fill_carried(model, base);
     fill_turns(model, setup, base);
     fill_supports(model, base);
+    fill_sensors(model, base);
+    find_crowd(model, base);
     for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
     for (int g = 0; g < model->gears; g++) fill_centre(model, base, gk_directions(setup), g);
 }

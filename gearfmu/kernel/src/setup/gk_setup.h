@@ -53,23 +53,32 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *support_rows;          /* (supports, n): force on the support, kappa included */
     double *support_damping;       /* (supports, n): force on it by the dashpots of all supports per speed */
     double *port_rows;             /* (ports, n) */
+    double *sensor_rows;           /* (sensors, n) */
     double *carried_rows;          /* (2 carried, n) √m x, √m y of carried bodies */
     int turns;                     /* pairs of rows x, y that turn into each other: carried bodies, gyroscopic forces */
     int32_t *turn_rotor;           /* (turns) with whose speed */
     double *turn_rows;             /* (2 turns, n) */
     gk_span *turn_span;            /* (turns) the part of both that is not zero */
-    double *outward;               /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
-    double *outward_support;       /* (rotors, supports) what it does at once to the forces on supports */
-    double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
+    gk_span crowd;                 /* oscillators that many pairs turn; width 0: none */
+    int crowd_pairs, crowd_dampers; /* that have just these */
+    double *outward;                /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
+    double *outward_support;        /* (rotors, supports) what it does at once to the forces on supports */
+    double *centre[MAX_GEARS];      /* (6, n): rigid motion of every gear at its mid-width */
     const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], support_damping_span[MAX_SUPPORTS],
-        port_span[MAX_PORTS];
+        port_span[MAX_PORTS], sensor_span[MAX_SENSORS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
     int patterns[MAX_GEARS];               /* in which its flanks feel that part, 0: oscillator by oscillator */
     double *pattern[MAX_GEARS];            /* (patterns, width) rigid motions as in a pose, ports, flanks */
+    gk_real *flanks[MAX_GEARS];            /* those of flanks, in whole halves: the same numbers */
     int port_slot[MAX_GEARS][MAX_PORTS];   /* a port's place among them, −1: none */
 } gk_base;
+/* is it a turning pair or a dashpot of the crowd, by its span? */
+static inline int gk_in_crowd(const gk_base *base, gk_span span)
+{
+    return base->crowd.width && span.from == base->crowd.from && span.width == base->crowd.width;
+}
 
 /* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
  * against the direction in which gear A slides past B, so that rows stand beside those of the normal displacement. */
@@ -185,14 +194,23 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
     int yields, softest;         /* the first lanes of each half: κ ≠ 0; padded, and as they are */
 } gk_flow;
 
+/* Turning pairs and dashpots of the crowd as matrices, in whole halves: rows by oscillators, what these do to speeds,
+ * and to the rows. Rows x of all pairs stand before their rows y. */
+enum { LEAST_CROWD = 16, MOST_CROWD = 128 };
+typedef struct gk_crowd_flow {
+    gk_real *turns, *turned, *turning;       /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
+    gk_real *damps, *holds, *pulls, *pulled; /* (width, dashpots) twice, (dashpots, width), (dashpots, dashpots) */
+} gk_crowd_flow;
+
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
     double *unit, *lead, *hold;
-    double *pulls;              /* (supports, n) s²e/n of a dashpot */
-    double *turns, *turned;     /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
-    double *products;           /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    double *holds;              /* (supports, n) e times `hold` */
-    double decay[MAX_SUPPORTS]; /* 1 − e^(−dh/2) */
+    double *press;          /* half a step's kick by a load that at rest displaces by load/ω² */
+    double *pulls, *holds;  /* (supports, n) s²e/n of a dashpot; e times `hold` */
+    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
+    gk_crowd_flow crowd;
+    double decay[MAX_SUPPORTS];                    /* 1 − e^(−dh/2) */
     double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
 } gk_ground_flow;
 
@@ -220,6 +238,8 @@ static inline const gk_scheme *gk_scheme_of(gk_integrator integrator)
 typedef struct gk_tally gk_tally;
 typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
                                double h, gk_tally *tally);
+typedef void gk_supports_function(const gk_model *model, const gk_setup *setup, const double *moved,
+                                  const double *speed, double *out);
 typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
@@ -256,6 +276,7 @@ struct gk_setup {
     gk_step_function *step;              /* of the integrator, in the widest vectors of this processor */
     gk_tally_function *count;            /* what is summed after every step, likewise */
     gk_moves_function *moves;            /* tables of a step's length, likewise */
+    gk_supports_function *supports;      /* forces on supports by motion, likewise */
     size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };

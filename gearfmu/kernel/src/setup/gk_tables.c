@@ -40,14 +40,14 @@ static void store_ground(const gk_node *n, int at, const gk_grounded *g, const d
 /* what friction puts on supports at once */
 static void store_along_support(const gk_node *n, int at, const gk_grounded *g, double *moved)
 {
-    const int supports = n->model->supports;
+    const int supports = n->model->supports, carrying = n->model->ground[n->setup->base.set].carrying;
     const double *kappa = n->model->ground[n->setup->base.set].kappa;
     const gk_matrix joints = gk_grounded_joints(g);
     memset(moved, 0, (size_t)n->points * (size_t)g->held * sizeof *moved);
     if (n->setup->on.residual) gk_grounded_times(n->along_motion, &joints, n->points, moved);
     for (int i = 0; i < n->points; i++, moved += g->held) {
         double *held = n->side->along.support + ((size_t)at * n->points + (size_t)i) * (size_t)supports;
-        for (int s = 0; s < supports; s++) held[s] = gk_node_dot(kappa + s * supports, moved, supports);
+        for (int s = 0; s < supports; s++) held[s] = gk_node_dot(kappa + s * supports, moved, carrying);
     }
 }
 
@@ -55,7 +55,7 @@ static void store_along_support(const gk_node *n, int at, const gk_grounded *g, 
 static void store_joints(const gk_node *n, int at, const gk_grounded *g, double *moved)
 {
     const gk_side *side = n->side;
-    const int supports = n->model->supports;
+    const int supports = n->model->supports, carrying = n->model->ground[n->setup->base.set].carrying;
     const double *kappa = n->model->ground[n->setup->base.set].kappa;
     const gk_matrix joints = gk_grounded_joints(g);
     memset(moved, 0, (size_t)n->points * (size_t)g->held * sizeof *moved);
@@ -63,7 +63,7 @@ static void store_joints(const gk_node *n, int at, const gk_grounded *g, double 
     for (int i = 0; i < n->points; i++, moved += g->held) {
         const size_t point = (size_t)at * n->points + (size_t)i;
         double *to = side->support + point * gk_padded(supports);
-        for (int s = 0; s < supports; s++) to[s] = gk_node_dot(kappa + s * supports, moved, supports);
+        for (int s = 0; s < supports; s++) to[s] = gk_node_dot(kappa + s * supports, moved, carrying);
         side->port[point] = n->port[i] + moved[supports];
     }
 }

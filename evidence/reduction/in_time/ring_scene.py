@@ -1,0 +1,88 @@
+"""The paper's ring in the time domain: a planet that turns in the backlash of an elastic ring on its mounts.
+
+Bodies, pin, mounts and backlash are those of the shipped planetary54. The pin of the one planet stands on its bearing's
+springs; the planet turns at 25 rad/s and begins in the middle of its backlash: teeth meet, let go and meet again. The
+ring is reduced from 54 input nodes, one a tooth, as in the paper; contact points are read from its motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from evidence.reduction.in_time.contact_points import Placed, contact_points
+from evidence.reduction.in_time.scenes import (
+    FIVE,
+    GRID,
+    SPEED,
+    Meshes,
+    Scene,
+    Solid,
+    foundation,
+    gear,
+    joint_rows,
+    nominal_play,
+    placed_gear,
+    touching,
+)
+from evidence.reduction.in_time.transient import Assembly, Joints, Member
+from gearfmu.femesh.ring import ring_sector
+from gearfmu.reduction.full_order import Interface
+from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.forms.shapes import set_geometry
+from gearfmu.spec.stage import load_stage
+
+
+def ring_hammering(meshes: Meshes) -> Scene:
+    """The planet's teeth meet those of the ring."""
+    stage = load_stage("planetary54")
+    spec, geometry = stage.written, set_geometry(stage.written)
+    mesh, centre = geometry.ring_mesh, np.array([spec.set.center_distance, 0.0])
+    planet = placed_gear(spec.planet, mesh.planet, centre, 0.0, meshes.gear)
+    ring = placed_ring(spec, meshes)
+    play = (mesh.normal_backlash - nominal_play(mesh)) / 2
+    points = contact_points(planet, ring, GRID, {1: play, -1: play})
+    solids = {
+        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
+        "ring": _ring(stage, meshes, points.rows[1]),
+    }
+    joints, kinds = _pin(spec, solids)
+    roll = mesh.path["C"]
+    penalty = foundation(stage, roll * (mesh.length + roll) / mesh.length)
+    joints, kinds = touching(joints, kinds, solids, points, penalty)
+    patterns = tuple(np.zeros(solid.full.rows().shape[0]) for solid in solids.values())
+    members = tuple(Member.whole(solid.full) for solid in solids.values())
+    start = (SPEED * np.eye(6)[5], np.zeros(0))
+    assembly = Assembly(members, joints, patterns, lambda time: 0.0, start)
+    return Scene("ring_hammering", solids, assembly, kinds, spec.planet.material, points)
+
+
+def placed_ring(spec: Any, meshes: Meshes) -> Placed:
+    """The ring of the set's file, space 0 on +x, where the planet of bolt 0 has its tooth 0."""
+    counts = spec.ring.body.mesh
+    mesh = counts.model_copy(update={"scale": counts.scale * meshes.ring})
+    ring = set_geometry(spec).ring_mesh.ring
+    return Placed(ring_sector(ring, spec.ring.face_width, mesh), ring, np.zeros(2), 0.0)
+
+
+def _ring(stage: Stage, meshes: Meshes, flank: sp.csr_array) -> Solid:
+    """The ring with the springs of its mounts, one node a tooth, and rows of its contact points."""
+    inputs = ring_full_order(member_of(stage, "ring"), meshes.ring)
+    labels = tuple(f"n{k}" for k in range(flank.shape[0]))
+    full = replace(inputs, interfaces=(*inputs.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
+    return Solid(np.zeros(3), None, (), full, inputs)
+
+
+def _pin(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
+    """The bearing of the planet on a pin that stands."""
+    bearing = spec.planet.bearing
+    stiffness = np.array([bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt])
+    entries = [(n, "planet", solids["planet"].index("bore", component), 1.0) for n, component in enumerate(FIVE)]
+    count = len(FIVE)
+    joints = Joints(joint_rows(solids, entries, count), stiffness, np.zeros(count), np.zeros(count, bool))
+    return joints, np.full(count, "pin")

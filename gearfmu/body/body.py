@@ -1,0 +1,329 @@
+"""Body: a free elastic body as the kernel takes it, whatever it was made from. Conventions: docs/architecture.md.
+
+A gear, a ring, a shaft, a carrier and a housing are rigid motion, n real oscillators in the mean-axis frame, and static
+compliance, all read at nodes. Teeth, spinning, pictures, sensors and a radiating skin are parts that a body has or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearfmu.body.layout import ALGORITHM_VERSION, Entry, entries_of, value_of
+from gearfmu.errors import BodyError
+from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.cyclic.spin import Spin
+from gearfmu.reduction.display import Picture
+from gearfmu.reduction.full_order import COMPONENTS
+
+_KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
+_FORMER = {  # names of earlier versions, told by the AttributeError
+    "input_hash": "how.hash", "algorithm_version": "how.algorithm", "method": "how.method", "material": "how.material",
+    "mesh": "how.mesh", "provenance": "how.provenance", "frf": "error", "display": "picture", "ground": "error.ground",
+    "shapes": "picture.shapes", "bore_rows": "rows", "static_bb": "static", "rigid_mass": "mass", "interfaces": "nodes",
+    "point": "points", "nodal_diameter": "flank.diameter", "part": "flank.part", "parity": "flank.parity",
+    "flank_rows": "flank.rows", "static_ff": "flank.static", "static_fb": "flank.node", "tangent": "flank.tangent",
+    "teeth": "flank.teeth", "r_b": "flank.r_b", "psi_b": "flank.psi_b", "base_helix_angle": "flank.beta_b",
+    "face_width": "flank.face_width", "strip_half_width": "flank.strip_half_width", "roll": "flank.roll",
+    "roll_range": "flank.roll_range", "internal": "flank.internal", "rim": "sensors", "max_error": "error.max_error",
+    "trusted_to": "error.trusted_to", "frf_error": "error.error", "frf_frequency": "error.frequency",
+    "length": "error.length", "band": "error.band", "knows_profile": "flank.knows_profile",
+    "width_functions": "flank.width_functions", "all_offsets": "flank.all_offsets",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class How:
+    """What a body was made from. hash: SHA-256 of its inputs and of the algorithm's version, 64 hex digits; method: of
+    reduction; material: SI; mesh: plain facts; provenance: program versions, time and memory."""
+
+    hash: str
+    method: str
+    material: dict[str, Any] = field(default_factory=dict)
+    mesh: dict[str, Any] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+    algorithm: int = ALGORITHM_VERSION
+
+
+@dataclass(frozen=True)
+class Node:
+    """Where a body is loaded and read. kind: "rigid" (RBE2), "averaging" (RBE3), "nodes", "section" of a beam, "" where
+    its file does not say; components: of `COMPONENTS`, one row of the body each; point (3,) m; span: from where to
+    where its surface reaches along z, m, where that is known."""
+
+    name: str
+    kind: str
+    components: tuple[str, ...]
+    point: np.ndarray
+    span: tuple[float, float] | None = None
+
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """(k, 6): rigid motion about the origin → components."""
+        return rigid_rows(self.point)[[COMPONENTS.index(component) for component in self.components]]
+
+
+def rigid_rows(point: np.ndarray) -> np.ndarray:
+    """(6, 6): rigid motion about the origin → motion of a point (3,) m."""
+    x, y, z = point
+    rows = np.eye(6)
+    rows[0, 4:], rows[1, 3], rows[1, 5], rows[2, 3:5] = (z, -y), -z, x, (y, -x)
+    return rows
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """S points that are read and never loaded. names; points (S, 3) m; rows (3S, n), kg^-½: displacement x, y, z of
+    each; static (3S, m), m/N and 1/N: per unit load on the nodes, None where that is not kept. A ring has one: the
+    mean of the patch of its rim that belongs to sector 0, in that sector's frame."""
+
+    names: tuple[str, ...]
+    points: np.ndarray
+    rows: np.ndarray
+    static: np.ndarray | None = None
+
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """(3S, 6): rigid motion about the origin → displacement of each."""
+        return np.vstack([rigid_rows(point)[:3] for point in self.points])
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A closed surface that radiates: points (P, 3) m; faces (F, 4), normals outward, a triangle repeats its last
+    point; modes (6 + n, P, 3): displacement in rigid motion about the origin (1 and m), then in the oscillators,
+    kg^-½."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    modes: np.ndarray
+
+    @property
+    def skin_modes(self) -> np.ndarray:
+        """(P, 3, 6 + n): `modes`, by points."""
+        return self.modes.transpose(1, 2, 0)
+
+
+@dataclass(frozen=True)
+class Exact:
+    """What a beam knows beyond its modes. omega (n,) rad/s; residual (m, m): static compliance beyond the modes;
+    gyroscopic (6 + n, 6 + n), kg·m² …, skew: of sections that tilt."""
+
+    omega: np.ndarray
+    residual: np.ndarray
+    gyroscopic: np.ndarray
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Displacement along the profile, towards growing roll: what friction loads and reads.
+
+    rows (2, R, A, n), kg^-½, like those of the flank. static_nt, static_tt (2, 2, R, R, A, A), m/N: along the normal
+    and along the profile at (tooth 0, flank f, roll i, function a) per load along the profile at (tooth 0, g, j, b).
+    """
+
+    rows: np.ndarray
+    static_nt: np.ndarray
+    static_tt: np.ndarray
+
+
+@dataclass(frozen=True)
+class Flank:
+    """Teeth of a body of equal sectors; shapes, units and meaning of every field: `layout.FLANK`.
+
+    diameter, part, parity (n,): the modes as patterns round the axis. rows (2, R, A, n), kg^-½; static (2, 2, M, R, R,
+    A, A), m/N; node (2, R, A, 6): flanks under loads of the node. M is z, or 2K + 1 where only the tooth offsets −K …
+    K are kept: offset m stands at m mod M. internal: a ring, whose index k counts tooth spaces, normals pointing into
+    them, and whose node is the rim. beta_b: rad, positive for a right-handed gear. tangent: None of a mean tooth.
+    """
+
+    teeth: int
+    internal: bool
+    r_b: float
+    psi_b: float
+    beta_b: float
+    face_width: float
+    strip_half_width: float
+    roll_range: np.ndarray
+    roll: np.ndarray
+    diameter: np.ndarray
+    part: np.ndarray
+    parity: np.ndarray
+    rows: np.ndarray
+    static: np.ndarray
+    node: np.ndarray
+    tangent: Tangent | None = None
+
+    @property
+    def knows_profile(self) -> bool:
+        """Whether flanks can be loaded and read along the profile, as friction does."""
+        return self.tangent is not None
+
+    @property
+    def all_offsets(self) -> bool:
+        """Whether `static` holds all tooth offsets."""
+        return self.static.shape[2] == self.teeth
+
+    @property
+    def width_functions(self) -> int:
+        """Number A of Legendre functions across the face width."""
+        return self.rows.shape[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A free body: n oscillators, m rows at its nodes; SI; shapes, units and meaning of the arrays: `layout.ENTRIES`.
+
+    mass (6, 6) of rigid motion about the origin, kg, kg·m, kg·m²; frequency (n,) Hz, ascending; damping_ratio (n,);
+    nodes in the order of rows (m, n), kg^-½ and kg^-½/m; static (m, m), m/N …: compliance of the free body, inertia
+    relief, mean-axis gauge; error: how well it follows its finite elements, None where nothing was compared; spin: None
+    turns as if rigid; picture: None is not drawn. Raises BodyError naming every field that cannot be.
+    """
+
+    name: str
+    how: How
+    mass: np.ndarray
+    frequency: np.ndarray
+    damping_ratio: np.ndarray
+    nodes: tuple[Node, ...]
+    rows: np.ndarray
+    static: np.ndarray
+    error: FrfError | None = None
+    flank: Flank | None = None
+    spin: Spin | None = None
+    exact: Exact | None = None
+    picture: Picture | None = None
+    sensors: Sensors | None = None
+    skin: Skin | None = None
+
+    def __post_init__(self) -> None:
+        if problems := body_problems(self):
+            raise BodyError(f"body '{self.name}' is not valid: " + "; ".join(problems))
+
+    if not TYPE_CHECKING:  # a checker knows the names
+
+        def __getattr__(self, name):
+            now = f": it is '{_FORMER[name]}' now" if name in _FORMER else ""
+            raise AttributeError(f"a body has no '{name}'{now}")
+
+    @property
+    def modes(self) -> int:
+        """Number n of oscillators."""
+        return len(self.frequency)
+
+    @property
+    def total_mass(self) -> float:
+        """kg."""
+        return float(self.mass[0, 0])
+
+    @property
+    def centre_of_mass(self) -> np.ndarray:
+        """(3,) m."""
+        return np.array([self.mass[1, 5], self.mass[2, 3], self.mass[0, 4]]) / self.mass[0, 0]
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) about the origin, kg·m²."""
+        return self.mass[3:, 3:]
+
+    @property
+    def points(self) -> np.ndarray:
+        """(K, 3) m: where the nodes lie."""
+        return np.array([node.point for node in self.nodes])
+
+    @property
+    def rigid_rows(self) -> np.ndarray:
+        """(m, 6): rigid motion about the origin → nodes."""
+        return np.vstack([node.rigid_rows for node in self.nodes])
+
+    @property
+    def toothed(self) -> Flank:
+        """The flank of a body that has one."""
+        assert self.flank is not None, f"body '{self.name}' has no teeth"
+        return self.flank
+
+
+def body_problems(body: Body) -> list[str]:
+    """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
+    sizes = {"K": len(body.nodes), "m": sum(len(node.components) for node in body.nodes), "6+n": 6 + body.modes}
+    if body.flank is not None:
+        sizes["z"] = body.flank.teeth
+    problems: list[str] = []
+    for entry in entries_of(body):
+        problems += _array_problems(entry, np.asarray(value_of(body, entry.field)), sizes)
+    if problems:
+        return problems
+    checks = _body_checks(body) | (_flank_checks(body.flank) if body.flank is not None else {})
+    return [text for text, holds in checks.items() if not holds]
+
+
+def _array_problems(entry: Entry, value: np.ndarray, sizes: dict[str, int]) -> list[str]:
+    value = value.astype("i8") if value.dtype == bool else value
+    if value.dtype.kind != entry.kind[0]:
+        return [f"{entry.path} holds {value.dtype}, expected {_KINDS[entry.kind]} numbers"]
+    if value.ndim != len(entry.shape):
+        return [f"{entry.path} has shape {value.shape}, expected {len(entry.shape)} dimensions"]
+    for length, wanted in zip(value.shape, entry.shape, strict=True):
+        expected = wanted if isinstance(wanted, int) else sizes.setdefault(wanted, length)
+        if length != expected:
+            return [
+                f"{entry.path} has shape {value.shape}, which does not fit {entry.shape} with {wanted} = {expected}"
+            ]
+    if not np.all(np.isfinite(value)):
+        return [f"{entry.path} holds a number that is not finite"]
+    return []
+
+
+def _body_checks(body: Body) -> dict[str, bool]:
+    picture, shapes = body.picture, body.picture.shapes if body.picture is not None else None
+    return {
+        "hash is not 64 hex digits": len(body.how.hash) == 64 and set(body.how.hash) <= set("0123456789abcdef"),
+        "mass must be above 0": body.total_mass > 0,
+        "frequency must be above 0 and ascending": body.modes == 0
+        or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),
+        "damping_ratio must lie between 0 and 1": bool(np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))),
+        "sensors/names does not fit the points": body.sensors is None
+        or len(body.sensors.names) == len(body.sensors.points) == len(body.sensors.rows) / 3,
+        "skin/faces names a point that is not there": body.skin is None or _inside(body.skin.faces, body.skin.points),
+        "picture/shapes/quads names a point that is not there": shapes is None or _inside(shapes.quads, shapes.points),
+        "picture/loads does not fit the surface": picture is None or picture.loads.shape[1] == len(picture.points),
+        "picture/quads names a point that is not there": picture is None or _inside(picture.quads, picture.points),
+    }
+
+
+def _inside(quads: np.ndarray, points: np.ndarray) -> bool:
+    return bool(np.all((quads >= 0) & (quads < len(points))))
+
+
+def _flank_checks(flank: Flank) -> dict[str, bool]:
+    offsets = flank.static.shape[2]
+    return {
+        "flank/teeth must be 3 or more": flank.teeth >= 3,
+        "flank/r_b, face_width and strip_half_width must be above 0": min(
+            flank.r_b, flank.face_width, flank.strip_half_width
+        )
+        > 0,
+        "flank/static must hold the tooth offsets −K … K, K at least 3, or all": offsets == flank.teeth
+        or (7 <= offsets < flank.teeth and offsets % 2 == 1),
+        "flank/beta_b must lie between −π/4 and π/4": abs(flank.beta_b) < np.pi / 4,
+        "there must be a mode, a roll point and a width function": min(flank.rows.shape) > 0,
+        "flank/part: the two modes of a pair must follow each other": _pairs_sound(flank),
+        "flank/diameter must lie between 0 and z/2": bool(
+            np.all((flank.diameter >= 0) & (2 * flank.diameter <= flank.teeth))
+        ),
+        "flank/parity must be −1, 0 or +1": bool(np.all(np.abs(flank.parity) <= 1)),
+        "flank/roll must ascend inside flank/roll_range": bool(
+            np.all(np.diff(np.concatenate([flank.roll_range[:1], flank.roll, flank.roll_range[1:]])) > 0)
+        ),
+    }
+
+
+def _pairs_sound(flank: Flank) -> bool:
+    first, second = flank.part == 1, flank.part == 2
+    follows = np.concatenate([[False], first[:-1]])
+    same = np.concatenate([[True], np.diff(flank.diameter) == 0])
+    return bool(np.all((flank.part >= 0) & (flank.part <= 2))) and bool(
+        np.all(second == follows) and np.all(same[second])
+    )

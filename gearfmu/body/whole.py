@@ -1,0 +1,113 @@
+"""Bodies whose finite elements are taken as a whole: the carrier of a planetary set, a housing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.body.body import Body, How, Node, Sensors, Skin
+from gearfmu.body.imported import imported_carrier_order
+from gearfmu.body.parts import provenance
+from gearfmu.femesh import mesh_report
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.carrier import carrier_full_order, carrier_need
+from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.memory import lower_counts, require_memory
+from gearfmu.reduction.mesh_error import carrier_mesh_error
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import static_response
+from gearfmu.reduction.oscillators import oscillators
+from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
+from gearfmu.spec.forms.members import CarrierMember
+
+Progress = Callable[[str, float], None]
+
+
+def reduced_carrier(carrier: CarrierMember, input_hash: str, progress: Progress | None = None) -> Body:
+    """The carrier of a set, reduced as its file says. Raises MeshError."""
+    part, started = carrier.part, time.process_time()
+    _tell(progress, "carrier: mesh and finite elements", 0.0)
+    if part.imported is None:
+        need = carrier_need(carrier)
+        require_memory(need, lower_counts(part.mesh, "carrier.mesh"))
+        _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
+        facts = _carrier_facts(carrier)
+        _tell(progress, "carrier: finite elements", 0.3)
+        full = carrier_full_order(carrier)
+        mesh = {**facts, "dof_body": full.size}
+    else:
+        full, mesh = imported_carrier_order(carrier)
+    _tell(progress, f"carrier: {part.method}", 0.5)
+    how = How(input_hash, part.method, part.material.model_dump(), mesh)
+    body = whole_body(full, how, Size(part.modes), Judging.over(damping_ratio=part.modal_damping))
+    return replace(body, how=replace(how, provenance=provenance(time.process_time() - started)))
+
+
+@dataclass(frozen=True)
+class Read:
+    """What is read of a body and never loaded: sensors, nodes of three displacements; a closed surface of points (P, 3)
+    m and faces (F, 4), whose displacement is `skin` (3P, N)."""
+
+    sensors: Sequence[Interface] = ()
+    points: np.ndarray | None = None
+    faces: np.ndarray | None = None
+    skin: sp.csr_array | None = None
+
+
+def whole_body(full: FullOrder, how: How, size: Size, judging: Judging, read: Read = Read()) -> Body:
+    """The body of finite elements taken as a whole: a carrier, a housing. size: of the basis that `how.method` makes;
+    judging: lines at which it is compared, and its modal damping. Raises BodyError."""
+    basis = METHODS[how.method](full, size)
+    model = oscillators(full, basis, judging.damping_ratio)
+    exact = reference(full, judging)
+    error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
+    band = float(judging.frequency[0]), float(judging.frequency[-1])
+    return Body(
+        name=full.name,
+        how=how,
+        mass=model.rigid_mass,
+        frequency=model.frequency,
+        damping_ratio=model.damping_ratio,
+        nodes=tuple(Node(i.name, i.kind, i.components, i.point) for i in full.interfaces),
+        rows=model.rows,
+        static=model.static,
+        error=FrfError.of(judging.frequency, error, band, full.length, full.ground),
+        sensors=_sensed(read, full, basis.vectors @ model.turn),
+        skin=_skin(read, full, basis.vectors @ model.turn),
+    )
+
+
+def _sensed(read: Read, full: FullOrder, shapes: np.ndarray) -> Sensors | None:
+    """Sensors of a body whose oscillators have the `shapes` (N, n)."""
+    if not read.sensors:
+        return None
+    rows = sp.csr_array(sp.vstack([sensor.rows for sensor in read.sensors]))
+    static = (rows @ static_response(full)) * full.scales()
+    points = np.array([sensor.point for sensor in read.sensors])
+    return Sensors(tuple(sensor.name for sensor in read.sensors), points, rows @ shapes, static)
+
+
+def _skin(read: Read, full: FullOrder, shapes: np.ndarray) -> Skin | None:
+    if read.skin is None or read.points is None or read.faces is None:
+        return None
+    moved = np.hstack([read.skin @ full.rigid, read.skin @ shapes]).T
+    return Skin(read.points.astype("f4"), read.faces, moved.reshape(-1, len(read.points), 3).astype("f4"))
+
+
+def _carrier_facts(carrier: CarrierMember) -> dict[str, Any]:
+    """Plain facts about our own mesh of a carrier, its error measured on a finer one."""
+    facts = mesh_report(carrier_sector(carrier.geometry, carrier.part.mesh))
+    counts, error = carrier.part.mesh.model_dump(), carrier_mesh_error(carrier)
+    return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
+
+
+def _tell(progress: Progress | None, what: str, share: float) -> None:
+    if progress:
+        progress(what, share)

@@ -1,0 +1,103 @@
+"""A housing before reduction: its mesh in the stage's axes, seats and feet as interfaces, and what is read beside them:
+sensors and the closed outer surface.
+
+A seat's master lies on the axis of the circle that fits its nodes best, in the middle of their length; a foot's in the
+middle of its nodes. Sensors and skin add rows, no unknowns and no modes: nothing loads them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, elimination, full_order
+from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
+from gearfmu.reduction.imported.carrier import circle_centre
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.skin import Surface, closed_surface
+from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
+from gearfmu.spec.tables.housing import HousingBody, HousingImportSpec
+
+HOUSING_FACTORS = 5  # of K, with the interfaces held, and at the reference's three points
+
+
+@dataclass(frozen=True)
+class ImportedHousing:
+    """An imported housing before reduction. full: seats and feet are its interfaces; spans: of every interface the
+    lowest and highest z of its nodes, m; sensors: interfaces of three components that nothing loads; surface: its skin,
+    None where the file names none, and skin (3P, N): displacement of its points by the unknowns."""
+
+    full: FullOrder
+    facts: dict[str, object]
+    spans: dict[str, tuple[float, float]]
+    sensors: tuple[Interface, ...]
+    surface: Surface | None
+    skin: sp.csr_array | None
+
+
+def imported_housing(housing: HousingBody) -> ImportedHousing:
+    """The finite elements of a housing. MeshError for sets that are missing, no circle or no surface, for holes in
+    the skin, and as of every import."""
+    source = housing.imported
+    mesh = sound_mesh(source)
+    with naming(Path(source.file)):
+        require_memory(whole_need(mesh.nodes.size, 3 * housing.modes, HOUSING_FACTORS), MESH_COARSER)
+        matrices = ready_matrices(source, mesh, np.eye(3), housing.material)
+        matrices = matrices or Matrices(*solids.assemble(mesh.nodes, mesh.elements, housing.material))
+        faces = solids.boundary(mesh.elements)
+        held = _seats(mesh, faces, source) + _feet(mesh, faces, source)
+        felt = [_sensor(mesh, faces, name, node_set) for name, node_set in source.sensors.items()]
+        body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
+        judgement = Judgement(tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max()))
+        full = full_order(housing.name, body, [*held, *felt], judgement)
+        loaded, sensors = full.interfaces[: len(held)], full.interfaces[len(held) :]
+        surface = closed_surface(mesh, faces, source.skin) if source.skin else None
+        skin = None
+        if surface is not None:
+            transform = elimination(mesh.nodes, [c for c in held if c.kind == "rigid"])[0]
+            skin = sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ transform)
+    dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
+    heights = {c.name: mesh.nodes[c.nodes, 2] for c in held}
+    return ImportedHousing(
+        replace(full, interfaces=loaded),
+        mesh_facts(mesh) | {"method": "whole body"} | dofs,
+        {name: (float(z.min()), float(z.max())) for name, z in heights.items()},
+        tuple(replace(s, components=COMPONENTS[:3], rows=sp.csr_array(s.rows[:3])) for s in sensors),
+        surface,
+        skin,
+    )
+
+
+def _seats(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+    found = []
+    for name, node_set in source.seats.items():
+        nodes = mesh.nodes[mesh.node_set(node_set)]
+        try:
+            centre = circle_centre(nodes[:, :2])
+        except MeshError as error:
+            raise MeshError(f"seat {name} ('{node_set}'): {error}") from error
+        point = np.array([*centre, 0.5 * (nodes[:, 2].min() + nodes[:, 2].max())])
+        found.append(set_coupling(mesh, faces, SetInterface(node_set, source.seat_coupling, point), name))
+    return found
+
+
+def _feet(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+    return [
+        set_coupling(mesh, faces, SetInterface(node_set, source.foot_coupling), name)
+        for name, node_set in source.feet.items()
+    ]
+
+
+def _sensor(mesh: ImportedMesh, faces: solids.Faces, name: str, node_set: str) -> Coupling:
+    """One node moves as itself, more as their mean."""
+    members = mesh.node_set(node_set)
+    if len(members) == 1:
+        return Coupling(name, "nodes", members, mesh.nodes[members[0]])
+    return set_coupling(mesh, faces, SetInterface(node_set), name)

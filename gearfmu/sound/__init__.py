@@ -1,0 +1,29 @@
+"""Radiated sound: skin of a body, boundary elements, radiation matrix, sound power, third octaves."""
+
+from gearfmu.sound.boundary import memory_needed
+from gearfmu.sound.levels import a_weighting, level, midbands, third_octaves, weighted
+from gearfmu.sound.power import Segments, SoundPower, power_of, radiated, segments
+from gearfmu.sound.radiation import Air, Radiation, radiation
+from gearfmu.sound.skin import Skin, SoundError, envelope, refined, skin_of
+
+__all__ = [
+    "Air",
+    "Radiation",
+    "Segments",
+    "Skin",
+    "SoundError",
+    "SoundPower",
+    "a_weighting",
+    "envelope",
+    "level",
+    "memory_needed",
+    "midbands",
+    "power_of",
+    "radiated",
+    "radiation",
+    "refined",
+    "segments",
+    "skin_of",
+    "third_octaves",
+    "weighted",
+]

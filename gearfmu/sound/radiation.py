@@ -1,0 +1,76 @@
+"""Radiation matrix R(f) of a body's coordinates: sound power W = ½ q̇ᴴ R q̇ of the velocities q̇ (peak amplitudes)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.sound.boundary import Surface, memory_needed, surface_of
+from gearfmu.sound.levels import midbands
+from gearfmu.sound.skin import Skin, SoundError, refined
+
+PANELS = 6  # patches a wavelength at least
+COUNT = 1500  # patches
+LINES = (63.0, 8000.0)  # Hz, nominal first and last third octave
+
+
+@dataclass(frozen=True)
+class Air:
+    """density kg/m³, speed of sound m/s; 20 °C and 101.325 kPa when not given."""
+
+    density: float = 1.204
+    speed: float = 343.2
+
+    @property
+    def impedance(self) -> float:
+        """ρc, N·s/m³."""
+        return self.density * self.speed
+
+
+@dataclass(frozen=True)
+class Radiation:
+    """frequency (L,) Hz, ascending; resistance (L, N, N) N·s/m, symmetric, not negative; gram (N, N) m²: integral of
+    products of normal displacements over the skin, so ρc · gram is the resistance of equivalent radiated power (ERP);
+    impedance ρc; reach Hz: lines above it are ERP; balance (L,) dB: power that leaves the skin over that of the far
+    field, mean over coordinates: how well the mesh solves the line, 0 above the reach."""
+
+    frequency: np.ndarray
+    resistance: np.ndarray
+    gram: np.ndarray
+    impedance: float
+    reach: float
+    balance: np.ndarray
+
+
+def radiation(
+    skin: Skin, lines: np.ndarray | None = None, count: int = COUNT, air: Air | None = None, memory: float = 4e9
+) -> Radiation:
+    """R of a skin's coordinates by boundary elements at the frequencies `lines` (Hz), third octaves from 63 Hz to 8 kHz
+    when None. Above six patches a wavelength R = ρc ∫ φ_n φ_nᵀ dS, its limit for short waves.
+
+    count : patches at most: coarse triangles are halved and fine ones joined until there are about so many.
+    memory : bytes it may take. Raises SoundError, before anything is allocated, when it would take more.
+    """
+    air = air or Air()
+    lines = midbands(*LINES) if lines is None else np.asarray(lines, dtype=float)
+    need = memory_needed(count, skin.shapes.shape[2])
+    if need > memory:
+        raise SoundError(f"{count} patches take {need / 1e9:.2f} GB, more than {memory / 1e9:.2f}: take fewer patches")
+    edge = np.sqrt(np.linalg.norm(skin.normals, axis=1).sum() / count)
+    surface = surface_of(refined(skin, 2 * edge), count)
+    gram, reach = skin.gram, air.speed / (PANELS * surface.edge)
+    found, balance = [], []
+    for line in lines:
+        own, decibel = (gram, 0.0) if line > reach else _at(surface, 2 * np.pi * line / air.speed, gram)
+        found.append(air.impedance * own)
+        balance.append(decibel)
+    return Radiation(lines, np.array(found, dtype=np.float32), gram, air.impedance, reach, np.array(balance))
+
+
+def _at(surface: Surface, k: float, gram: np.ndarray) -> tuple[np.ndarray, float]:
+    """R/ρc at one wave number and the balance, dB."""
+    pressure = surface.pressure(k)
+    far, scale = surface.resistance(k, pressure), np.maximum(np.diag(gram), 1e-300)
+    ratio = (np.diag(surface.near(pressure)) / scale).sum() / (np.diag(far) / scale).sum()
+    return far, float(10 * np.log10(ratio)) if ratio > 0 else float("inf")

@@ -1,0 +1,55 @@
+"""Does a housing fit the stage that it carries? One housing, seats that exist, feet that hold it. Where seats lie is
+known from its mesh (stage/build/housed.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.spec.tables.supports import SupportSpec
+
+Found = Iterator[tuple[str, str, str]]
+
+
+def housing_problems(stage: Stage) -> Found:
+    """(field, value, remedy) of everything that is wrong with the housing of a stage."""
+    for other in stage.housings[1:]:
+        yield f"bodies.{other.name}.kind", "housing", f"{stage.housings[0].name} is one already: keep one housing"
+    for housing in stage.housings[:1]:
+        yield from _alone(stage, housing)
+        for support in stage.supports:
+            if housing.name in (support.body, support.to):
+                yield from _support(housing, support)
+        if not any(s.body == housing.name for s in stage.supports):
+            feet = ", ".join(housing.imported.feet) or "none in its import: name node sets in feet = {…}"
+            remedy = (
+                f'nothing holds it: write [[supports]] with body = "{housing.name}" and node one of its feet ({feet}); '
+                'one that hangs freely has soft ones, e.g. radial = "1e4 N/m"'
+            )
+            yield f"bodies.{housing.name}", "no feet", remedy
+
+
+def _alone(stage: Stage, housing: HousingBody) -> Found:
+    for name, rotor in stage.rotors.items():
+        if housing.name in rotor.bodies:
+            yield f"rotors.{name}.bodies.{housing.name}", housing.name, "a housing stands: name it in no rotor"
+    for name, port in stage.ports.items():
+        if port.body == housing.name:
+            yield f"ports.{name}.body", housing.name, "a housing does not turn: name a shaft or a gear"
+
+
+def _support(housing: HousingBody, support: SupportSpec) -> Found:
+    place, foot = f"supports.{support.name}", support.body == housing.name
+    known, what = (housing.imported.feet, "feet") if foot else (housing.imported.seats, "seats")
+    if foot and support.to is not None:
+        yield f"{place}.to", support.to, f"a foot of {housing.name} stands on the ground: leave `to` away"
+    if foot and support.bearing is not None:
+        yield f"{place}.bearing", support.bearing, "a foot has springs: write radial, axial, tilt and torsion"
+    if foot and support.at is not None:
+        yield f"{place}.at", f"{support.at:g}", "its node set says where a foot lies: leave it away"
+    if support.node not in known:
+        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or 'not named in its import'}"
+        yield f"{place}.node", support.node or "missing", remedy
+    if not foot and support.torsion is not None:
+        yield f"{place}.torsion", f"{support.torsion}", "a bearing on a housing cannot hold a spin: leave it away"

@@ -1,0 +1,86 @@
+"""Motion of a housing after a run: the housing on its feet alone, driven by the forces that its bearings recorded.
+
+The forces of shafts on seats (`bearing.NAME.fx_mean` …, their dashpots' share included) are all that moves a housing
+but its feet. Its oscillators on the feet, theory eqs. 2a and 2b with this one body, follow them exactly as constant
+over every communication step:
+
+    q̈ + (2ζΩ + Eᵀ c E) q̇ + Ω² q = P f,      ẋ = Φ q̇
+
+P: rows of the seats, E elongations of the feet's springs, c their dashpots, x rigid motion and oscillators of the free
+housing: what `body.skin` and `body.sensors` read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as sl
+
+from gearfmu.body import Body
+from gearfmu.errors import ModelError
+from gearfmu.spec.forms.general import Stage
+from gearfmu.stage.build.assembly import layout_of
+from gearfmu.stage.build.groups import FORCES, Group, mount
+from gearfmu.stage.run.trace import Trace
+
+
+@dataclass(frozen=True)
+class HousingMotion:
+    """time (T,) s; velocity (T, 6 + n): of rigid motion x, y, z, rx, ry, rz about the origin, m/s and rad/s, and of the
+    n oscillators of the free housing that are dynamic, kg^½·m/s. The skin moves with
+    `skin_modes[:, :, : 6 + n] @ velocity[t]`."""
+
+    time: np.ndarray
+    velocity: np.ndarray
+
+
+@dataclass(frozen=True)
+class HousingAlone:
+    """A housing on its feet. group: its oscillators; channels: forces of the bearings on it; pushes (s, k): what a unit
+    of each does to the oscillators; body: as it was reduced."""
+
+    body: Body
+    group: Group
+    channels: tuple[str, ...]
+    pushes: np.ndarray
+
+    @classmethod
+    def of(cls, stage: Stage, bodies: Sequence[Body]) -> HousingAlone:
+        """The housing of a stage; bodies as of `assemble`. ModelError where the stage has none."""
+        if not stage.housings:
+            raise ModelError(f"{stage.name} has no housing: its bearings stand on rigid ground")
+        layout = layout_of(stage, bodies)
+        last = len(layout.bodies) - 1
+        feet = [replace(s, first=(0, s.first[1])) for s in layout.supports if s.first[0] == last]
+        group = mount(replace(layout, bodies=layout.bodies[last:], rotors=[], supports=feet, stands=frozenset()))
+        seats = [s for s in layout.supports if s.second is not None and s.second[0] == last]
+        own = [(s.name, s.second[1], d) for s in seats if s.second is not None for d in s.directions]
+        names = tuple(f"{name}.{FORCES[direction]}_mean" for name, _, direction in own)
+        pushes = np.array([group.node_rows(0, node, direction) for _, node, direction in own])
+        return cls(bodies[-1], group, names, pushes)
+
+    def motion(self, trace: Trace) -> HousingMotion:
+        """How the housing of a run moved, from rest under its first forces. TraceError where the run did not record
+        the forces of its bearings."""
+        group, n, step = self.group, self.group.omega.size, float(trace.time[1] - trace.time[0])
+        force = np.stack([trace[name] for name in self.channels], axis=1)
+        damping = np.diag(2 * group.zeta * group.omega) + (group.damper_rows.T * group.damper) @ group.damper_rows
+        rate = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(group.omega**2), -damping]])
+        flow = sl.expm(step * rate)
+        pushed = np.linalg.solve(
+            rate, (flow - np.eye(2 * n)) @ np.vstack([np.zeros_like(self.pushes.T), self.pushes.T])
+        )
+        state, found = np.zeros(2 * n), np.zeros((len(force), n))
+        state[:n] = (self.pushes.T @ force[0]) / group.omega**2
+        for k in range(1, len(force)):
+            state = flow @ state + pushed @ force[k]
+            found[k] = state[n:]
+        return HousingMotion(trace.time, found @ group.shapes.T)
+
+    def sensor_speed(self, motion: HousingMotion) -> np.ndarray:
+        """(T, 3S) m/s: of the body's sensors, x, y, z of each, by what is dynamic."""
+        assert self.body.sensors is not None, "a body with sensors"
+        rows = np.hstack([self.body.sensors.rigid_rows, self.body.sensors.rows])
+        return np.asarray(motion.velocity @ rows[:, : motion.velocity.shape[1]].T)
