@@ -281,7 +281,6 @@ struct gk_setup {
 };
 
 #define GK_SETUP_MAGIC 0x32505445534b47ULL
-
 typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 
 /* For GK_ASSERT: the number of an engagement that has been planned; a span of whole quads */
