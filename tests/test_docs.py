@@ -236,3 +236,21 @@ def test_sections_and_equations_that_are_cited_exist() -> None:
             missing += [f"{path.relative_to(ROOT)}: {found}"] if wrong else []
             seen += 1
     assert seen > 100 and not missing
+
+
+def test_the_way_of_a_number_names_what_there_is() -> None:
+    """The first drawing of docs/architecture.md: every function, class and file is in the package before its colon, and
+    every value is a class."""
+    drawing = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    places = re.findall(r"([a-z/]+): (\w[\w., ]+)", "\n".join(line[50:] for line in drawing.splitlines()))
+    missing = []
+    for package, names in places:
+        files = list((ROOT / "gearfmu" / package).rglob("*.py"))
+        text = "".join(path.read_text(encoding="utf-8") for path in files)
+        for name in re.findall(r"[\w.]+", names):
+            defined = re.search(rf"^(?:def|class) {name}\b|^{name}(?:: | = )", text, flags=re.MULTILINE)
+            missing += [] if defined or name in {path.name for path in files} else [f"{package}: {name}"]
+    values = {name for line in drawing.splitlines()[2:] for name in re.findall(r"\b[A-Z]\w*[a-z]\w*\b", line[24:50])}
+    every = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "gearfmu").rglob("*.py"))
+    missing += [name for name in values if not re.search(rf"^class {name}\b", every, flags=re.MULTILINE)]
+    assert len(places) > 15 and len(values) > 10 and not missing
