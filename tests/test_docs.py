@@ -193,3 +193,64 @@ def test_prose_is_counted() -> None:
     )
     assert [s.split()[0] for s in prose.too_long(text)] == ["A", "A"]
     assert prose.banned(text) == ["goes on", "what"]
+
+
+NUMBER = r"\d+(?:\.\d+)?[a-z]?[′″]?"  # of a section or an equation of the theory
+
+
+def _listed() -> dict[str, str]:
+    """Equations of every section by its heading, as docs/theory.md lists them."""
+    text = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8").partition("## Sections and equations")[2]
+    return dict(re.findall(r"^\| \[(\d.*)\]\(theory/\S+\) \| (.+) \|$", text, flags=re.MULTILINE))
+
+
+def test_the_theory_lists_every_section_with_its_equations() -> None:
+    """An equation ends its line with its number, which is given once; chapters without sections are one row."""
+    found = {}
+    for page in sorted((ROOT / "docs" / "theory").glob("*.md")):
+        pieces = re.split(r"^##? (\d.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+        heads = list(zip(pieces[::2], pieces[1::2], strict=True))
+        found |= dict(heads[1:] or heads)
+    numbers = {
+        head: re.findall(rf"^ {{4}}.* \(({NUMBER})\)$", text, flags=re.MULTILINE) for head, text in found.items()
+    }
+    listed = {head: re.findall(rf"\(({NUMBER})\)", row) for head, row in _listed().items()}
+    assert listed == {head: sorted(row, key=lambda n: (int(re.split(r"\D", n)[0]), n)) for head, row in numbers.items()}
+    every = [number for row in numbers.values() for number in row]
+    assert len(every) == len(set(every)) > 90
+
+
+def test_sections_and_equations_that_are_cited_exist() -> None:
+    """`docs/theory.md, 3.4`, `theory, eqs. 7 and 8`: in sources, tests, programs of evidence and pages."""
+    known = {number for head, row in _listed().items() for number in re.findall(rf"\(({NUMBER})\)", row)}
+    known |= {part for head in _listed() for part in (head.split()[0], head.split(".")[0].split()[0])}
+    one = rf"(?:eqs?\. )?\(?{NUMBER}\)?"
+    cited = re.compile(rf"\btheory(?:\.md)?,? ({one}(?:(?:,| and) {one})*)")
+    kinds = {"gearfmu": ("py", "c", "h", "inc"), "tests": ("py",), "evidence": ("py",)}
+    paths = [path for folder, ends in kinds.items() for end in ends for path in (ROOT / folder).rglob(f"*.{end}")]
+    missing, seen = [], 0
+    for path in [*PAGES, *paths]:
+        text = re.sub(r"\s+(?:[*#] )?", " ", path.read_text(encoding="utf-8"))
+        for found in cited.findall(text):
+            wrong = set(re.findall(NUMBER, found)) - known
+            missing += [f"{path.relative_to(ROOT)}: {found}"] if wrong else []
+            seen += 1
+    assert seen > 100 and not missing
+
+
+def test_the_way_of_a_number_names_what_there_is() -> None:
+    """The first drawing of docs/architecture.md: every function, class and file is in the package before its colon, and
+    every value is a class."""
+    drawing = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    places = re.findall(r"([a-z/]+): (\w[\w., ]+)", "\n".join(line[50:] for line in drawing.splitlines()))
+    missing = []
+    for package, names in places:
+        files = list((ROOT / "gearfmu" / package).rglob("*.py"))
+        text = "".join(path.read_text(encoding="utf-8") for path in files)
+        for name in re.findall(r"[\w.]+", names):
+            defined = re.search(rf"^(?:def|class) {name}\b|^{name}(?:: | = )", text, flags=re.MULTILINE)
+            missing += [] if defined or name in {path.name for path in files} else [f"{package}: {name}"]
+    values = {name for line in drawing.splitlines()[2:] for name in re.findall(r"\b[A-Z]\w*[a-z]\w*\b", line[24:50])}
+    every = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "gearfmu").rglob("*.py"))
+    missing += [name for name in values if not re.search(rf"^class {name}\b", every, flags=re.MULTILINE)]
+    assert len(places) > 15 and len(values) > 10 and not missing

@@ -209,6 +209,7 @@ def test_vtu_comes_back_as_written(tmp_path, case: tuple[GearGeometry, FeMesh]) 
     assert np.array_equal(back.points, mesh.nodes)
     assert np.array_equal(back.cells[0].data, mesh.elements)
     assert np.array_equal(np.flatnonzero(back.point_data["bore"]), np.sort(mesh.sets["bore"]))
+    assert set(back.point_data["bore"]) == {0.0, 1.0}
     assert np.array_equal(back.point_data["roll"][mesh.flank[0].quads], mesh.flank[0].roll)
     assert back.cell_data["scaled_jacobian"][0] == pytest.approx(scaled_jacobian(mesh))
     assert [path.name for path in tmp_path.iterdir()] == ["body.vtu"]

@@ -126,6 +126,12 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     assert heat is not None and heat.values.max() == heat.high and "drive flanks" in pattern.caption
 
 
+def test_without_statics_and_mean_cycle_there_is_no_picture() -> None:
+    spec, time = load_stage("fzg_c/stage_relief"), np.arange(100) * 1e-4
+    trace = steady(np.ones(100), time, **{"mesh.te": np.zeros(100), "wheel.gear.phi": np.zeros(100)})
+    assert transmission_error(trace, window_of_interest(trace), spec, ["mesh"], {}) is None
+
+
 def test_a_short_run_is_called_short() -> None:
     """Faults: a steady run of three mesh periods, and one that ends before it has settled, were called not steady."""
     settled = Window(0.1, 0.2, SETTLED)

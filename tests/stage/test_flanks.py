@@ -218,7 +218,7 @@ def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle
     spec = load_stage("fzg_c/stage_relief")
     turn = Turn.of(spec, bodies, 64, 302.0, 20e-6)
     found, true = orders(turn.eccentric), orders(turn.true)
-    page = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "theory" / "02-line-contact.md").read_text(encoding="utf-8")
     said = re.search(r"side bands of (\d+) and (\d+) nm beside mesh order 1, (\d+) and (\d+) nm beside order 2", page)
     assert said is not None and found[16] == pytest.approx(true[16], rel=1e-3)
     for order, nm in zip((15, 17, 31, 33), said.groups(), strict=True):

@@ -6,7 +6,7 @@ With R the rigid motions of the bodies (mass M_r), N their modes, C their residu
 
     κ = (K_s⁻¹ + C_ss)⁻¹,  M = diag(M_r, I),  K = diag(0, ω²) + [R N]_sᵀ κ [R N]_s,  K Φ = M Φ Ω²
 
-(docs/theory.md eqs. 2a, 2b). Not among the unknowns is the common rotation of a rotor's bodies about their axis, the
+(docs/theory.md eq. 2d). Not among the unknowns is the common rotation of a rotor's bodies about their axis, the
 spin: the oscillators are orthogonal to it in the mass metric.
 
 Signs. Loads: F_f, outward normal force on a flank (a contact presses with λ = −F_f), T, moment on a port's node.

@@ -1,7 +1,7 @@
 """Motion of a housing after a run: the housing on its feet alone, driven by the forces that its bearings recorded.
 
 The forces of shafts on seats (`bearing.NAME.fx_mean` …, their dashpots' share included) are all that moves a housing
-but its feet. Its oscillators on the feet, theory eqs. 2a and 2b with this one body, follow them exactly as constant
+but its feet. Its oscillators on the feet, theory eq. 2d with this one body, follow them exactly as constant
 over every communication step:
 
     q̈ + (2ζΩ + Eᵀ c E) q̇ + Ω² q = P f,      ẋ = Φ q̇

@@ -107,11 +107,13 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     gk_glide_freely(setup, data, work, k->h, e);
     find_coefficients(model, setup, data, k->h, e, engaged);
     gk_glide_moves(setup, k, work, e);
+    const gk_mesh *mesh = &setup->mesh[e];
+    const int follows = glide->rolls && (mesh->rides || mesh->coupled); /* a spur pair alone gains nothing by it */
     for (int i = 0; i < s->contacts; i++) {
         const double yields = gk_friction_local_yield(s, i);
         glide->yields[i * s->stride + i] += yields;
         glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
-        glide->by_end[i] = glide->rolls && setup->mesh[e].rides ? weight_of_end(glide, s, i) : 1.0;
+        glide->by_end[i] = follows ? weight_of_end(glide, s, i) : 1.0;
     }
     glide->held0 = gk_friction_held0(glide, s);
 }

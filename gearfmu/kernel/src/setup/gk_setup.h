@@ -106,22 +106,21 @@ typedef struct gk_side {
     double *ground;          /* (nodes + 1, points, width of the gear): what ground oscillators displace outward, beside
                                rigid motion, at the nominal place of contact */
     gk_real
-        *residual; /* (nodes + 1, points, 2, columns): C of what is not dynamic at the node, and mixed with the next, so
-                          that all of C is a parabola between nodes at every level; points: strips of the candidates */
-    double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
-    int port_of;   /* the port that the gear feels, −1: none */
-    double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
-    double *far;   /* (nodes + 1, points, FAR): patterns of far teeth */
+        *residual;  /* (nodes + 1, points, 2, columns): C of what is not dynamic, at the node and mixed with the next:
+                          all of C is a parabola between nodes at every level; points: strips of the candidates */
+    double *path;   /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
+    int port_of;    /* the port that the gear feels, −1: none */
+    double *port;   /* (nodes + 1, candidates, strips): residual between flank and bore angle */
+    double *far;    /* (nodes + 1, points, FAR): patterns of far teeth */
     double *shares; /* (nodes + 1, points, patterns − FIRST_PATTERN): `ground` by patterns */
     gk_along along;
     gk_span held;    /* the supports that this side loads */
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
 } gk_side;
 
-typedef struct gk_line {    /* of contact of a tooth pair, z (m) in the engagement's width */
-    double end[2], edge[2]; /* its ends; tip edges */
-    double moves[2];        /* 1: an end moves along the path of contact, with the faces; 0: it stays, at a tip edge */
-    double missing;         /* of the least length, 0 … 1: the pair has left its flanks, or is about to reach them */
+typedef struct gk_line {              /* of contact of a tooth pair, z (m) in the engagement's width */
+    double end[2], edge[2], moves[2]; /* its ends; tip edges; ends that move with a face: 1, at a tip edge: 0 */
+    double missing; /* of the least length, 0 … 1: the pair has left its flanks, or is about to reach them */
 } gk_line;
 
 typedef struct gk_part { /* of a line of contact, or a slice of the width; z (m) */
@@ -282,7 +281,6 @@ struct gk_setup {
 };
 
 #define GK_SETUP_MAGIC 0x32505445534b47ULL
-
 typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 
 /* For GK_ASSERT: the number of an engagement that has been planned; a span of whole quads */
