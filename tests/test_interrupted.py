@@ -84,7 +84,7 @@ def test_two_processes_may_reduce_one_stage(tmp_path: Path) -> None:
     told = [work.communicate(timeout=300) for work in both]
     assert [work.returncode for work in both] == [0, 0], told
     assert {path.name for path in (tmp_path / "tiny").iterdir()} == {"stage.toml", "pinion.h5", "wheel.h5"}
-    assert load_body(tmp_path / "tiny" / "wheel.h5").teeth == 19
+    assert load_body(tmp_path / "tiny" / "wheel.h5").toothed.teeth == 19
 
 
 def _no_room() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg as sl
 import scipy.sparse as sp
 from blocks import STEEL, box
 from small_body import averaging
@@ -100,6 +101,13 @@ def test_mass_and_inertia_are_those_of_a_hollow_box(body: Body) -> None:
     assert np.abs(body.centre_of_mass).max() < 1e-12
     about = [m / 12 * ((size**2).sum() - size**2) for m, size in solids]
     assert np.diag(body.inertia) == pytest.approx(about[0] - about[1], rel=1e-9)
+
+
+def test_its_lowest_frequencies_are_those_of_its_finite_elements(body: Body) -> None:
+    """In Hz, by a dense eigenvalue problem of the free box; six rigid motions come first."""
+    order, _ = full()
+    values = sl.eigh(order.stiffness.toarray(), order.mass.toarray(), eigvals_only=True, subset_by_index=[0, 15])
+    assert body.frequency[:10] == pytest.approx(np.sqrt(values[6:]) / (2 * np.pi), rel=1e-4)
 
 
 def test_it_comes_back_from_its_file(body: Body, tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ def test_a_line_that_ends_inside_the_width_has_no_peak_at_its_end() -> None:
 
 def test_more_width_functions_than_the_kernel_takes_are_refused() -> None:
     stage = load_stage("helical_demo")
-    bodies = [SimpleNamespace(width_functions=count) for count in (9, 8)]
+    bodies = [SimpleNamespace(toothed=SimpleNamespace(width_functions=count)) for count in (9, 8)]
     with pytest.raises(ModelError, match="with 8 width functions: this stage takes at most 6: set width_functions = 6"):
         width_degrees(stage, bodies)
     assert width_degrees(load_stage("fzg_c"), bodies).tolist() == [0, 2, 4, 6]
