@@ -12,7 +12,7 @@ enum {
     MAX_ENGAGEMENTS = GK_HIGH_ENGAGEMENTS,
     MAX_PORTS = GK_HIGH_PORTS,
     MAX_SUPPORTS = GK_HIGH_SUPPORTS, /* directions */
-    MAX_SENSORS = 255, /* directions in which points of the housing are felt */
+    MAX_SENSORS = 255,               /* directions in which points of the housing are felt */
     MAX_SLICES = GK_HIGH_SLICES,
     MAX_FUNCTIONS = 8,
     LEADS = 33,       /* places across the face width where a lead is given */
