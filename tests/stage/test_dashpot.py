@@ -3,10 +3,9 @@ and `same_loss` says with which constant the mesh loses the same."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from few_modes import with_modes
 
 from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
@@ -37,14 +36,7 @@ def halved(body: Body) -> Body:
     middle = body.frequency.size // 2
     gaps = np.diff(np.log(body.frequency[middle - 8 : middle + 8]))
     n = middle - 8 + int(gaps.argmax()) + 1
-    flank = replace(
-        body.flank,
-        **{name: getattr(body.flank, name)[:n] for name in ("diameter", "part", "parity")},
-        rows=body.flank.rows[..., :n].copy(),
-        tangent=None,
-    )
-    own = {name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio")}
-    return replace(body, **own, rows=body.rows[:, :n].copy(), flank=flank, spin=None, picture=None)
+    return with_modes(body, n)
 
 
 def alternating(spec: Stage, bodies: list[Body]) -> np.ndarray:
