@@ -74,8 +74,8 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         }
     }
     data->energy.dissipated += taken - (held - s->held0);
-    if (work->another) data->energy.baseline += s->stored0 + s->held0;
-    return gk_solve_stored(s) + held;
+    if (work->another) data->energy.baseline += s->stored0 + s->held0 - s->shift0;
+    return gk_solve_stored(s) + held - s->shift;
 }
 
 /* Books what friction took in an engagement; returns what it holds. */

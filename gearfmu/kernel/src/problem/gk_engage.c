@@ -127,6 +127,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
     else
         gk_solve_begin_dashpots(s);
     s->energy_error = GK_OF(data, meshing)[e].energy_error;
+    s->shift = s->shift0 = GK_OF(data, meshing)[e].shift;
     s->energy_correction = gk_clamp(s->energy_error, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
@@ -159,6 +160,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
                                                        s->damper[i], s->end[i]};
     meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
     meshing->energy_error = s->energy_error;
+    meshing->shift = s->shift;
 }
 
 /* an engagement without rows */

@@ -190,6 +190,7 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     list_rows(model, setup, data, k->h, work, e);
+    s->lead = gk_min(1.0, 4.0 * k->gamma - 1.0) / 24.0;
     const size_t size = (size_t)(s->stride * s->stride + 4); /* a quad may write beyond the last row */
     const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma &&
                        !setup->mesh[e].joined;

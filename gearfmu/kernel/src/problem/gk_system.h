@@ -74,6 +74,8 @@ typedef struct gk_system {
     double held0;              /* energy that the dampers' force holds in Q at the start */
     double energy_error;       /* defect of energy that the steps before left */
     double energy_correction;  /* what of it this step should make good */
+    double shift0, shift;      /* account of the invariant's jumps (12c), at the start and at the end */
+    double lead;               /* of states over h²: 1/24 at γ = 1 */
     double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
     double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
     int coupled, factored;     /* it has neighbours; the tangent's factors are those of its status */
@@ -178,6 +180,7 @@ GK_HOT void gk_solve_status(gk_system *s);
 GK_HOT void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
 GK_HOT void gk_solve_path(const gk_system *s, const double *x, double *y);
 GK_HOT double gk_solve_stored(const gk_system *s);
+GK_HOT double gk_solve_jump(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the
  * distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i)
