@@ -51,7 +51,7 @@ def test_whichever_ports_decide_the_third_shaft_follows_by_willis(ports: tuple[s
     model = differential(ports)
     for place in PLACES:
         astray, sun, ring, carrier = at_rest(model, *place)
-        assert astray == pytest.approx(PLAY, rel=0.1)  # the rest is what teeth and shafts yield
+        assert astray == pytest.approx(PLAY, rel=0.1)  # the rest is the yield of teeth and shafts
         assert sun < -1.0
         assert ring == pytest.approx(RATIO * sun, rel=1e-2)
         assert carrier == pytest.approx(-(1 + RATIO) * sun, rel=1e-2)
