@@ -1,4 +1,4 @@
-"""Hashes of bodies as gearfmu 0.2 wrote them, by which their files are known again and adopted.
+"""Hashes of bodies as gearfmu 0.2 and 0.3 wrote them, by which their files are known again and adopted.
 
 They name the fields of a pair, a set and a general stage one by one. Bodies of today: `gearfmu.spec.forms.body`."""
 
@@ -18,7 +18,7 @@ ALGORITHM = 2
 
 
 def former_hash(stage: Stage, name: str) -> str:
-    """Hash that gearfmu 0.2 gave the body whose file is `name`; "" of a housing, which it did not know. SpecError for
+    """Hash that gearfmu 0.2 and 0.3 gave the body whose file is `name`; "" of a housing, which they did not know. SpecError for
     an imported file that is not there."""
     table = stage.by_file[name]
     if isinstance(table, HousingBody):
