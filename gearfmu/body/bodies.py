@@ -22,7 +22,8 @@ from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
 from gearfmu.spec.forms.body import ALGORITHMS, expected_hash
 from gearfmu.spec.forms.former import former_hash
-from gearfmu.spec.forms.general import CarrierBody, Reduced, Stage, ToothedBody
+from gearfmu.spec.forms.general import Reduced, Stage, ToothedBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.tables.housing import HousingBody
 
@@ -62,9 +63,9 @@ def reduce_bodies(
     """Reduce what is missing or stale and store it: two large gears at the same time where processors and memory are
     there, the carrier last, which takes the most memory. Shafts need no file. Returns what `assemble` takes.
 
-    folder : of the .h5 files, that of the stage file when None; files of gearfmu 0.2 and 0.3 that fit are written anew in the
-    format of today. force : reduce in any case. progress : called with
-    (what is being done, share done of it). Raises MeshError and BodyError.
+    folder : of the .h5 files, that of the stage file when None; those of gearfmu 0.2 and 0.3 that fit are written anew
+    in the format of today. force : reduce in any case. progress : called with (what is being done, share done of it).
+    Raises MeshError and BodyError.
     """
     names = stage.files
     stored = {} if force else {name: _current(stage, name, folder) for name in names}
@@ -138,8 +139,8 @@ def _current(stage: Stage, name: str, folder: Folder) -> Body | None:
 
 
 def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
-    """The stored body; one that gearfmu 0.2 or 0.3 made from these numbers gets its hash of today. Raises BodyError when it is
-    missing, damaged or stale: it says whether the program or the numbers are others."""
+    """The stored body; one that gearfmu 0.2 or 0.3 made from these numbers gets its hash of today. Raises BodyError
+    when it is missing, damaged or stale: it says whether the program or the numbers are others."""
     path = body_path(stage, name, folder)
     body, wanted = load_body(path), expected_hash(stage, name)
     if body.how.hash == wanted:

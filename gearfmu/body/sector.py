@@ -6,7 +6,8 @@ from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.spec.forms.general import CarrierBody, Stage
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.tables.housing import HousingBody
 

@@ -25,7 +25,7 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import static_response
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
-from gearfmu.spec.forms.general import CarrierBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.forms.shapes import carrier_geometry
 
 Progress = Callable[[str, float], None]

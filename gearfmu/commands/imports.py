@@ -48,7 +48,8 @@ def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> di
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported.carrier import imported_carrier
-    from gearfmu.spec.forms.general import CarrierBody, GearBody, RingBody
+    from gearfmu.spec.forms.general import GearBody, RingBody
+    from gearfmu.spec.forms.planetary import CarrierBody
     from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     table = spec.by_file[name]

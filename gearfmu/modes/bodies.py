@@ -17,7 +17,8 @@ from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order, evenly_spaced, scaled_sector
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
 from gearfmu.spec.forms.expand import CARRIER
-from gearfmu.spec.forms.general import CarrierBody, RingBody, Stage, ToothedBody
+from gearfmu.spec.forms.general import RingBody, Stage, ToothedBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.tables.housing import HousingBody
 

@@ -7,7 +7,8 @@ import json
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.general import CarrierBody, Reduced, Stage
+from gearfmu.spec.forms.general import Reduced, Stage
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.flanks import TOOTHING
 from gearfmu.spec.tables.imported import import_inputs
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.forms.body import hash_of
-from gearfmu.spec.forms.general import CarrierBody, GearBody, RingBody, Stage
-from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec
+from gearfmu.spec.forms.general import GearBody, RingBody, Stage
+from gearfmu.spec.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec
 from gearfmu.spec.tables.flanks import TOOTHING
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import import_inputs
@@ -18,8 +18,8 @@ ALGORITHM = 2
 
 
 def former_hash(stage: Stage, name: str) -> str:
-    """Hash that gearfmu 0.2 and 0.3 gave the body whose file is `name`; "" of a housing, which they did not know. SpecError for
-    an imported file that is not there."""
+    """Hash that gearfmu 0.2 and 0.3 gave the body whose file is `name`; "" of a housing, which they did not know.
+    SpecError for an imported file that is not there."""
     table = stage.by_file[name]
     if isinstance(table, HousingBody):
         return ""

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.spec.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
 from gearfmu.spec.tables.bearings import Bearings, LaterFields, OperatingSpec
 from gearfmu.spec.tables.gear import (
     Backlash,
     Bearing,
     Diameter,
-    FaceWidth,
     GearSpec,
     HelixAngle,
     Length,
@@ -136,17 +135,6 @@ class ShaftBody(Spec):
     def length(self) -> float:
         """m."""
         return sum(section.length for section in self.sections)
-
-
-class CarrierBody(CarrierSpec):
-    """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
-    planetary_set, with the places of its bolts."""
-
-    name: Name = Field(description="name of the carrier")
-    kind: Literal["carrier"] = Field(description="kind of body")
-    circle: Annotated[float, Quantity("center_distance")] = Field(default=0.0, description="radius of the bolt circle")
-    seat_length: FaceWidth = Field(default=0.0, description="length of the planets' seats")
-    bolts: tuple[float, ...] = Field(default=(), description="places of the bolts, in turns from +x")
 
 
 Reduced: TypeAlias = ToothedBody | CarrierBody | HousingBody  # bodies that have a file
