@@ -73,7 +73,7 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
 static void find_jumps(const gk_work *work, gk_system *s)
 {
     for (int i = s->contacts; i < s->n; i++)
-        if (s->kind[i] == ROW_TORQUE) s->jump[i] = work->torque[s->port_of[i]] - s->force0[i];
+        if (gk_row_is_given(s, i)) s->jump[i] = work->torque[s->joint.port[i]] - s->force0[i];
 }
 
 /* Tip corners off: did a pair that carried load end with its flank? */
@@ -145,7 +145,7 @@ static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_wor
         if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
         find_jumps(work, &work->engaged[e].system);
-        gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
+        gk_memory_recall(model, setup, work, data, e);
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
         GK_LAP(work, PHASE_SYSTEM);
     }

@@ -56,7 +56,7 @@ void gk_felt_rows(const gk_setup *setup, gk_work *work, int e, int w)
         }
     }
     for (int i = s->contacts; i < s->n; i++, to += local) {
-        const int slot = gk_rows_at_bore(setup, s, i) ? setup->base.port_slot[side->gear][s->port_of[i]] : -1;
+        const int slot = gk_rows_at_bore(setup, s, i) ? setup->base.port_slot[side->gear][s->joint.port[i]] : -1;
         gk_clear((double *)to, 2 + quads);
         if (slot >= 0) ((double *)to)[slot] = 1.0;
     }

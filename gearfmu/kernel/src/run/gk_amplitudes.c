@@ -53,7 +53,7 @@ void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const 
         for (int i = s->contacts; i < s->n; i++) {
             const double moment = gk_rows_at_bore(setup, s, i) ? gk_reported(s, i) : 0.0;
             for (int k = 0; k < all->n && moment != 0.0; k++)
-                if (setup->base.slot[k] < 0) ground[k] += moment * all->port_rows[s->port_of[i] * all->n + k];
+                if (setup->base.slot[k] < 0) ground[k] += moment * all->port_rows[s->joint.port[i] * all->n + k];
         }
     }
 }

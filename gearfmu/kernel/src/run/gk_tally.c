@@ -28,11 +28,11 @@ static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h
     double side[2] = {0, 0};
     int touches = 0;
     for (int i = 0; i < s->contacts; i++) {
-        side[engaged->place[s->place_of[i]].flank] += gk_solve_mean(s, i);
+        side[engaged->place[s->flank.place_of[i]].flank] += gk_solve_mean(s, i);
         touches |= gk_solve_touches(s, i);
     }
     for (int i = s->contacts; i < s->n; i++)
-        if (s->joint_of[i] == JOINT_PORT) tally->port[s->port_of[i]] -= gk_solve_mean(s, i) * h;
+        if (s->joint.which[i] == JOINT_PORT) tally->port[s->joint.port[i]] -= gk_solve_mean(s, i) * h;
     tally->mesh[e] += (side[0] - side[1]) * h;
     tally->highest[e] = gk_max(tally->highest[e], gk_max(side[0], side[1]));
     if (touches) {
