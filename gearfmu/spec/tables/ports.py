@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from gearfmu.spec.reading.base import Count, Quantity, Spec, Whole, refuse
@@ -93,7 +94,14 @@ class PortSpec(Spec):
     )
     k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
     c: Damping | None = Field(default=None, description="damping of the port spring")
+    play: Annotated[float, Quantity("play")] = Field(
+        default=0.0, description="angle through which the port spring is free between both sides, as in a spline"
+    )
     chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    def side(self, torque: np.ndarray | float) -> np.ndarray:
+        """Angle (rad) of a port spring within its play on the side that carries `torque` (N·m), outer end ahead."""
+        return 0.5 * self.play * np.sign(torque)
 
     @property
     def no_spring(self) -> str:

@@ -102,12 +102,12 @@ class Steady(Wound):
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
-            stiffness = self.model.stage.ports[port].k
-            assert stiffness is not None, "the port is a spring"
+            spring = self.model.stage.ports[port]
+            assert spring.k is not None, "the port is a spring"
             if port == shafts.input:
-                wound = self.torque / turn / stiffness + self.winding
+                wound = self.torque / turn / spring.k + self.winding + float(spring.side(self.torque / turn))
             else:
-                wound = -(self.torque - self.lost) / turn / stiffness
+                wound = -(self.torque - self.lost) / turn / spring.k + float(spring.side(-self.torque / turn))
             values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * times) * times
             values[f"{port}.w"] = turn * (self.speed + self.rate * times)
             if self.rate:

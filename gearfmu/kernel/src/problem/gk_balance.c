@@ -102,22 +102,26 @@ static void expand(const gk_system *s, const double *p, const double *damper, ba
     b->c1 += gk_film_grows(s, p, yields, &b->c2);
 }
 
+static int opened_or_closed(const gk_system *s, int i)
+{
+    if (i < s->contacts) return (s->force0[i] > 0.0 && !gk_film_sinks(s, i)) != gk_solve_touches(s, i);
+    return gk_row_opens(s, i) && (s->force0[i] != 0.0) != (s->force[i] != 0.0);
+}
+
 static int status_changed(const gk_system *s)
 {
-    for (int i = 0; i < s->contacts; i++)
-        if ((s->force0[i] > 0.0 && !gk_film_sinks(s, i)) != gk_solve_touches(s, i)) return 1;
-    for (int i = s->contacts; i < s->n; i++)
-        if (gk_row_opens(s, i) && (s->force0[i] != 0.0) != (s->force[i] != 0.0)) return 1;
+    for (int i = 0; i < s->n; i++)
+        if (opened_or_closed(s, i)) return 1;
     return 0;
 }
 
-/* the rows that share η: the contacts that are closed at either end; bearings, shafts and ports only where that finds
- * no balance, because η on them rings their modes */
+/* the rows that share η: contacts that are closed at either end, joints that close or open; other bearings, shafts and
+ * ports only where that finds no balance, because η on them rings their modes */
 static void choose_direction(gk_system *s, int all_rows)
 {
     for (int i = 0; i < s->n; i++) {
         const int film = gk_film_sinks(s, i) && !gk_solve_touches(s, i);
-        const int may = (gk_row_opens(s, i) && !film) || (all_rows && gk_row_is_stiff(s, i) && !gk_row_opens(s, i));
+        const int may = i < s->contacts ? !film : opened_or_closed(s, i) || (all_rows && gk_row_is_stiff(s, i));
         s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
     }
 }

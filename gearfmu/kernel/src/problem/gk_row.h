@@ -50,6 +50,13 @@ GK_HOT int gk_row_joint_begin(const gk_forming *f, gk_system *s, const gk_row_bl
 GK_HOT double gk_row_joint_twist(const gk_setup *setup, const gk_system *s, int i);
 GK_HOT int gk_row_joint_begin_given(const gk_forming *f, gk_system *s, const gk_row_block *b);
 GK_HOT void gk_row_joint_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, const gk_row_block *b);
+/* gk_row_play.c */
+GK_HOT void gk_row_play_recall(const gk_forming *f, gk_system *s, int i);
+GK_HOT int gk_row_play_begin(const gk_forming *f, gk_system *s, const gk_row_block *b);
+GK_HOT void gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
+GK_HOT void gk_row_play_flip(gk_system *s, int i);
+GK_HOT double gk_row_play_twist(const gk_setup *setup, const gk_system *s, int i);
+GK_HOT void gk_row_play_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, const gk_row_block *b);
 /* gk_row_clutch.c */
 GK_HOT void gk_row_clutch_recall(const gk_forming *f, gk_system *s, int i);
 GK_HOT void gk_row_clutch_read(const gk_forming *f, double h, gk_system *s, const gk_row_block *b);
@@ -64,6 +71,8 @@ static inline const gk_row_verbs *gk_verbs_of(gk_row_kind kind)
         [ROW_CONTACT] = {NULL, gk_row_contact_read, gk_row_contact_begin, gk_row_contact_contradict,
                          gk_row_contact_flip, NULL, gk_row_contact_keep},
         [ROW_SPRING] = {NULL, gk_row_joint_read, gk_row_joint_begin, NULL, NULL, gk_row_joint_twist, gk_row_joint_keep},
+        [ROW_PLAY] = {gk_row_play_recall, gk_row_joint_read, gk_row_play_begin, gk_row_play_contradict,
+                      gk_row_play_flip, gk_row_play_twist, gk_row_play_keep},
         [ROW_TORQUE] = {NULL, gk_row_joint_read, gk_row_joint_begin_given, NULL, NULL, NULL, gk_row_joint_keep},
         [ROW_CLUTCH] = {gk_row_clutch_recall, gk_row_clutch_read, gk_row_clutch_begin, gk_row_clutch_contradict,
                         gk_row_clutch_flip, NULL, gk_row_clutch_keep},

@@ -1,17 +1,19 @@
 /* Rows of joints: port, shaft and clutch of the ports that an engagement has. Here springs and given torques. */
 #include "problem/gk_row.h"
 
-static gk_row_kind kind_of(const gk_setup *setup, int port, int which)
+static gk_row_kind kind_of(const gk_forming *f, int port, int which)
 {
     if (which == JOINT_CLUTCH) return ROW_CLUTCH;
-    return which == JOINT_PORT && setup->given_torque[port] ? ROW_TORQUE : ROW_SPRING;
+    if (which == JOINT_PORT && f->setup->given_torque[port]) return ROW_TORQUE;
+    const int held = !(f->setup->joint[port][which].compliance > 0.0);
+    return which == JOINT_PORT && f->model->port[port].play > 0.0 && !held ? ROW_PLAY : ROW_SPRING;
 }
 
 static void list_one(const gk_forming *f, double h, gk_system *s, int port, int which)
 {
     const gk_joint_state *state = &GK_OF(f->data, joint)[port][which];
     const int i = s->n++;
-    s->kind[i] = kind_of(f->setup, port, which);
+    s->kind[i] = kind_of(f, port, which);
     s->joint.port[i] = port, s->joint.which[i] = which;
     s->weight[i] = 1.0;
     s->force0[i] = state->force;

@@ -19,8 +19,8 @@ enum {
     MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4,
     MAX_LOCAL = 7 /* spins that an engagement's rows read */
 };
-/* λ ≥ 0; any λ; given torque; velocity-level friction. Their verbs: gk_row.h */
-typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
+/* λ ≥ 0; any λ; λ on either side of a play; given torque; velocity-level friction. Their verbs: gk_row.h */
+typedef enum { ROW_CONTACT, ROW_SPRING, ROW_PLAY, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 typedef struct gk_row_block { /* rows of one kind, from … end − 1 */
     gk_row_kind kind;
     int from, end;
@@ -155,7 +155,10 @@ static inline int gk_row_yields(const gk_system *s, int i) { return s->kind[i] !
 static inline int gk_row_is_given(const gk_system *s, int i) { return s->kind[i] == ROW_TORQUE; }
 /* does a gap that changes change its force? can it open? */
 static inline int gk_row_is_stiff(const gk_system *s, int i) { return gk_row_yields(s, i) && !gk_row_is_given(s, i); }
-static inline int gk_row_opens(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
+static inline int gk_row_opens(const gk_system *s, int i)
+{
+    return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_PLAY;
+}
 /* is its gap relative to the outer end of a port? */
 static inline int gk_row_has_outer_end(const gk_system *s, int i)
 {

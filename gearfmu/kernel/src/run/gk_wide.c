@@ -43,6 +43,7 @@
 #include "problem/gk_row_contact.c"
 #include "problem/gk_row_joint.c"
 #include "problem/gk_row_clutch.c"
+#include "problem/gk_row_play.c"
 #include "problem/gk_form.c"
 #include "problem/gk_film.c"
 #include "problem/gk_tangent.c"

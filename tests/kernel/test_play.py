@@ -1,0 +1,60 @@
+"""A port spring with play (kind of rows gk_row_play.c): exact motion of a body that bounces between its sides, torque at
+rest, energy, and no play as the limit of a small one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
+from gearfmu.kernel import Kernel
+from gearfmu.stage.build.blob import read_blob, write_blob
+
+DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
+MASS, K, PLAY, SPEED = 2.0, 8e6, 4e-4, 0.5  # kg, N/m, m, m/s: a flat stage's spins are translations
+PERIOD = 2 * PLAY / SPEED + 2 * math.pi * math.sqrt(MASS / K)  # there and back: two flights, two half periods
+
+
+def plate(play: float, h: float, c: float = 0.0, **parameters: float) -> Kernel:
+    """A rigid body on a spring with play, another that it never meets."""
+    none = np.zeros(0)
+    body = FlatBody(MASS, none, none, np.zeros((1, 0)), np.array([[0.0]]))
+    sections = dict(read_blob(flat_blob("plates", [body, body], FlatContact(gap=1.0))))
+    sections["port_kinds"] = np.array([[0, 0, 0], [1, 1, 0]], np.int32)
+    sections["ports"] = np.array([[K, c, 1.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 1.0, 0.0]])
+    if play:
+        sections["port_play"] = np.array([play, 0.0])
+    return Kernel(write_blob(sections), {"h": h, "level": 3.0, **parameters})
+
+
+def bounced(h: float, end: float, c: float = 0.0, play: float = PLAY, **parameters: float) -> np.ndarray:
+    """Place (m) and speed (m/s) of the body after every step, (n, 2): thrown from the middle, its outer end held."""
+    kernel = plate(play, h, c, **parameters)
+    kernel.set("left.w", SPEED)
+    kernel.initialize()
+    kernel.set("left.w", 0.0)
+    found = []
+    for i in range(round(end / h)):
+        kernel.step(i * h, h)
+        found.append((kernel.get("left.gear.phi"), kernel.get("left.gear.w")))
+    return np.array(found)
+
+
+def exact(time: np.ndarray) -> np.ndarray:
+    """Place (m) of the body at `time`, by flights and half sines."""
+    flight, half = PLAY / SPEED, math.pi * math.sqrt(MASS / K)
+    phase = (np.asarray(time) + 0.5 * flight) % (2 * (flight + half))
+    way, sign = phase % (flight + half), np.where(phase < flight + half, 1.0, -1.0)
+    deep = SPEED * half / math.pi * np.sin(math.pi * np.clip(way - flight, 0.0, half) / half)
+    return sign * (np.minimum(SPEED * way, PLAY) - 0.5 * PLAY + deep)
+
+
+@pytest.mark.parametrize("integrator", [DG4, EM, RK45])
+def test_a_body_bounces_between_the_sides_as_flights_and_half_sines(integrator: float) -> None:
+    h, end = 5e-6, 3 * PERIOD
+    found = bounced(h, end, integrator=integrator)
+    time = h * np.arange(1, len(found) + 1)
+    assert np.abs(found[:, 0] - exact(time)).max() < 5e-3 * PLAY
+    assert np.abs(found[:, 1]).max() == pytest.approx(SPEED, rel=1e-3)
