@@ -1,5 +1,5 @@
-"""A port spring with play (kind of rows gk_row_play.c): exact motion of a body that bounces between its sides, torque at
-rest, energy, and no play as the limit of a small one."""
+"""A port spring with play (gk_row_play.c): exact motion of a body that bounces between its sides, order of the step,
+energy, and a loaded side, which is a spring without play."""
 
 from __future__ import annotations
 

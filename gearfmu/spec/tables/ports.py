@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias, cast
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from gearfmu.spec.reading.base import Count, Quantity, Spec, Whole, refuse
@@ -99,9 +98,10 @@ class PortSpec(Spec):
     )
     chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
 
-    def side(self, torque: np.ndarray | float) -> np.ndarray:
-        """Angle (rad) of a port spring within its play on the side that carries `torque` (N·m), outer end ahead."""
-        return 0.5 * self.play * np.sign(torque)
+    @property
+    def side(self) -> float:
+        """Angle (rad) from the middle of the play of the port spring to either side; 0 where there is no spring."""
+        return 0.5 * self.play if self.kind == "spring" else 0.0
 
     @property
     def no_spring(self) -> str:

@@ -81,11 +81,11 @@ class Profiled(Wound):
         taken, yielding, _ = self.winding.at(torque)
         lost = self._rubbed * np.sign(torque)
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
-            spring = self.model.stage.ports[port]
-            assert spring.k is not None, "the port is a spring"
+            stiffness = self.model.stage.ports[port].k
+            assert stiffness is not None, "the port is a spring"
             driven = port == shafts.input
-            wound = (1.0 if driven else -(1.0 - lost)) / turn / spring.k
-            values[f"{port}.phi"] = wound * torque + spring.side(wound * torque) + (taken if driven else 0.0) + turn * angle
+            wound = (1.0 if driven else -(1.0 - lost)) / turn / stiffness
+            values[f"{port}.phi"] = wound * torque + (taken if driven else 0.0) + turn * angle
             values[f"{port}.w"] = wound * growing + (yielding * growing if driven else 0.0) + turn * speed
             values[f"{port}.a"] = turn * rate
         return values

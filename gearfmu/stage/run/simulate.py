@@ -62,12 +62,18 @@ class Steady(Wound):
 
     @cached_property
     def winding(self) -> float:
-        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh. Its
-        meshes carry the mean of what goes in and what comes out."""
+        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh, and
+        the plays of its port springs. Its meshes carry the mean of what goes in and what comes out."""
         known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
         ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
         taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)
-        return taken - 0.5 * slope * self.lost
+        return taken - 0.5 * slope * self.lost + self._play
+
+    @property
+    def _play(self) -> float:
+        shafts, ports = self.model.shafts, self.model.stage.ports
+        sides = (ports[shafts.input].side, abs(float(shafts.ratio)) * ports[shafts.output].side)
+        return float(sum(sides) * np.sign(self.torque))
 
     @property
     def lost(self) -> float:
@@ -102,12 +108,12 @@ class Steady(Wound):
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}
         for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
-            spring = self.model.stage.ports[port]
-            assert spring.k is not None, "the port is a spring"
+            stiffness = self.model.stage.ports[port].k
+            assert stiffness is not None, "the port is a spring"
             if port == shafts.input:
-                wound = self.torque / turn / spring.k + self.winding + float(spring.side(self.torque / turn))
+                wound = self.torque / turn / stiffness + self.winding
             else:
-                wound = -(self.torque - self.lost) / turn / spring.k + float(spring.side(-self.torque / turn))
+                wound = -(self.torque - self.lost) / turn / stiffness
             values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * times) * times
             values[f"{port}.w"] = turn * (self.speed + self.rate * times)
             if self.rate:

@@ -32,7 +32,7 @@ def wound_starts(model: StageModel, torque: float, speed: float = 0.0) -> dict[s
             values |= {f"{name}.tau": exerted, f"{name}.w_start": turn * speed}
         elif port.kind == "spring":
             assert port.k is not None
-            values |= {f"{name}.phi": exerted / port.k + float(port.side(exerted)), f"{name}.w": turn * speed}
+            values |= {f"{name}.phi": exerted / port.k, f"{name}.w": turn * speed}
     if ends[0].kind == "spring":
         given_way = torque * shafts.ratio / (ends[1].k or FIXED_K) if ends[1].kind == "fixed" else 0.0
         values[f"{shafts.input}.phi"] += steady.winding + shafts.ratio * given_way

@@ -122,7 +122,7 @@ static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup
 {
     if (!turns(setup, g)) return k->flow[g].bv;
     gk_frame_finish(&setup->modal[g], &k->flow[g], angle_of(model, data, k, g), work, g);
-    return work->zero;
+    return work->room.zero;
 }
 
 /* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of

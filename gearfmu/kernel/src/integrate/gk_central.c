@@ -130,7 +130,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
         const gk_real *a = gk_modal_seen(setup, data, g) + 2 * n;
         for (int i = 0; i < n; i++) sum += (double)a[i] * a[i];
     }
-    return gk_energy_invariant(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
+    return gk_energy_invariant(model, setup, data, &work->room.explicit_rows) - 0.125 * h * h * sum;
 }
 
 /* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the

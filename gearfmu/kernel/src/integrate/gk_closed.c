@@ -123,8 +123,8 @@ static int form(const gk_model *model, const gk_setup *setup, gk_work *work, con
                 const gk_coefficients *k, int e)
 {
     const gk_search near = {.k = k, .reach = NEAR, .anew = 1};
-    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
-    work->ground_y = work->ground_zero;
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->room.zero;
+    work->ground_y = work->room.ground_zero;
     return gk_engage(model, setup, work, data, &near, e);
 }
 
@@ -156,7 +156,7 @@ int gk_closed_place(const gk_model *model, const gk_setup *setup, gk_work *work,
     GK_ASSERT(gk_is_mesh(setup, e) && gk_is_engagement(model, e));
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     roll(model, work, e, position);
-    return form(model, setup, work, data, &work->explicit_rows, e);
+    return form(model, setup, work, data, &work->room.explicit_rows, e);
 }
 
 /* ---- an island at a position ------------------------------------------------------------------------------------- */
@@ -172,7 +172,7 @@ static int within(const island *of, int e) { return of->setup->mesh[e].island ==
 
 static double *kept_at(const gk_work *work, int e, int position)
 {
-    return work->columns + (size_t)(e * LIMIT_POSITIONS + position) * MAX_STRIDE * MAX_STRIDE;
+    return work->room.columns + (size_t)(e * LIMIT_POSITIONS + position) * MAX_STRIDE * MAX_STRIDE;
 }
 
 /* forms all problems of the island, with rows along the profile where there is friction */
@@ -206,7 +206,7 @@ void gk_closed_keep(const gk_model *model, const gk_setup *setup, gk_work *work,
     GK_ASSERT(model && setup && work && data);
     island of = {.model = model, .setup = setup, .work = work, .data = data, .number = -1, .first = -1};
     while (next_place(&of)) {
-        if (!form_island(&of, &work->explicit_rows)) continue;
+        if (!form_island(&of, &work->room.explicit_rows)) continue;
         for (int e = 0; e < model->engagements; e++) {
             const gk_system *s = &work->engaged[e].system;
             if (within(&of, e)) memcpy(kept_at(work, e, of.position), s->A, (size_t)(s->n * s->stride) * sizeof *s->A);
@@ -292,7 +292,7 @@ static int holds_at(island *of, const gk_coefficients *k, double mu)
     memset(coupling, 0, size * sizeof *coupling);
     if (of->rows > of->work->engaged[of->first].system.n) {
         add_coupling(of, k, 1.0, coupling);
-        add_coupling(of, &of->work->explicit_rows, mu - 1.0, coupling);
+        add_coupling(of, &of->work->room.explicit_rows, mu - 1.0, coupling);
     }
     for (motion slides = rubs ? FORWARDS : FRICTIONLESS; slides <= (rubs ? STICKING : FRICTIONLESS); slides++) {
         memcpy(L, coupling, size * sizeof *L);

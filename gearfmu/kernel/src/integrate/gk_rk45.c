@@ -59,7 +59,7 @@ static void add_dashpots(const gk_setup *setup, const gk_mesh *mesh, gk_system *
 /* problem of an engagement at the trial state; 0 when the poses mean nothing */
 static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
-    const gk_search how = {.k = &work->explicit_rows, .reach = 50e-6};
+    const gk_search how = {.k = &work->room.explicit_rows, .reach = 50e-6};
     gk_system *s = &work->engaged[e].system;
     if (!gk_engage(model, setup, work, data, &how, e)) return 0;
     for (int r = 0; r < s->contacts; r++) s->dashpot.coefficient[r] = 0.0;
@@ -79,7 +79,7 @@ static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work
         gk_film_begin_rates(setup, work, e, rate);
     }
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, &work->explicit_rows, i, 0, 0, GK_FIRST_RATE, 0, 0};
+        gk_coupled coupled = {model, setup, work, &work->room.explicit_rows, i, 0, 0, GK_FIRST_RATE, 0, 0};
         const gk_island island = gk_couple_island(&coupled);
         gk_balance_plain(&island);
     }

@@ -36,7 +36,7 @@ static int press(gk_equilibrium *r)
         work->spin[d] = GK_OF(r->data, x)[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
         work->speed[d] = 2.0 * work->spin[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
-    for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->zero;
+    for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->room.zero;
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (gk_equilibrium_has(r, e)) { /* given torques move the pose, not the place */
@@ -174,7 +174,7 @@ static int search(gk_equilibrium *r)
 /* κ = −1/ω² puts the dynamic modes of the gear groups into C′ too */
 static void set_compliance(gk_equilibrium *r)
 {
-    r->k = r->work->explicit_rows;
+    r->k = r->work->room.explicit_rows;
     r->k.timeless = 0;
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &r->setup.modal[g];

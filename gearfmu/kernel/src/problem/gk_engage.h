@@ -5,6 +5,7 @@
 #include "gk.h"
 #include "problem/gk_system.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 typedef struct gk_search {    /* how contacts are looked for */

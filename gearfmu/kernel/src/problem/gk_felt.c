@@ -69,7 +69,7 @@ typedef struct between { /* from the patterns of one gear to those of another */
 
 static between between_of(const gk_setup *setup, const gk_work *work, int to, int from)
 {
-    return (between){work->between[to][from], setup->base.patterns[from], setup->base.patterns[to]};
+    return (between){work->room.between[to][from], setup->base.patterns[from], setup->base.patterns[to]};
 }
 
 static void add_between(between b, const gk_real *x, int kind, gk_real *y)

@@ -119,7 +119,7 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     const gk_forming f = {model, setup, data, work, e};
     list_rows(&f, k->h, s);
     const size_t size = (size_t)(s->stride * s->stride + 4); /* a quad may write beyond the last row */
-    const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma &&
+    const int tables = work->room.table_h > 0.0 && k->h == work->room.table_h && k->gamma == work->room.table_gamma &&
                        !setup->mesh[e].joined;
     s->D = engaged->matrix;
     s->A = s->D + size;

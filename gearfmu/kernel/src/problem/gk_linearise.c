@@ -66,9 +66,9 @@ static int form_all(const gk_model *model, const gk_setup *setup, gk_work *work,
 {
     memcpy(work->spin, GK_OF(data, x), (size_t)setup->spins * sizeof *work->spin);
     memset(work->speed, 0, sizeof work->speed);
-    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
-    work->ground_y = work->ground_zero;
-    const gk_search how = {.k = &work->explicit_rows, .ground = gk_ground_seen(data)};
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->room.zero;
+    work->ground_y = work->room.ground_zero;
+    const gk_search how = {.k = &work->room.explicit_rows, .ground = gk_ground_seen(data)};
     for (int e = 0; e < model->engagements; e++) {
         gk_system *s = &work->engaged[e].system;
         if (!gk_engage(model, setup, work, data, &how, e)) return 0;

@@ -325,7 +325,7 @@ static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, 
         for (int w = 0; w < 2; w++) press_nodes(p, w);
         for (int w = 0; w < 2; w++) {
             gk_real *sum[2] = {work->force[p->e->gear[w]], work->next[p->e->gear[w]]};
-            gk_field_end(p->tooth[w].field, work->zero, sum, work->ground_force);
+            gk_field_end(p->tooth[w].field, work->room.zero, sum, work->ground_force);
         }
         if (p->mesh->runs_out) gk_runout_turn(p->turn, p->push);
         press_pose(setup, work, p->mesh, p->push, spin_rate);

@@ -1,4 +1,4 @@
-/* Rows of contacts: strips of all tooth pairs, λ ≥ 0. Their law is in force/gk_law.c, their damper's limits are in
+/* Rows of contacts: strips of all tooth pairs, λ ≥ 0. Their law is in problem/gk_law.c, their damper's limits are in
  * gk_solve.c. */
 #include "problem/gk_row.h"
 #include "problem/gk_rows.h"

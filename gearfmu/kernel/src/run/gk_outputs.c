@@ -198,11 +198,11 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
     if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
         data->energy.quasi_static = stored(model, work);
         v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
-                                                   : gk_energy_invariant(model, setup, data, &work->explicit_rows);
+                                                   : gk_energy_invariant(model, setup, data, &work->room.explicit_rows);
         return gk_finite(v[V_ENERGY]);
     }
     const double energy = gk_energy_invariant(model, setup, data,
-                                              gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
+                                              gk_flow_for(model, setup, &work->room, data->state_h, data->state_gamma));
     if (first) data->energy.baseline = energy - data->energy.work + data->energy.dissipated;
     v[V_ENERGY] = energy;
     v[V_RESIDUAL] = energy - data->energy.baseline - data->energy.work + data->energy.dissipated;

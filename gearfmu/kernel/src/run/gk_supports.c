@@ -9,7 +9,7 @@ void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_dat
     GK_ASSERT(moved && speed && moved != speed);
     const int n = setup->base.n;
     const gk_quad *x = (const gk_quad *)gk_ground_seen(data), *v = x + n / 4, *f = v + n / 4;
-    const gk_ground_flow *flow = &gk_flow_known(work, data->state_h, data->state_gamma)->ground;
+    const gk_ground_flow *flow = &gk_flow_known(&work->room, data->state_h, data->state_gamma)->ground;
     const gk_quad *kappa = (const gk_quad *)flow->kappa, *unit = (const gk_quad *)flow->unit,
                   *lead = (const gk_quad *)flow->lead, *hold = (const gk_quad *)flow->hold, *rate = f + n / 4;
     for (int q = 0; q < n / 4; q++) {

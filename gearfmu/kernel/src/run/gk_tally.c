@@ -11,7 +11,8 @@ void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work,
     memset(tally, 0, sizeof *tally);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = work->tally + i * n;
     memset(tally->moved, 0, 2 * n * sizeof *tally->moved);
-    if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
+    if (data->state_h > 0.0)
+        gk_flow_for(model, setup, &work->room, data->state_h, data->state_gamma); /* a restored state */
     gk_supports_motion(setup, work, data, tally->last_moved, tally->last_speed);
     setup->supports(model, setup, tally->last_moved, tally->last_speed, tally->last);
     gk_sensors_speed(model, setup, tally->last_speed, tally->sensed);

@@ -22,7 +22,7 @@
 #pragma GCC target("avx2")
 #endif
 #define GK_WIDE
-#include "force/gk_law.c"
+#include "problem/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_section.c"
 #include "force/gk_parts.c"
