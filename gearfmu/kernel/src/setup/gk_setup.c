@@ -362,7 +362,7 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_room 
 
 void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_room *room, const gk_data *data, const int32_t *which)
 {
-    GK_ASSERT(model && setup && work && data && which);
+    GK_ASSERT(model && setup && room && data && which);
     int coasts[MAX_ENGAGEMENTS];
     for (int g = 0; g < model->gears; g++) {
         fill_modal(&model->gear[g], &setup->modal[g]);
