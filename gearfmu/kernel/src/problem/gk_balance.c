@@ -307,8 +307,7 @@ static void aim(const gk_island *island, int jumps)
     for (int m = 0; m < island->count; m++) {
         gk_system *s = island->member[m];
         const double most = MOST * gk_solve_stored(s);
-        s->energy.shift =
-            jumps ? gk_clamp(s->energy.shift0 + gk_solve_jump(s), -most, most) : s->energy.shift0;
+        s->energy.shift = jumps ? gk_clamp(s->energy.shift0 + gk_solve_jump(s), -most, most) : s->energy.shift0;
     }
 }
 
