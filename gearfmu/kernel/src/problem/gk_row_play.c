@@ -43,10 +43,14 @@ int gk_row_play_begin(const gk_forming *f, gk_system *s, const gk_row_block *b)
 
 static double apart(const gk_system *s, int i) { return gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i); }
 
-void gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
+int gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
 {
-    for (int i = b->from; i < b->end; i++)
+    int count = 0;
+    for (int i = b->from; i < b->end; i++) {
         wrong[i] = s->active[i] ? s->force[i] * s->joint.slip[i] > 0.0 : fabs(apart(s, i)) > s->joint.bound[i];
+        count += wrong[i];
+    }
+    return count;
 }
 
 void gk_row_play_flip(gk_system *s, int i)
