@@ -1,6 +1,6 @@
 /* Kinds of rows (problem/gk_row_*.c, one file a kind). A problem is a list of blocks: rows of one kind that follow each
- * other, the contacts first. What a kind does goes by its verbs, what it is by its traits; a new kind is a new file, its
- * line below, and where a row of it is listed. */
+ * other, the contacts first. A kind has verbs, here, and traits (gk_system.h). A new kind is a new file, its line below
+ * and its traits, and a place where such a row is listed. */
 #ifndef GK_ROW_H
 #define GK_ROW_H
 #include "base/gk_lanes.h"

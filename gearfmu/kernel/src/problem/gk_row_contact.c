@@ -38,8 +38,8 @@ void gk_row_contact_list(const gk_forming *f, double h, gk_system *s)
     gk_law_set(f->model, f->setup, mesh, s);
 }
 
-/* Undeformed gap at the predicted poses, which contain what the ground group moves the gears rigidly: that has been read
- * with the oscillators, and is taken away. */
+/* Undeformed gap at the predicted poses, which contain the rigid motion of the gears by the ground group: that has been
+ * read with the oscillators, and is taken away. */
 void gk_row_contact_read(const gk_forming *f, double h, gk_system *s, const gk_row_block *b)
 {
     GK_ASSERT(b->from == 0 && b->end == s->contacts);

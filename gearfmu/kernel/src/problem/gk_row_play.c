@@ -1,6 +1,6 @@
-/* Rows of a spring with play, as a spline has: within ±½ of it the shaft is free, on either side the spring takes what is
- * beyond. A closed side is a bilateral row whose gap counts from that side (joint.slip: ±½ play, joint.bound: ½ play);
- * λ there never pulls. The damper acts while the same side is closed at both ends of a step. */
+/* Rows of a spring with play, as a spline has: within ±½ of it the shaft is free, on either side the spring takes the
+ * rest. A closed side is a bilateral row whose gap counts from that side (joint.slip: ±½ play, joint.bound: ½ play); λ
+ * there never pulls. The damper acts while the same side is closed at both ends of a step. */
 #include "problem/gk_row.h"
 
 /* the side that is closed under a force */
