@@ -57,9 +57,8 @@ class TransferPaths:
     def _in(self, lines: np.ndarray, band: float | None) -> np.ndarray:
         bands = self.bands if band is None else midbands(band, band)
         if not np.isin(np.round(bands), np.round(self.bands)).all():
-            raise SoundError(
-                f"no third octave at {band:g} Hz: the record has {self.bands[0]:.0f} to {self.bands[-1]:.0f}"
-            )
+            known = f"{self.bands[0]:.0f} to {self.bands[-1]:.0f} Hz"
+            raise SoundError(f"no third octave at {band:g} Hz: the record has {known}")
         return np.asarray(third_octaves(self.frequency, lines.T, bands).sum(axis=-1))
 
 

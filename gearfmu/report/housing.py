@@ -97,10 +97,8 @@ def sound(run: Run) -> Plot:
     chart = Chart((panel,), "third octave in Hz", f"{NAME}_sound")
     (power, power_a), (erp, erp_a) = ((float(found.total(o)[0]), float(found.total_a(o)[0])) for o in (False, True))
     caption = f"Sound power level {power:.1f} dB, {power_a:.1f} dB(A) re 1 pW; equivalent radiated power (ERP) "
-    caption += (
-        f"{erp:.1f} dB, {erp_a:.1f} dB(A). Into free air, from {run.window.start:.3f} s on, by {patches} boundary "
-    )
-    caption += "elements."
+    caption += f"{erp:.1f} dB, {erp_a:.1f} dB(A). Into free air, from {run.window.start:.3f} s on, by {patches} "
+    caption += "boundary elements."
     return Plot(f"{NAME}_sound", "Sound power of the housing", caption, chart, columns)
 
 
@@ -140,21 +138,29 @@ def transfer_paths(run: Run) -> Plot:
     alone, joint = found.octaves()
     band = float(nominal(found.bands[[joint.sum(axis=0).argmax()]])[0])
     shares = {"all third octaves": 100 * found.share(), f"third octave {band:g} Hz": 100 * found.share(band)}
-    at, ticks = np.arange(len(found.names), dtype=float), tuple(name.removeprefix("bearing.") for name in found.names)
-    panels = tuple(
-        Panel(f"{words}: share in %", (Curve(at, own, words, "%", "bars"),), ticks=ticks)
-        for words, own in shares.items()
-    )
     caption = (
-        f"Share of every bearing direction in the mean square of {found.sensor}; shares sum to 100 %, and one below "
+        f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one below 0 "
     )
-    caption += "0 makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
+    caption += "makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
     columns = {"third_octave_[Hz]": found.bands} | {
         f"{name}_[{ACCELERATIONS.label}]": level(np.sqrt(own), ACCELERATIONS.reference)
         for name, own in zip(found.names, alone, strict=True)
     }
-    chart = Chart(panels, "direction of a bearing force", f"{NAME}_paths")
+    panels = tuple(_by_bearing(f"{words}: share in %", found.names, own) for words, own in shares.items())
+    chart = Chart(panels, "bearing", f"{NAME}_paths")
     return Plot(f"{NAME}_paths", f"Transfer paths to {found.sensor.removeprefix(SENSOR)}", caption, chart, columns)
+
+
+def _by_bearing(label: str, names: Sequence[str], shares: np.ndarray) -> Panel:
+    """Shares in % of bearing.NAME.fx …: bearings along the axis, a bar for each of their directions."""
+    parts = [name.removeprefix("bearing.").split(".") for name in names]
+    bearings, directions = (list(dict.fromkeys(part[k] for part in parts)) for k in (0, 1))
+    table = np.zeros((len(directions), len(bearings)))
+    for (bearing, direction), share in zip(parts, shares, strict=True):
+        table[directions.index(direction), bearings.index(bearing)] = share
+    at = np.arange(len(bearings), dtype=float)
+    curves = (Curve(at, row, name, "%", "bars") for name, row in zip(directions, table, strict=True))
+    return Panel(label, tuple(curves), ticks=tuple(bearings))
 
 
 def _at_hand(run: Run, what: str) -> tuple[Stage, Sequence[Body]]:
