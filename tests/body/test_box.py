@@ -162,7 +162,7 @@ def test_the_ground_group_takes_it_like_a_carrier(body: Body) -> None:
 
 
 def test_the_reduction_keeps_its_radiation_matrix_beside_it(body: Body, tmp_path: Path, monkeypatch: Any) -> None:
-    """In steps of 2⁻¹⁵ of √(Rᵢᵢ Rⱼⱼ): power of drawn velocities within .03 dB; of another body or count there is none."""
+    """In steps of 2⁻¹⁵ of √(Rᵢᵢ Rⱼⱼ): power of drawn velocities within .03 dB; none of others."""
     monkeypatch.setattr(bodies, "reduce_body", lambda *_: body)
     monkeypatch.setattr(sound, "PATCHES", 80)
     bodies.make_body(None, "box", tmp_path / "box.h5")
