@@ -240,8 +240,8 @@ class Reference:
         return self.problem.offset + self.w @ (y - self.kappa * external)
 
     def _forces(self, gap: np.ndarray, state: State) -> tuple:
-        """λ₁, η, η_d, the dashpots' force at the end and the account of jumps: complementarity, then energy where a contact changed, or
-        dissipation where none did."""
+        """λ₁, η, η_d, the dashpots' force at the end and the account of jumps: complementarity, then energy where a
+        contact changed, or dissipation where none did."""
         p, s = self.problem, self.scheme
         was = (state.force > 0) | p.bilateral
         none = np.zeros_like(gap)
@@ -342,7 +342,9 @@ class Reference:
         late_fixed = np.where((hold == 0) & (acts > 0), beta * fixed + tail, 0.0)
         return Dashpots(acts, clip, hold, part, by, fixed, late_by, late_fixed)
 
-    def _conserve(self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray) -> tuple[Solved, np.ndarray, float]:
+    def _conserve(
+        self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray
+    ) -> tuple[Solved, np.ndarray, float]:
         """The solution and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ and
         the jump of the invariant; the account of these jumps, within a tenth of the energy at the end."""
         c, d, force0 = self.c, self.d, state.force
