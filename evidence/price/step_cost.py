@@ -174,7 +174,7 @@ def main() -> None:
             chosen.commit: Side(unpacked(chosen.commit, Path(work) / "tree"), Path(work) / "before", case),
             "this tree": Side(ROOT, Path(work) / "now", case),
         }
-        times = {name: [] for name in sides}
+        times: dict[str, list[float]] = {name: [] for name in sides}
         for _ in range(chosen.rounds):
             for name, side in sides.items():
                 times[name].append(side.seconds())
