@@ -15,9 +15,8 @@ from gearfmu.cosim.scene_run import Staged
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.tables.profile import Profile, read_profile
-from gearfmu.stage import StageModel, Steady, TeResult, Trace
+from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
-from gearfmu.stage.run.set_te import SetTeResult, stage_te
 from gearfmu.stage.run.simulate import Inputs
 from gearfmu.stage.run.steady import Drive, parameters, steady_run
 
@@ -30,24 +29,24 @@ def te(
     mesh: str | None = None,
     pitches: int = 1,
     **settings: Unpack[Settings],
-) -> TeResult | SetTeResult:
+) -> TeResult:
     """Quasi-static loaded transmission error over one pitch or more, output held, torque on the input (the first port).
 
     stage : a name or path, a `load`ed stage, or an `assemble`d model.
     torques : one or several, "302 N*m" or in N·m; 0 is the unloaded stage.
     positions : over one pitch, end point left out.
-    rigid_bearings : hold the axes. mesh : of a train the engagement, the first when None. Neither is for sets.
+    rigid_bearings : hold the axes, not of sets. mesh : the engagement, None: the first of a train, all of a set.
     pitches : teeth of gear A for deviations that differ from tooth to tooth.
     settings : of the kernel (docs/variables.md): slices=10, **{"effect.hertz": False}.
 
-    Of a pair or a train a TeResult: te (T, P) m, mesh_stiffness and stage_stiffness (T, P) N/m, without and with shafts
-    and bearings, shares of the tooth pairs; of a planetary set a SetTeResult with stage_stiffness
-    and load sharing. `failed` names torques without equilibrium; SimulationError where none has one.
+    Returns te (T, P) m and stage_stiffness (T, P) N/m with shafts and bearings; of a pair or a train mesh_stiffness
+    without them and shares of the tooth pairs, of a planetary set load sharing. `failed` names torques without
+    equilibrium; SimulationError where none has one.
     """
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
-    return stage_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
+    return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, None, **known)
 
 
 def simulate(

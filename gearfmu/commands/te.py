@@ -13,7 +13,7 @@ from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_
 from gearfmu.errors import SimulationError
 
 if TYPE_CHECKING:
-    from gearfmu.stage import StageModel
+    from gearfmu.stage import StageModel, TeResult
 
 
 @click.command()
@@ -73,37 +73,43 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
     from gearfmu.commands.settings import level_of
-
-    model = model_of(stage, bores=bore)
-    where |= level_of(model, where.pop("level"))
-    if doubled is None:
-        doubled = len(model.stage.engagements) == 1
-    if model.stage.carriers:
-        return _of_set(model, list(torques), out, doubled, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
 
-    meshes, failed = [mesh.name for mesh in model.stage.engagements], False
+    model = model_of(stage, bores=bore)
+    where |= level_of(model, where.pop("level"))
+    carried = bool(model.stage.carriers)
+    if carried and where["rigid_bearings"]:
+        raise click.BadParameter(
+            "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
+        )
+    meshes, failed = [None] if carried else [mesh.name for mesh in model.stage.engagements], False
     for mesh in meshes:
-        result = loaded_te(model, list(torques), mesh=mesh, **where)
+        with progress_bar(f"te {model.name}") as progress:
+            result = loaded_te(model, torques, mesh=mesh, progress=progress, **where)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
         write_columns(path, result.columns())
         picture = path.with_suffix(".png")
-        write_plot(result, picture, _unloaded(model, torques, mesh=mesh, **where))
+        write_plot(result, picture, None if carried else _unloaded(model, torques, mesh=mesh, **where))
         if len(meshes) > 1:
             click.echo(mesh)
-        _tell(result)
-        if doubled:
+        for torque, text in result.rows:
+            click.echo(f"{torque:>12}: {text}" if torque else f"{'':14}{text}")
+        if len(model.stage.engagements) == 1 if doubled is None else doubled:
             _tell_slices(model, torques, mesh, where)
+        for text in above_sharing(result, model.stage.load_sharing):
+            click.echo(f"warning: {text}", err=True)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
-    _end(model, torques, failed)
+    warn_of_limits(model, torques)
+    if failed:
+        click.get_current_context().exit(1)
 
 
 def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, where: Mapping[str, float]) -> None:
-    """What the number of slices of a helical stage leaves open, over one pitch."""
+    """Changes of the harmonics of a helical stage with twice the slices, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
     parameters = {key: where[key] for key in where.keys() - {"positions", "pitches", "rigid_bearings"}}
@@ -112,7 +118,7 @@ def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, 
         click.echo(f"{'':14}{left.text}")
 
 
-def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
+def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> TeResult | None:
     """The transmission error without load, for the picture; None where it is among those asked for, or not found."""
     from gearfmu.stage import loaded_te
 
@@ -120,13 +126,6 @@ def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
         return None if 0.0 in torques else loaded_te(model, [0.0], **where)
     except SimulationError:
         return None
-
-
-def _end(model: StageModel, torques: Sequence[float], failed: bool) -> None:
-    """Warnings; exit code 1 where a torque has no equilibrium."""
-    warn_of_limits(model, torques)
-    if failed:
-        click.get_current_context().exit(1)
 
 
 def _draw_flanks(model: StageModel, out: Path) -> None:
@@ -147,44 +146,11 @@ def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
             click.echo(f"warning: {text}", err=True)
 
 
-def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where: Any) -> None:
-    if where["rigid_bearings"]:
-        raise click.BadParameter(
-            "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
-        )
-    from gearfmu.report.te import write_set_plot
-    from gearfmu.stage.run.set_te import set_te
-    from gearfmu.stage.run.trace import write_columns
-
-    with progress_bar(f"te {model.name}") as progress:
-        known = {name: where[name] for name in ("level",) if name in where}
-        result = set_te(model, torques, where["positions"], where["pitches"], progress, **known)
-    write_columns(out, result.columns())
-    picture = out.with_suffix(".png")
-    write_set_plot(result, picture)
-    _tell(result)
-    if doubled:
-        _tell_slices(model, torques, None, where)
-    for text in above_sharing(result, model.stage.load_sharing):
-        click.echo(f"warning: {text}", err=True)
-    click.echo(f"{out}, {picture}")
-    _draw_flanks(model, out)
-    _end(model, torques, any(result.failed))
-
-
-def above_sharing(result: Any, load_sharing: float) -> list[str]:
-    """Where a planet of a set carries more than the stage file's `load_sharing` says."""
-    from gearfmu.stage.run.set_te import GEARS
-
+def above_sharing(result: TeResult, load_sharing: float) -> list[str]:
+    """Where a planet of a set carries more than `load_sharing` of the stage file."""
     return [
         f"{torque:g} N·m: K_gamma {most:.3f} at the {gear}, above load_sharing = {load_sharing:g} of the stage file"
         for torque, factors in zip(result.torque, result.load_factor, strict=True)
-        for gear, most in zip(GEARS, factors, strict=True)
+        for gear, most in zip(result.centrals, factors, strict=True)
         if most > load_sharing
     ]
-
-
-def _tell(result: Any) -> None:
-    """One line a torque, of a set two more."""
-    for torque, text in result.rows:
-        click.echo(f"{torque:>12}: {text}" if torque else f"{'':14}{text}")

@@ -23,7 +23,7 @@ from gearfmu.stage import StageModel
 from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.te import loaded_te
 
 POSITIONS = 16
 DECIBEL = 20.0 / math.log(10.0)  # of a small relative error
@@ -125,7 +125,7 @@ def _quasi_static(settings: dict[str, float], known: Conditions) -> float:
     """rms of what the transmission error changes over a pitch, its mean left out, over its own alternating part."""
     own: dict[str, Any] = {"slices": float(known.full.choice.slices)}
     try:
-        on, off = (stage_te(known.model, [known.torque], POSITIONS, **(own | more)).te[0] for more in ({}, settings))
+        on, off = (loaded_te(known.model, [known.torque], POSITIONS, **(own | more)).te[0] for more in ({}, settings))
     except GearfmuError:
         return UNKNOWN
     return float(np.std(off - on) / max(float(np.std(on)), 1e-15))

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from gearfmu.files import written_whole
-from gearfmu.report.style import COLOURS, WIDTH, styled
+from gearfmu.report.style import COLOURS, WIDTH, styled, written
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.stage.build.flanks import FlankField
@@ -30,8 +29,7 @@ def write_flanks(stage: Stage, path: Path) -> bool:
         rows = figure.subplots(len(fields), 3, squeeze=False)
         for axes, field in zip(rows, fields, strict=True):
             _draw(axes, field)
-        with written_whole(path) as temporary:
-            figure.savefig(temporary, dpi=150)
+        written(figure, path)
     return True
 
 

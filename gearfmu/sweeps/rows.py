@@ -16,8 +16,8 @@ from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_inte
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
 from gearfmu.stage.run.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
 
@@ -38,12 +38,11 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
     row: dict[str, float] = {}
     curve: dict[str, list[float]] = {}
     for mesh in names:
-        found = stage_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
+        found = loaded_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
         before = f"{mesh}_" * (len(names) > 1)
         row |= _te_numbers(found, before)
         curve |= _curve(found, before)
-        if isinstance(found, SetTeResult):
-            row |= {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, found.load_factor[0], strict=True)}
+        row |= {f"K_gamma_{gear}": float(k) for gear, k in zip(found.centrals, found.load_factor[0], strict=True)}
     return row, curve
 
 
@@ -105,7 +104,7 @@ def _settings(what: str, model: StageModel, values: Mapping[str, Any]) -> dict[s
     return parameters(model, {key: value for key, value in values.items() if key not in OWN[what]})
 
 
-def _te_numbers(result: Any, before: str) -> dict[str, float]:
+def _te_numbers(result: TeResult, before: str) -> dict[str, float]:
     te = 1e6 * result.te[0]
     found = {"te_mean_um": te.mean(), "te_pp_um": np.ptp(te)}
     for name, values in result.columns().items():
@@ -115,6 +114,6 @@ def _te_numbers(result: Any, before: str) -> dict[str, float]:
     return {before + name: float(value) for name, value in found.items()}
 
 
-def _curve(result: Any, before: str) -> dict[str, list[float]]:
+def _curve(result: TeResult, before: str) -> dict[str, list[float]]:
     columns = {name: values.tolist() for name, values in result.columns().items() if name != "torque_Nm"}
     return {name if name == "position" else before + name: values for name, values in columns.items()}
