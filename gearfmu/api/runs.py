@@ -18,7 +18,7 @@ from gearfmu.spec.tables.profile import Profile, read_profile
 from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
 from gearfmu.stage.run.simulate import Inputs
-from gearfmu.stage.run.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
 
 
 def te(
@@ -78,7 +78,7 @@ def simulate(
     start, *end = (
         None if value is None else in_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
     )
-    driven = Drive(
+    driven = LoadCase(
         torque=None if torque is None else in_si(torque, "N*m"),
         speed=start,
         duration=None if duration is None else in_si(duration, "s"),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from gearfmu.body.body import Sensors, Tangent
+from gearfmu.body.body import Flank, Sensors, Tangent
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Modes
@@ -78,6 +78,29 @@ def tangent_of(modes: Modes, statics: Statics, points: Points) -> Tangent | None
         return None
     rows = modes.tangent_rows.reshape(2, len(points.rolls), points.functions, -1)
     return Tangent(rows, statics.static_nt, statics.static_tt)
+
+
+def flank_of(teeth: int, load_points: tuple[ToothFlank, Points], modes: Modes, statics: Statics) -> Flank:
+    """The flank of a body: its geometry and load points, rows of the modes and static tables at them."""
+    flank, points = load_points
+    return Flank(
+        teeth=teeth,
+        internal=flank.internal,
+        r_b=flank.r_b,
+        psi_b=flank.psi_b,
+        beta_b=flank.base_helix_angle,
+        face_width=flank.face_width,
+        strip_half_width=flank.strip_half_width,
+        roll_range=np.array(flank.roll_range),
+        roll=points.rolls,
+        diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
+        static=kept_offsets(statics.static_ff),
+        node=statics.static_fb,
+        tangent=tangent_of(modes, statics, points),
+    )
 
 
 def rim_sensor(body: SectorBody, modes: Modes) -> Sensors | None:

@@ -122,13 +122,13 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
     from gearfmu.commands.models import model_of
     from gearfmu.commands.settings import parameters
     from gearfmu.spec.tables.profile import read_profile
-    from gearfmu.stage.run.steady import Drive, steady_run
+    from gearfmu.stage.run.steady import LoadCase, steady_run
 
     level = drive.pop("level")
     settings = (*settings, f"level={level}") if level else settings
     if profile is None and (missing := [f"--{name}" for name in ("torque", "speed") if drive[name] is None]):
         raise click.UsageError(f"give {' and '.join(missing)}, or a --profile")
-    driven = Drive(**drive, profile=None if profile is None else read_profile(profile))
+    driven = LoadCase(**drive, profile=None if profile is None else read_profile(profile))
     model = model_of(stage)
     with progress_bar(model.name) as progress:
         trace = steady_run(model, driven, parameters(model, settings), progress)

@@ -16,7 +16,7 @@ from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_inte
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.run.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
 from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
@@ -48,7 +48,7 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
 
 def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
     """`steady_run` at a point."""
-    return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
+    return steady_run(model, LoadCase(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
 def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Body]) -> Trace:

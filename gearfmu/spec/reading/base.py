@@ -27,7 +27,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
-_KINDS = ("gear", "shaft", "housing", "ball", "roller", "springs", "catalogue")  # pydantic's marks of chosen classes
+_TAGS = ("springs", "catalogue")  # of classes that a table chooses without its `kind`
 _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 
@@ -165,11 +165,16 @@ def _follows(entry: Any, entries: Sequence[Any]) -> bool:
     return entry["type"] == "too_short" and any(inside)
 
 
+def _is_tag(raw: object, part: str | int) -> bool:
+    """Whether `part` of a place only names the class that a table is read as."""
+    return isinstance(raw, dict) and part not in raw and part in (raw.get("kind", "gear"), *_TAGS)
+
+
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
     for part in loc:
-        if isinstance(raw, dict) and part not in raw and part in _KINDS:
+        if _is_tag(raw, part):
             continue
         inside, label = _step(raw, part)
         path += label if label.startswith("[") or not path else f".{label}"
@@ -181,9 +186,9 @@ def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
     """Keys and positions in `raw` that lead to a place of the model."""
     path: list[Any] = []
     for part in loc:
+        if _is_tag(raw, part):
+            continue
         if isinstance(raw, dict):
-            if part not in raw and part in _KINDS:
-                continue
             key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
             raw = raw.get(key)
         else:
