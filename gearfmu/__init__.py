@@ -24,13 +24,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearfmu.api.bodies import frf
     from gearfmu.api.models import assemble, load, load_scene, reduce
-    from gearfmu.api.plans import plan, run_plan
+    from gearfmu.api.plans import plan, run_plan, sweep
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
     from gearfmu.api.sound import house, sound_power
     from gearfmu.api.stages import bearings, effects, efficiency, new
-    from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
     from gearfmu.fmu.validate import validate
     from gearfmu.stage.build.model import StageModel

@@ -37,7 +37,7 @@ VERBS = {
         "Quasi-static loaded transmission error, load shares, stiffness of mesh and stage.",
     ),
     "efficiency": (
-        "gearfmu.commands.efficiency:efficiency",
+        "gearfmu.commands.te:efficiency",
         "Loss of every mesh to friction of its flanks.",
     ),
     "bearings": (
@@ -56,7 +56,7 @@ VERBS = {
     "compare": ("gearfmu.commands.runs:compare", "Compare two or more traces in one page."),
     "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),
     "plan": ("gearfmu.commands.plan:plan", "Effects, level and step of a scene by an error budget: plan.toml."),
-    "convert": ("gearfmu.commands.convert:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
+    "convert": ("gearfmu.commands.files:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),

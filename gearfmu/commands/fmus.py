@@ -68,8 +68,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
     from gearfmu.api.results import windup_file, with_windup
-    from gearfmu.commands.models import model_in_scene, model_of
-    from gearfmu.commands.settings import parameters
+    from gearfmu.commands.models import model_in_scene, model_of, parameters
     from gearfmu.stage.run.windup import write_starts
 
     scene, observe = how.pop("scene"), how.pop("observe")

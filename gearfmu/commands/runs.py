@@ -119,8 +119,7 @@ def _unit(how: dict[str, Any]) -> Any:
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque."""
-    from gearfmu.commands.models import model_of
-    from gearfmu.commands.settings import parameters
+    from gearfmu.commands.models import model_of, parameters
     from gearfmu.spec.tables.profile import read_profile
     from gearfmu.stage.run.steady import LoadCase, steady_run
 

@@ -34,10 +34,10 @@ def sweep(
     is taken as by 'te' (Harris map). Keys: torque, speed; stage.<field of the stage file>; of a scene its fields; of a
     stage duration, step, settle, positions, pitches and parameters of docs/variables.md. An interrupted sweep goes on
     when it is called again. Exit code: the number of points that failed (at most 99)."""
-    from gearfmu.api.sweeps import sweep as run_sweep
+    from gearfmu.api.plans import sweep as run_sweep
     from gearfmu.sweeps.charts import write_charts
     from gearfmu.sweeps.page import write_page
-    from gearfmu.sweeps.values import key_and_values
+    from gearfmu.sweeps.plan import key_and_values
 
     folder = out or Path("out") / f"sweep_{Path(subject).stem}"
     with progress_bar(f"sweep {subject}") as progress:

@@ -1,4 +1,4 @@
-"""The verb te: loaded transmission error as a table and a picture."""
+"""Verbs on meshes under load: te, the transmission error as a table and a picture; efficiency, losses to friction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_names
+from gearfmu.commands.shared import Quantity, echo_pairs, level_option, progress_bar, stage_names
 from gearfmu.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
-    from gearfmu.commands.settings import level_of
+    from gearfmu.commands.models import level_of
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
@@ -154,3 +154,25 @@ def above_sharing(result: TeResult, load_sharing: float) -> list[str]:
         for gear, most in zip(result.centrals, factors, strict=True)
         if most > load_sharing
     ]
+
+
+@click.command()
+@click.argument("stage", shell_complete=stage_names)
+@click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
+@click.option(
+    "--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches of the slowest mesh."
+)
+@level_option
+def efficiency(stage: str, torque: float, speed: float, pitches: int, level: str | None) -> None:
+    """Efficiency of the meshes of STAGE at constant load: mean friction power of a run over whole pitches, and
+    P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction. Power
+    is that which rolls through a mesh: in a planetary set less than the input's.
+
+    The coefficient follows what the stage says ([contact] friction), else it is 0.05. Losses of bearings, seals and
+    churned oil are in neither number."""
+    from gearfmu.commands.models import level_of
+    from gearfmu.stage.run.efficiency import mesh_efficiency
+
+    model = model_of(stage)
+    echo_pairs(mesh_efficiency(model, torque, speed, level_of(model, level), pitches=pitches).columns())

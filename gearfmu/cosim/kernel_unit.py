@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.kernel import Kernel
+from gearfmu.stage import StageModel
 
 
 class KernelHandle(NamedTuple):
@@ -124,3 +128,26 @@ class KernelUnit:
 
     def close(self) -> None:
         """Nothing to free: Python owns the memory."""
+
+
+class UnitSource(Protocol):
+    """What a run needs of a source: the stage's model, and a fresh unit of it with these start values."""
+
+    @property
+    def model(self) -> StageModel: ...
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit: ...
+
+
+@dataclass(frozen=True)
+class Source:
+    """The kernel itself (fmu_path None) or an FMU; the model it was made from."""
+
+    model: StageModel
+    fmu_path: Path | None = None
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit:
+        """A fresh instance with these start values."""
+        if self.fmu_path is None:
+            return KernelUnit(self.model.blob, parameters)
+        return FmuUnit(self.fmu_path, parameters)

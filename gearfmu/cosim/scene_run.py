@@ -18,12 +18,11 @@ from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.drivetrain import car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
-from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError

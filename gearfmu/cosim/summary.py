@@ -10,7 +10,7 @@ from typing import Any
 
 from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
-from gearfmu.cosim.source import Source
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.kernel.binding import status_words
 from gearfmu.spec.forms.turning import meshings
 from gearfmu.spec.scene import SceneSpec

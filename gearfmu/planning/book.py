@@ -1,9 +1,10 @@
-"""A plan as a value and as plan.toml: what every segment is run with, and why."""
+"""A plan as a value and as plan.toml: settings of every segment, with reasons; plans that were made before."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -152,3 +153,28 @@ def _value(value: Any) -> str:
     if isinstance(value, float):
         return "nan" if math.isnan(value) else str(value)
     return json.dumps(value, ensure_ascii=False)
+
+
+def kept_plan(identity: str) -> Plan | None:
+    """The plan that was made before for the same model, scene, outputs, budget and kernel; None where there is none
+    that can be read."""
+    try:
+        return Plan.load(_kept_at(identity))
+    except SpecError:
+        return None
+
+
+def keep_plan(plan: Plan) -> Plan:
+    """The plan, also kept in $GEARFMU_CACHE/plans or the user's cache folder, where that can be written."""
+    try:
+        plan.save(_kept_at(plan.identity))
+    except OSError:
+        pass
+    return plan
+
+
+def _kept_at(identity: str) -> Path:
+    home = (
+        os.environ.get("GEARFMU_CACHE") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearfmu"
+    )
+    return Path(home) / "plans" / f"{identity[:32]}.toml"

@@ -14,9 +14,8 @@ from pathlib import Path
 from gearfmu.cosim.coupled import CoupledRun, Saved
 from gearfmu.cosim.fmu_state import kernel_bytes, with_kernel_bytes
 from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run
-from gearfmu.cosim.source import Source
 from gearfmu.planning.choice import Choice
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel

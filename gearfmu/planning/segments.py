@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import coupled_run, drive_of
-from gearfmu.cosim.source import Source
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Window, pilot_choice
 from gearfmu.planning.windows import LONGEST, first_window, whole_periods

@@ -15,9 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import Choice
 from gearfmu.planning.judge import Signals

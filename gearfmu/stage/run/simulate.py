@@ -15,7 +15,7 @@ from typing_extensions import Self
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.trace import Channel, Trace

@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 
 SECANT = 0.01  # of the torque
 
