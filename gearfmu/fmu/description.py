@@ -17,6 +17,12 @@ from gearfmu.kernel import Variable
 from gearfmu.kernel.instance import INSTANCES
 from gearfmu.spec.forms.general import Stage
 
+OF_SUPPORT, OF_MODE = (13, 14, 15), 2**24  # numbers of the table; where references of amplitudes begin
+AXES = {"x": "along x", "y": "along y", "z": "along z", "rx": "about x", "ry": "about y", "rz": "about z"}
+LOADS = {f"{kind}{axis}": AXES[f"{tilt}{axis}"] for kind, tilt in (("f", ""), ("m", "r")) for axis in "xyz"}
+MEMBERS = ("phi", "w", "a", "tau", "tau_mean")
+KIND = "org.modelica.Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+
 DEFAULT_STEP = 1e-4
 DEFAULT_STOP = 0.1
 LOG_CATEGORIES = {
@@ -180,11 +186,6 @@ def _add_structure(root: ET.Element, variables: Sequence[Variable]) -> None:
         ET.SubElement(initial, "Unknown", {"index": index})
 
 
-OF_SUPPORT, OF_MODE = (13, 14, 15), 2**24  # numbers of the table; where references of amplitudes begin
-AXES = {"x": "along x", "y": "along y", "z": "along z", "rx": "about x", "ry": "about y", "rz": "about z"}
-LOADS = {f"{kind}{axis}": AXES[f"{tilt}{axis}"] for kind, tilt in (("f", ""), ("m", "r")) for axis in "xyz"}
-
-
 def named(variables: Sequence[Variable], stage: Stage) -> list[Variable]:
     """The variables with descriptions that differ: "mesh of planet 3 with the ring: tooth pairs in contact"."""
     subjects = {mesh.name: mesh_name(*mesh.gears) for mesh in stage.engagements}
@@ -216,10 +217,6 @@ def _subject(variable: Variable, subjects: dict[str, str]) -> str:
     while place and place not in subjects:
         place = place.rpartition(".")[0]
     return subjects.get(place, "")
-
-
-MEMBERS = ("phi", "w", "a", "tau", "tau_mean")
-KIND = "org.modelica.Modelica.Mechanics.Rotational.Interfaces.Flange_a"
 
 
 def shafts(variables: Sequence[Variable]) -> dict[str, list[str]]:

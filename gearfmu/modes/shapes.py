@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+MOST = 12
+CELLS = 24  # of radius and of width: points in one cell are compared with each other around the axis
+
 DRAWN = 0.05  # of the body's diameter: the largest displacement as it is drawn
 
 
@@ -85,10 +88,6 @@ def cylindrical(points: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     c, s = (points[:, k] / np.where(radius > 0, radius, 1.0) for k in (0, 1))
     radial, tangential = c * vectors[:, 0] + s * vectors[:, 1], c * vectors[:, 1] - s * vectors[:, 0]
     return np.stack([radial, tangential, vectors[:, 2]], axis=1)
-
-
-MOST = 12
-CELLS = 24  # of radius and of width: points in one cell are compared with each other around the axis
 
 
 def harmonic_shares(points: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -31,6 +31,9 @@ from gearfmu.spec.scene import SceneSpec, StageChoice, full_key, scene_path, shi
 from gearfmu.spec.stage import stage_class
 from gearfmu.units import to_si
 
+_RANGE = re.compile(r"\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*(\S.*?)?\s*$")
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
+
 RUN, SIMULATE, TE = "run", "simulate", "te"
 OWN = {  # keys of a stage that is computed alone, with their units
     SIMULATE: {"torque": "N*m", "speed": "rad/s", "duration": "s", "step": "s", "settle": "s", "end_speed": "rad/s"},
@@ -136,10 +139,6 @@ def _file(subject: str | os.PathLike[str]) -> tuple[Path, bool]:
     if not path.exists() and str(subject) in shipped_scenes():
         return scene_path(str(subject)).resolve(), True
     return find_stage(subject).resolve(), False
-
-
-_RANGE = re.compile(r"\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*(\S.*?)?\s*$")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 
 
 def key_and_values(text: str) -> tuple[str, list[Any]]:
