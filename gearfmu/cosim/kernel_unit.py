@@ -1,4 +1,5 @@
-"""KernelUnit: the kernel without an FMU around it, as a unit. Same library, same numbers as the FMU."""
+"""KernelUnit: the kernel without an FMU around it, as a unit, same library, same numbers as the FMU; and `Source`, which
+makes units of the stage of a run."""
 
 from __future__ import annotations
 

@@ -174,7 +174,5 @@ def keep_plan(plan: Plan) -> Plan:
 
 
 def _kept_at(identity: str) -> Path:
-    home = (
-        os.environ.get("GEARFMU_CACHE") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearfmu"
-    )
-    return Path(home) / "plans" / f"{identity[:32]}.toml"
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Path(os.environ.get("GEARFMU_CACHE") or caches / "gearfmu") / "plans" / f"{identity[:32]}.toml"
