@@ -1,5 +1,5 @@
-"""KernelUnit: the kernel without an FMU around it, as a unit, same library, same numbers as the FMU; and `Source`, which
-makes units of the stage of a run."""
+"""KernelUnit: the kernel without an FMU around it as a unit, same library, same numbers as the FMU; `Source`, which
+makes the unit of a run."""
 
 from __future__ import annotations
 
