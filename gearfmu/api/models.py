@@ -6,9 +6,9 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
-from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
+from gearfmu.body import Body, body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.expand import with_bores, with_ports
 from gearfmu.spec.forms.general import Stage
@@ -62,7 +62,7 @@ def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
 
 def reduce(
     stage: PathLike | Stage, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
-) -> list[Any]:
+) -> list[Body]:
     """The reduced bodies of a stage, in the order of its gears; what is missing or stale is made first (about a minute
     a gear) and stored as .h5.
 
@@ -112,7 +112,7 @@ def assemble(
 
 def reduced_to_move(
     stage: PathLike | Stage, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
-) -> tuple[Stage, list[Any]]:
+) -> tuple[Stage, list[Body]]:
     """The stage with these bores, and its bodies: what `assemble` puts together. SpecError, before anything is reduced,
     for a set that does not say all that it needs to move."""
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage

@@ -29,7 +29,7 @@ def plan(
     band: Sequence[str | float],
     budget: str | None = None,
     waveform: str | None = None,
-    on: Any = None,
+    on: object = None,
     **how: Unpack[PlanOptions],
 ) -> Plan:
     """Plan a scene for an error budget: which effects, level, step and slices it needs.
@@ -77,7 +77,7 @@ def run_plan(
     )
 
 
-def _runner(on: Any) -> Any:
+def _runner(on: object) -> Any:
     if on is None or on == 1:
         return in_this_process
     return on_this_machine(on) if isinstance(on, int) else on_cluster(on)
@@ -85,10 +85,10 @@ def _runner(on: Any) -> Any:
 
 def sweep(
     subject: PathLike,
-    over: Mapping[str, Any] | Sequence[Mapping[str, Any]],
+    over: Mapping[str, object] | Sequence[Mapping[str, object]],
     out: PathLike,
     traces: bool = False,
-    on: Any = None,
+    on: object = None,
     progress: Progress | None = None,
 ) -> SweepTable:
     """Compute a scene or a stage at many points; one table.

@@ -17,7 +17,7 @@ from typing_extensions import Unpack
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, load, model_of
 from gearfmu.api.settings import Quantity, Starts, checked
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import Extras
@@ -182,7 +182,7 @@ def stage_of(meta: Mapping[str, Any]) -> str | None:
     return path if path and Path(path).is_file() else meta.get("stage")
 
 
-def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Stage, Sequence[Any]]:
+def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Stage, Sequence[Body]]:
     """The stage of a run and its reduced bodies. meta : of the run's trace or deformation. stage : of the run where it
     is known; else that of the FMU that was run, with the bodies beside the stage file that `stage_of` names.
     GearfmuError where there is none such, or where the FMU is another by now."""

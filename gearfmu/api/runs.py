@@ -46,7 +46,9 @@ def te(
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
-    return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, None, **known)
+    if rigid_bearings and (mesh or not model.stage.carriers):
+        known["effect.bearings"] = 0.0
+    return loaded_te(model, values, positions, mesh, pitches, None, **known)
 
 
 def simulate(

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.shared import stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
+    from gearfmu.stage import StageModel
+    from gearfmu.stage.effects import Cost
 
 FIELDS = ("formula", "matters", "off", "switch", "code")
 
@@ -35,7 +40,7 @@ def effects(stage: str | None) -> None:
         click.echo(f"  in the stage  {line}")
 
 
-def _cost(cost: Any) -> str:
+def _cost(cost: Cost | None) -> str:
     if cost is None:
         return "not measured"
     price = "" if math.isnan(cost.without) else f"; off, {cost.price_of_off:+.1%} against a kernel without it"
@@ -93,13 +98,13 @@ def _numbers(stage: str) -> dict[str, str]:
     }
 
 
-def _runout(gear: Any) -> str:
+def _runout(gear: ToothedBody) -> str:
     """Eccentricity and wobble of a gear."""
     eccentricity, wobble = (part.amount if part else 0.0 for part in (gear.eccentricity, gear.wobble))
     return f"{1e6 * eccentricity:g} µm with {1e6 * wobble:g} µrad"
 
 
-def _friction(mesh: Any) -> str:
+def _friction(mesh: EngagementSpec) -> str:
     """Law of a mesh."""
     if mesh.friction is None:
         return "none is stated: it costs nothing"
@@ -107,7 +112,7 @@ def _friction(mesh: Any) -> str:
     return f"coefficient {mesh.friction.coefficient:g}" if constant else f"law {mesh.friction.law}"
 
 
-def _film(stage: Any, mesh: Any) -> str:
+def _film(stage: Stage, mesh: EngagementSpec) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
@@ -116,7 +121,7 @@ def _film(stage: Any, mesh: Any) -> str:
     return f"takes {1e3 * film_stop(stage, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
 
-def _whirling(model: Any) -> str:
+def _whirling(model: StageModel) -> str:
     """What turning does to the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
     from gearfmu.body import load_bodies
     from gearfmu.stage.run.inertia import WHIRL_BAND, whirling

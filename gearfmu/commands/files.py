@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import echo_pairs
+
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import Stage
 
 UNITS = {
     "r_b": "m", "r_f": "m", "r_a": "m", "base_pitch": "m", "ring_least_tip_radius": "m", "gap_between_planets": "m",
@@ -148,7 +151,7 @@ def _toml(path: Path) -> dict[str, Any]:
     }
 
 
-def _needs(stage: Any) -> Any:
+def _needs(stage: Stage) -> str | dict[str, dict[str, float]]:
     """What the reduction of every body takes, estimated from its mesh; or why it cannot be meshed."""
     from gearfmu.body import body_needs
     from gearfmu.errors import MeshError
@@ -175,7 +178,7 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
     return {"file": found["file"], "kind": found["kind"], **own, **after}
 
 
-def in_units(found: Any, key: str = "") -> Any:
+def in_units(found: object, key: str = "") -> Any:
     """Numbers whose unit the name does not tell as text with it, here in what follows from a stage and in bodies."""
     from gearfmu.units import quantity_text
 

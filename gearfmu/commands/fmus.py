@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import progress_bar, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.stage import StageModel
 
 OF_INPUT = ("torque", "speed")  # starts that are no parameters
 PORT_KINDS = ("spring", "torque", "fixed")
@@ -94,7 +97,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     click.echo(how_to_load(path, model))
 
 
-def how_to_load(path: Path, model: Any) -> str:
+def how_to_load(path: Path, model: StageModel) -> str:
     """What an importer connects, and how Python loads the FMU."""
     names = [variable.name for variable in model.kernel_variables() if variable.causality == "input"]
     connect = f"connect {', '.join(names[:6])}{' …' if len(names) > 6 else ''}" if names else "it has no inputs"

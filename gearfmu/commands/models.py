@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
+    from gearfmu.body import Body
     from gearfmu.spec.forms.general import Stage
     from gearfmu.stage import StageModel
 
@@ -35,7 +36,7 @@ def model_in_scene(scene: str, stage: str | None, observe: Sequence[str] = ()) -
         return assemble_in_scene(scene, stage, observe, progress)
 
 
-def bodies_of(stage: str) -> tuple[Stage, list[Any]]:
+def bodies_of(stage: str) -> tuple[Stage, list[Body]]:
     """The numbers of STAGE and its bodies (`api.reduce`)."""
     from gearfmu.api.models import load, reduce
 
@@ -44,7 +45,7 @@ def bodies_of(stage: str) -> tuple[Stage, list[Any]]:
         return spec, reduce(spec, progress=progress)
 
 
-def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list[Any]]:
+def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list[Body]]:
     """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are
     not the stage's own."""
     from gearfmu.api.models import bodies_folder, load, reduced_to_move

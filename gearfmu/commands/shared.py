@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -33,7 +32,7 @@ class Quantity(click.ParamType):
         """As the option takes it: click would write the unit in capitals."""
         return self.name
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """SI value of the text; a usage error when number or unit are missing or of another kind, SpecError where it
         is out of range."""
         if isinstance(value, float):
@@ -138,7 +137,7 @@ class Told:
             click.echo(f"{self.title} {self._doing or 'at work'}{since}", err=True)
 
 
-def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
+def echo_pairs(pairs: Mapping[str, object], indent: str = "") -> None:
     """Print a nested name–value mapping, aligned; numbers with six digits."""
     width = max((len(str(key)) for key in pairs), default=0)
     for key, value in pairs.items():
@@ -151,7 +150,7 @@ def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
             click.echo(f"{indent}{key:<{width}}  {_shown(value)}")
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, (list, tuple)):

@@ -80,10 +80,12 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
     model = model_of(stage, bores=bore)
     where |= level_of(model, where.pop("level"))
     carried = bool(model.stage.carriers)
-    if carried and where["rigid_bearings"]:
-        raise click.BadParameter(
-            "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
-        )
+    if where.pop("rigid_bearings"):
+        if carried:
+            raise click.BadParameter(
+                "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
+            )
+        where["effect.bearings"] = 0.0
     meshes, failed = [None] if carried else [mesh.name for mesh in model.stage.engagements], False
     for mesh in meshes:
         with progress_bar(f"te {model.name}") as progress:
@@ -112,8 +114,8 @@ def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, 
     """Changes of the harmonics of a helical stage with twice the slices, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
-    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches", "rigid_bearings"}}
-    left = left_of_slices(model, torques, None, bool(where["rigid_bearings"]), mesh, **parameters)
+    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches"}}
+    left = left_of_slices(model, torques, None, mesh, **parameters)
     if left is not None:
         click.echo(f"{'':14}{left.text}")
 

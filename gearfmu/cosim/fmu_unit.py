@@ -144,7 +144,7 @@ class FmuUnit:
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         addLoggerProxy(byref(self._callbacks))
 
-    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(message.decode("utf-8", "replace"))
         del self.messages[:-MESSAGES_KEPT]
 
@@ -229,7 +229,7 @@ class FmuUnit:
                 handle.buffer[group.places] = group.view
         return handle.buffer
 
-    def read(self, call: str, references: Any, count: int, address: Any) -> None:
+    def read(self, call: str, references: object, count: int, address: object) -> None:
         """Values of variables of one type (Real, Integer, Boolean) to an address, which must have room for them.
         Raises FmuError when the FMU refuses."""
         if self._getters[call](self._component, references, count, address) > fmi2Warning:

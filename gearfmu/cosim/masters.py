@@ -96,7 +96,7 @@ class _Exchange:
             if self.rates:
                 self._known[len(self.signals) + k] = (last - first) / h if h else 0.0
 
-    def _send(self, inputs: tuple[Any, np.ndarray | slice]) -> None:
+    def _send(self, inputs: tuple[object, np.ndarray | slice]) -> None:
         handle, places = inputs
         self.stage.set(handle, self._values[places])
 

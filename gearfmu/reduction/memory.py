@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gearfmu.errors import MeshError
+from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.spec.forms.planetary import CarrierMeshSpec
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 
 _BASE = 0.2e9  # bytes of the program with its packages, and of what is small
 _FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand
@@ -49,12 +52,12 @@ class ReductionSize:
     loads: int
 
 
-def gear_need(sector: Any, body: Any) -> Need:
+def gear_need(sector: FeMesh, body: BodySpec) -> Need:
     """Need of a gear: its sector (FeMesh) and what a spec says about the reduction (BodySpec)."""
     return sector_need(sector, ReductionSize(sector.teeth, body.modes, 2 * body.roll_points * body.width_functions))
 
 
-def sector_need(sector: Any, size: ReductionSize) -> Need:
+def sector_need(sector: FeMesh | CyclicCut, size: ReductionSize) -> Need:
     """Need of a gear that is reduced by cyclic symmetry; sector: its nodes, cut_minus and cut_plus."""
     cut, unknowns = 3 * len(sector.cut_minus), 3 * (len(sector.nodes) - len(sector.cut_plus))
     loads, family = 2 * size.loads, size.modes / size.teeth + 4
@@ -101,7 +104,7 @@ def require_memory(need: Need, remedy: str) -> None:
     )
 
 
-def lower_counts(counts: Any, table: str) -> str:
+def lower_counts(counts: MeshSpec | CarrierMeshSpec, table: str) -> str:
     """The remedy where element counts (MeshSpec, CarrierMeshSpec) of `table` can be lowered."""
     own = {name: value for name, value in counts.model_dump().items() if isinstance(value, int)}
     named = ", ".join(f"{name} = {value}" for name, value in own.items())

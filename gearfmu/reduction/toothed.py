@@ -5,8 +5,6 @@ The method through cyclic symmetry (`sector`) takes far finer meshes; this one s
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -20,6 +18,7 @@ from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.spec.forms.members import Member
+from gearfmu.spec.forms.planetary import MountsSpec
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5
@@ -55,7 +54,7 @@ def gear_full_order(member: Member, scale: float = GEAR_SCALE) -> FullOrder:
     return full_order(member.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
 
 
-def ring_mounts(sector: FeMesh, body: Elements, mounts: Any) -> list[Coupling]:
+def ring_mounts(sector: FeMesh, body: Elements, mounts: MountsSpec | None) -> list[Coupling]:
     """The mounts mount0 … of a whole ring: averaging nodes, each of the rim of one sector; none when `mounts` is None.
 
     Mount k holds the sector of its tooth space (`mount_spaces`); its point is the middle of that patch.

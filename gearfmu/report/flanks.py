@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearfmu.report.style import COLOURS, WIDTH, styled, written
@@ -33,7 +33,7 @@ def write_flanks(stage: Stage, path: Path) -> bool:
     return True
 
 
-def _draw(axes: Sequence[Any], field: FlankField) -> None:
+def _draw(axes: Sequence[Axes], field: FlankField) -> None:
     """One gear."""
     along, across, by_tooth = axes
     z = np.linspace(-0.5, 0.5, 33) * field.gear.face_width

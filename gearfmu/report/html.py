@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from gearfmu.body import Body
 from gearfmu.files import write_text
@@ -26,7 +25,7 @@ RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")
 
 def write(
     trace: Trace,
-    summary: Mapping[str, Any],
+    summary: Mapping[str, object],
     out_dir: str | os.PathLike[str],
     spec: Stage | None = None,
     bodies: Sequence[Body] | None = None,

@@ -12,6 +12,7 @@ import base64
 import gzip
 import json
 import struct
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ class Pack:
         head += b" " * (-(4 + len(head)) % 8)
         return squeezed(struct.pack("<I", len(head)) + head + bytes(self._bytes))
 
-    def _once(self, key: bytes, make: Any) -> int:
+    def _once(self, key: bytes, make: Callable[[], dict[str, Any]]) -> int:
         if key not in self._known:
             head = make()
             self._known[key] = len(self._heads)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu.extras import MissingPackage
 from gearfmu.report.chart import Chart, Plot
@@ -14,10 +14,13 @@ from gearfmu.report.figures import chart_element, chart_numbers
 from gearfmu.report.packed import Pack, squeezed
 from gearfmu.report.results import REACHED_THE_END
 
+if TYPE_CHECKING:
+    from gearfmu.report.moving import View
+
 NO_SCRIPT = "A script inside this page draws the figures; it is switched off. Their data lie in the folder data."
 
 
-def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: Any = None) -> str:
+def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: View | None = None) -> str:
     """The whole document around the given parts. plots: those among them whose charts the script draws; stage: the
     numbers of the turning view (`moving.View`), None without one."""
     charts = {plot.name: plot.picture for plot in plots if isinstance(plot.picture, Chart)}
@@ -28,7 +31,7 @@ def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: Any
     return f"{top}<body><main>\n" + "\n".join(body) + f"\n</main>{scripts}</body></html>\n"
 
 
-def _scripts(charts: Mapping[str, Chart], stage: Any) -> str:
+def _scripts(charts: Mapping[str, Chart], stage: View | None) -> str:
     pack = Pack()
     content: dict[str, Any] = {"figures": {name: chart_numbers(chart, pack) for name, chart in charts.items()}}
     if stage is not None:

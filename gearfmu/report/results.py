@@ -110,7 +110,7 @@ def energy_balance(trace: Trace) -> dict[str, float]:
     return {"energy_residual_of_port_work": float(trace["energy.residual"][-1]) / work}
 
 
-def strict(value: Any) -> Any:
+def strict(value: object) -> Any:
     """`value` as plain JSON: numpy scalars become Python's, numbers that are not finite become null."""
     if isinstance(value, Mapping):
         return {str(key): strict(item) for key, item in value.items()}

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
@@ -47,7 +49,7 @@ class Run:
         return planet_set(self.trace, self.known)
 
     @cached_property
-    def angles(self) -> dict[str, Any]:
+    def angles(self) -> dict[str, np.ndarray]:
         """Mesh angle (n,) rad by engagement."""
         return mesh_angles(self.trace, self.spec)
 

@@ -176,7 +176,7 @@ def _breaking(channel: str) -> str:
     return escape(channel).replace(".", ".<wbr>")
 
 
-def facts(summary: Mapping[str, Any]) -> dict[str, str]:
+def facts(summary: Mapping[str, object]) -> dict[str, str]:
     """How it was run."""
     known = {
         "torque of the input": _text(summary, "torque", 1, "N·m"),
@@ -276,7 +276,7 @@ def _frf_words(name: str, frf: FrfError) -> str:
     )
 
 
-def provenance(summary: Mapping[str, Any]) -> dict[str, str]:
+def provenance(summary: Mapping[str, object]) -> dict[str, str]:
     """The rest of the summary."""
     shown = {
         "scene",

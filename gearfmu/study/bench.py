@@ -132,7 +132,7 @@ class KeptSource:
 
 
 def models_for(
-    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: Any
+    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: object
 ) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of what is written in its file."""

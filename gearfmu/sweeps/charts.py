@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from gearfmu.report.metrics import level
 from gearfmu.report.style import panels, styled, written
@@ -105,7 +106,7 @@ def _levels(table: SweepTable, axes: list[str], path: Path) -> Path:
     return path
 
 
-def _map(figure: Any, axis: Any, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
+def _map(figure: Figure, axis: Axes, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
     """One colour map: the first key to the right, the second upwards."""
     x, y = (ticks_of(table, key)[rows] for key in axes[:2])
     right, up = np.unique(x), np.unique(y)

@@ -47,7 +47,7 @@ def _lines(path: Path) -> list[tuple[str, Outcome]]:
     return found
 
 
-def _strict(value: Any) -> Any:
+def _strict(value: object) -> Any:
     """Numbers that are not finite become null."""
     if isinstance(value, dict):
         return {key: _strict(item) for key, item in value.items()}

@@ -67,7 +67,7 @@ class Plan:
         quantity = self._quantity(key)
         return None if quantity is None else quantity.unit
 
-    def number(self, key: str, value: Any) -> Any:
+    def number(self, key: str, value: object) -> Any:
         """A value of a key in SI, as the table has it; text, switches and numbers without unit as they are."""
         unit = self.unit(key)
         return to_si(value, unit) if unit and isinstance(value, str) else value
@@ -89,7 +89,7 @@ class Plan:
         return quantity_at(SceneSpec, full_key(read_toml(self.subject), key, str(self.subject)))
 
 
-def plan(subject: str | os.PathLike[str], over: Mapping[str, Any] | Sequence[Values]) -> Plan:
+def plan(subject: str | os.PathLike[str], over: Mapping[str, object] | Sequence[Values]) -> Plan:
     """The Plan of a sweep of a scene or stage, by path or shipped name.
 
     over : values by key, a list each (or one value): their grid, the last key fastest; or the points themselves.
@@ -127,7 +127,7 @@ def _grid(over: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
     return tuple(dict(zip(over, values, strict=True)) for values in itertools.product(*lists)) if over else ()
 
 
-def _several(value: Any) -> bool:
+def _several(value: object) -> bool:
     return not isinstance(value, (str, bytes, Mapping)) and hasattr(value, "__iter__")
 
 

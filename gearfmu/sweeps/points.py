@@ -8,7 +8,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
 
-from gearfmu.body import load_bodies, reduce_apart, reduce_bodies
+from gearfmu.body import Body, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.kernel.build import source_hash, sources
 from gearfmu.spec.forms.general import Stage
@@ -111,7 +111,7 @@ def _computed(task: Task) -> Outcome:
 
 
 @lru_cache(maxsize=4)
-def _stage(variant: Variant) -> tuple[Any, list[Any]]:
+def _stage(variant: Variant) -> tuple[Stage, list[Body]]:
     """Spec and bodies."""
     spec = variant.spec()
     return spec, load_bodies(spec, variant.folder)

@@ -25,7 +25,7 @@ ORDERS = 5  # of the mesh
 POSITIONS = 41
 
 
-def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, list[float]]]:
+def te_row(model: StageModel, values: Mapping[str, object]) -> tuple[dict[str, float], dict[str, list[float]]]:
     """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), means of
     mesh stiffness and stage stiffness; of several meshes with the mesh's name before; of a set stage stiffness alone,
     and K_gamma at sun and ring."""
@@ -46,7 +46,7 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
     return row, curve
 
 
-def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
+def run_alone(model: StageModel, values: Mapping[str, object]) -> Trace:
     """`steady_run` at a point."""
     return steady_run(model, LoadCase(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
@@ -100,7 +100,7 @@ def _own(what: str, values: Mapping[str, Any]) -> dict[str, float]:
     return {k: to_si(v, units[k]) if isinstance(v, str) else float(v) for k, v in own.items()}
 
 
-def _settings(what: str, model: StageModel, values: Mapping[str, Any]) -> dict[str, float]:
+def _settings(what: str, model: StageModel, values: Mapping[str, object]) -> dict[str, float]:
     return parameters(model, {key: value for key, value in values.items() if key not in OWN[what]})
 
 

@@ -47,12 +47,12 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
     points = _points(plan, out)
     _prepare([p for p in points if isinstance(p, _Point)], runner, told)
     outcomes: list[Outcome | None] = [_kept(p, journal, out, traces) for p in points]
-    open_ = [n for n, known in enumerate(outcomes) if known is None]
-    tasks = [_task(plan, points[n], traces) for n in open_]
+    open_ = [(n, p) for n, p in enumerate(points) if outcomes[n] is None and isinstance(p, _Point)]
+    tasks = [_task(plan, point, traces) for _, point in open_]
     failed, done = sum(known is not None and known.name != OK for known in outcomes), len(points) - len(open_)
     for number, result in runner(compute, tasks):
-        n, outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
-        outcomes[n] = _keep(points[n], outcome, journal, out)
+        (n, point), outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
+        outcomes[n] = _keep(point, outcome, journal, out)
         failed, done = failed + (outcome.name != OK), done + 1
         told(done / len(points), f"{done} of {len(points)} points" + (f", {failed} failed" if failed else ""))
     return _table(plan, points, [o for o in outcomes if o is not None], out)
@@ -124,11 +124,11 @@ def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) ->
     return known
 
 
-def _task(plan: Plan, point: Any, traces: bool) -> Task:
+def _task(plan: Plan, point: _Point, traces: bool) -> Task:
     return Task(str(plan.subject), plan.what, point.values, point.variant, traces, program())
 
 
-def _keep(point: Any, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
+def _keep(point: _Point, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
     """The outcome without its trace, which is now in a file, noted in the journal."""
     if outcome.trace is not None:
         outcome.trace.save(out / trace_name(point.identity))
@@ -156,7 +156,9 @@ def _table(plan: Plan, points: list[_Point | Outcome], outcomes: list[Outcome], 
     return table
 
 
-def _curves(columns: Mapping[str, Any], keys: Mapping[str, str], outcomes: list[Outcome]) -> dict[str, np.ndarray]:
+def _curves(
+    columns: Mapping[str, np.ndarray], keys: Mapping[str, str], outcomes: list[Outcome]
+) -> dict[str, np.ndarray]:
     """The curves of all points, one below the other, with the point and its values in every line."""
     lengths = [len(outcome.curve.get("position", ())) for outcome in outcomes]
     if not sum(lengths):
@@ -169,6 +171,6 @@ def _curves(columns: Mapping[str, Any], keys: Mapping[str, str], outcomes: list[
     return found
 
 
-def _digest(value: Any) -> str:
+def _digest(value: object) -> str:
     """SHA-256, hex, of a JSON value."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()

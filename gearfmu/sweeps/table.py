@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def table_suffix() -> str:
     return ".parquet" if has("pyarrow") else ".csv"
 
 
-def column(values: Sequence[Any]) -> np.ndarray:
+def column(values: Sequence[object]) -> np.ndarray:
     """(n,) of one type: numbers, NaN where None; switches; else text."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)
@@ -125,5 +125,5 @@ def column_name(key: str, unit: str | None) -> str:
     return f"{key}_{plain}" if plain else key
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -49,20 +49,18 @@ def left_of_slices(
     model: StageModel,
     torques: Sequence[float],
     slices: int | None = None,
-    rigid_bearings: bool = False,
     mesh: str | None = None,
     **parameters: float,
 ) -> Change | None:
     """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
-    where a torque has no equilibrium. Bearings, mesh and parameters as `loaded_te` takes them."""
+    where a torque has no equilibrium. Mesh and parameters as `loaded_te` takes them."""
     own = slices or model.stage.slices
     finer = twice(model.stage, own)
     if finer == own:
         return None
     try:
         found = [
-            loaded_te(model, torques, POSITIONS, rigid_bearings, mesh, 1, None, slices=float(n), **parameters)
-            for n in (own, finer)
+            loaded_te(model, torques, POSITIONS, mesh, 1, None, slices=float(n), **parameters) for n in (own, finer)
         ]
     except SimulationError:
         return None

@@ -101,7 +101,7 @@ def _case_problems(case: LoadCase) -> Iterator[Problem]:
         yield Problem("", "end_speed", f"{case.end_speed:g} rad/s", "the profile has a speed: leave one of them away")
 
 
-def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
+def parameters(model: StageModel, settings: Mapping[str, object]) -> dict[str, float]:
     """Kernel parameters (docs/variables.md) as numbers, from {"level": "fast", "slices": 10, "effect.hertz": False} or
     the same as text. ModelError, naming what there is, for a name or value that the model does not know; SpecError
     with every number that is out of range, in the words in which a stage file with that number is refused."""

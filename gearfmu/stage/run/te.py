@@ -183,7 +183,6 @@ def loaded_te(
     model: StageModel,
     torques: Sequence[float],
     positions: int = 41,
-    rigid_bearings: bool = False,
     mesh: str | None = None,
     pitches: int = 1,
     progress: Callable[[float, str], None] | None = None,
@@ -196,16 +195,16 @@ def loaded_te(
     without load it is ± the mean backlash of the two meshes along the line of action.
 
     torques: N·m on the input (the first port; `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
-    driving torque: the unloaded (kinematic) transmission error. rigid_bearings: the nodes on the axes are held, not of
-    a set. mesh: name of the engagement; None: the first, of a set all. pitches: teeth of gear A for all that differs
-    from tooth to tooth. progress: called with the part done and the torque. parameters: of the kernel, e.g. slices=10.
+    driving torque: the unloaded (kinematic) transmission error. mesh: name of the engagement; None: the first, of
+    a set all. pitches: teeth of gear A for all that differs from tooth to tooth. progress: called with the part done
+    and the torque. parameters: of the kernel, e.g. slices=10; with "effect.bearings" 0 axes are held.
 
     A torque without equilibrium is named in `failed` with its limit; SimulationError(no_equilibrium) where none has
     one.
     """
     planets = len(model.stage.engagements) // len(GEARS) if model.stage.carriers and mesh is None else 0
     place = place_of(model, f"{GEARS[0]}_planet1" if planets else mesh)
-    at = _of_set(model, place, planets, parameters) if planets else _of_mesh(model, place, rigid_bearings, parameters)
+    at = _of_set(model, place, planets, parameters) if planets else _of_mesh(model, place, parameters)
     position, least = np.arange(pitches * positions) / positions, LEAST * place.most
     found: list[list[_Point]] = [[] for _ in torques]
 
@@ -245,9 +244,9 @@ class _Point(NamedTuple):
 _At = Callable[[float, float], _Point]  # position in pitches, torque N·m → equilibrium
 
 
-def _of_mesh(model: StageModel, place: MeshPlace, rigid_bearings: bool, parameters: Mapping[str, float]) -> _At:
+def _of_mesh(model: StageModel, place: MeshPlace, parameters: Mapping[str, float]) -> _At:
     held = statics_of(model, **{**parameters, "effect.bearings": 0.0})
-    kernel = held if rigid_bearings else statics_of(model, **parameters)
+    kernel = statics_of(model, **parameters) if parameters.get("effect.bearings", 1.0) else held
 
     def at(part: float, torque: float) -> _Point:
         angle = -part * place.pitch
