@@ -12,9 +12,16 @@ import numpy as np
 from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
-from gearfmu.report.plots_set import PlanetSet, planet_set
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
-from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
+from gearfmu.report.signals import (
+    PlanetSet,
+    Window,
+    known_meshings,
+    mesh_angles,
+    meshes,
+    planet_set,
+    window_of_interest,
+)
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.deformation import Deformation

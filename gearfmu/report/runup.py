@@ -15,8 +15,7 @@ from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, loudest_sensors
-from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
-from gearfmu.report.signals import GEAR_SPEED, Window, bearings
+from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
@@ -220,7 +219,7 @@ def _force(part: Trace, name: str) -> Signal:
         own = ACCELERATIONS
         return Signal(part[name], own.unit, own.reference, {}, metrics.sample_step(part.time))
     step = metrics.sample_step(part.time) if f"{name}_mean" in part else 0.0
-    return Signal(mean_or_sample(part, name), "N", 1.0, {}, step)
+    return Signal(part[recorded(part, name)], "N", 1.0, {}, step)
 
 
 def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:

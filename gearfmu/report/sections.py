@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from gearfmu.report import heading, page, plots_nvh, plots_set
+from gearfmu.report import heading, page, plots_nvh
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words, plain
+from gearfmu.report.planets import planet_results, shares
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
@@ -73,7 +74,7 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
 def _most_loaded(run: Run) -> list[tuple[str, str, str]]:
     assert run.planets is not None
     try:
-        means = plots_set.shares(run.trace, run.planets, run.window)[1]
+        means = shares(run.trace, run.planets, run.window)[1]
     except MetricsError:
         return []
     mesh = max(means, key=lambda name: means[name])
@@ -132,7 +133,7 @@ def planets(run: Run) -> list[str]:
     if run.planets is None:
         return []
     try:
-        table = page.table(*plots_set.results(run.trace, run.planets, run.window))
+        table = page.table(*planet_results(run.trace, run.planets, run.window))
     except MetricsError:
         return []
     window = run.window

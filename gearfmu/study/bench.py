@@ -24,10 +24,10 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import StageModel, Trace, assemble
+from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.model import integrator_of
 from gearfmu.stage.build.tables import ROLLS
-from gearfmu.study.norm import Signals, set_signals, signals_of
+from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
@@ -172,7 +172,7 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     return Run(
         point,
         integrator,
-        _signals(result.trace, model, scene.settle if end > scene.settle else 0.0),
+        signals_of(result.trace, model.stage, scene.settle if end > scene.settle else 0.0),
         end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
         int(facts["solver.n_dyn"]),
         result.outcome,
@@ -180,14 +180,6 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         done.kernel.warning,
         done.recording,
     )
-
-
-def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
-    """What a run of a pair or of a planetary set is judged by."""
-    if model.stage.carriers:
-        return set_signals(trace, model.stage, settle)
-    pinion, wheel = (gear.name for gear in model.stage.gears)
-    return signals_of(trace, (pinion, wheel), settle)
 
 
 def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:
