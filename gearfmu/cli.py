@@ -55,7 +55,7 @@ VERBS = {
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "compare": ("gearfmu.commands.runs:compare", "Compare two or more traces in one page."),
     "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),
-    "plan": ("gearfmu.commands.plan:plan", "Effects, level and step of a scene by an error budget: plan.toml."),
+    "plan": ("gearfmu.commands.sweep:plan", "Effects, level and step of a scene by an error budget: plan.toml."),
     "convert": ("gearfmu.commands.files:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),

@@ -27,8 +27,8 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.exchange import convert as convert_trace
+from gearfmu.stage.run.simulate import wound_starts, write_starts
 from gearfmu.stage.run.steady import parameters
-from gearfmu.stage.run.windup import wound_starts, write_starts
 
 
 def export(

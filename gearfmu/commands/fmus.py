@@ -72,7 +72,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     from gearfmu import fmu
     from gearfmu.api.results import windup_file, with_windup
     from gearfmu.commands.models import model_in_scene, model_of, parameters
-    from gearfmu.stage.run.windup import write_starts
+    from gearfmu.stage.run.simulate import write_starts
 
     scene, observe = how.pop("scene"), how.pop("observe")
     if scene is not None:

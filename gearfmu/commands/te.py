@@ -132,7 +132,7 @@ def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> TeRe
 
 def _draw_flanks(model: StageModel, out: Path) -> None:
     """A picture of the flanks beside the table, where they are not nominal."""
-    from gearfmu.report.flanks import write_flanks
+    from gearfmu.report.te import write_flanks
 
     picture = out.with_name(f"{out.stem}_flanks.png")
     if write_flanks(model.stage, picture):

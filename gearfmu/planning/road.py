@@ -12,8 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gearfmu.cosim.coupled import CoupledRun, Saved
-from gearfmu.cosim.fmu_state import kernel_bytes, with_kernel_bytes
-from gearfmu.cosim.fmu_unit import FmuUnit
+from gearfmu.cosim.fmu_unit import FmuUnit, kernel_bytes, with_kernel_bytes
 from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run
 from gearfmu.planning.choice import Choice

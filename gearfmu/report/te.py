@@ -1,5 +1,5 @@
 """Picture of a loaded transmission error: each torque about its mean, its harmonics, mesh stiffness and load over the
-width; of a planetary set how its planets share the load."""
+width; of a planetary set the shares of its planets. Picture of flanks that are not nominal."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearfmu.report.style import COLOURS, MUTED, WIDTH, styled, written
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.stage.build.flanks import FlankField
 from gearfmu.stage.run.te import TeResult
 
 NOISE = 1e-10  # m
@@ -141,3 +144,37 @@ def _show_at_least(axis: Axes, low: float, high: float) -> None:
     """Widen the vertical axis, so that rounding noise does not fill it."""
     lowest, highest = axis.get_ylim()
     axis.set_ylim(min(low, lowest), max(high, highest))
+
+
+ROW = 2.2  # inches of a gear
+
+
+def write_flanks(stage: Stage, path: Path) -> bool:
+    """Write a picture with one row for every gear whose flanks are not nominal: material over the length of roll at
+    mid-width and over the face width at the middle roll, all teeth, and index deviations by tooth; left flanks in
+    full lines, right ones in broken ones. False, and no file, where all are nominal."""
+    fields = [field for gear in stage.gears if (field := FlankField(gear, gear_shape(gear))).any]
+    if not fields:
+        return False
+    with styled():
+        figure = Figure(figsize=(WIDTH, ROW * len(fields) + 0.3), layout="constrained")
+        rows = figure.subplots(len(fields), 3, squeeze=False)
+        for axes, field in zip(rows, fields, strict=True):
+            _draw(axes, field)
+        written(figure, path)
+    return True
+
+
+def _draw(axes: Sequence[Axes], field: FlankField) -> None:
+    """One gear."""
+    along, across, by_tooth = axes
+    z = np.linspace(-0.5, 0.5, 33) * field.gear.face_width
+    material, rolls = field.whole(z), field.rolls
+    index = np.broadcast_to(field.index(), (2, field.gear.teeth))
+    for flank, style in ((0, "-"), (1, "--")):
+        along.plot(1e3 * rolls, 1e6 * material[:, flank, z.size // 2].T, style, color=COLOURS[flank], lw=0.7)
+        across.plot(1e3 * z, 1e6 * material[:, flank, :, rolls.size // 2].T, style, color=COLOURS[flank], lw=0.7)
+        by_tooth.plot(1e6 * index[flank], style, color=COLOURS[flank], marker=".", ms=3)
+    along.set(xlabel="length of roll in mm", ylabel=f"{field.gear.name}: material in µm")
+    across.set(xlabel="place across the face width in mm")
+    by_tooth.set(xlabel="tooth", ylabel="index deviation in µm")
