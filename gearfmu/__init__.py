@@ -13,7 +13,7 @@
     gf.sweep("fzg_c", {"torque": [100.0, 200.0, 300.0]}, "out/harris")
 
 Numbers are SI; text carries its unit. `docs/howto-python.md` shows more, `gearfmu --help` the same on the command line.
-What is named here is imported when it is used.
+Names listed here are imported on first use.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The command line. Verbs are loaded when they are called, so that help and errors come at once."""
+"""The command line. Verbs are loaded when they are called, so that help and errors come without delay."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ VERBS = {
 
 
 class Verbs(click.Group):
-    """A group that knows its commands by name and imports one only to run it."""
+    """A group that lists its commands by name and imports one only to run it."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)

@@ -1,4 +1,4 @@
-"""Effects, level, step and slices by an error budget; many points at once."""
+"""Effects, level, step and slices by an error budget; sweeps of many points."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def plan(
     waveform : largest error of the waveforms in the band after a common delay, "5 %".
     on : number of processes for the trials, this one when None; or a dask scheduler's address, Client or cluster.
     how : may_drop, names of effects that may be left out though they cost little; fresh=True plans anew what was
-        planned before; tell, called with a text as the search goes on; name of the scene in plan.toml.
+        planned before; tell, called with a text during the search; name of the scene in plan.toml.
 
     `Plan.save(path)` writes plan.toml, `gf.run_plan` runs it. SpecError with all that is wrong with the request;
     PlanError where an output is silent in the band, the full model does not run, or a waveform does not repeat.
@@ -98,11 +98,11 @@ def sweep(
     over : values by key, a list each or one value: their grid. Or a list of points. Keys: `torque`, `speed`;
         `stage.<field of the stage file>`; of a scene its fields; of a stage alone duration, step, settle, positions
         and parameters of the kernel. Values as text with units ("302 N*m") or SI numbers.
-    out : folder of the files. A sweep that was interrupted goes on: points that are there are not computed again.
+    out : folder of the files. An interrupted sweep is continued: finished points are not computed again.
     traces : keep the trace of every run, as out/traces/*.h5 (`SweepTable.trace`).
     on : number of processes of this machine, all its cores when None; or the address of a dask scheduler
         ("tcp://host:8786"), a dask Client or cluster (gearfmu[dist]).
-    progress : called with the part that is done, 0 … 1, and what is done.
+    progress : called with the part done, 0 … 1, and the present task.
 
     A point that fails, or whose workers die, is a row with its outcome by name (`SweepTable.failures`). Raises
     SweepError, SpecError where no point can be made, BodyError where bodies that are missing cannot be.

@@ -1,4 +1,4 @@
-"""What is handed on: the FMU, the report, traces in other formats."""
+"""Results for others: the FMU, the report, traces in other formats."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def trace_file(path: PathLike) -> Path:
 
 
 def _labels(runs: Sequence[Run], sources: Sequence[Trace | PathLike]) -> list[str]:
-    """What tells the runs apart: stage, else scene, else folder or file, else a number."""
+    """Names that distinguish the runs: stage, else scene, else folder or file, else a number."""
     files = [str(n + 1) if isinstance(s, Trace) else _short(s) for n, s in enumerate(sources)]
     choices = ([run.stage_name for run in runs], [run.title for run in runs], files)
     return next((found for found in choices if len(set(found)) == len(found)), [str(n + 1) for n in range(len(runs))])

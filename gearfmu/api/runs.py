@@ -1,4 +1,4 @@
-"""What a stage does: loaded transmission error, a run alone, a run in a scene."""
+"""Statics and runs of a stage: loaded transmission error, a run alone, a run in a scene."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def run(
     verify : run again at half the communication step and estimate the coupling error.
     progress : called with the part that is done, 0 … 1.
 
-    The trace's meta is the summary, with the outcome: "ok", or what stopped the run. Raises SpecError, BodyError,
+    The trace's meta is the summary, with the outcome: "ok", or the reason of an early end. Raises SpecError, BodyError,
     FmuError and CouplingError where the run cannot begin.
     """
     spec, own = _scene_and_stage(scene, stage)

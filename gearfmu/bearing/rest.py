@@ -1,4 +1,4 @@
-"""Where a bearing stands under a load: the least of U(d) − F·d, found by damped Newton steps."""
+"""Equilibrium of a bearing under a load: the least of U(d) − F·d, found by damped Newton steps."""
 
 from __future__ import annotations
 

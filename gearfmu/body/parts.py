@@ -1,4 +1,4 @@
-"""What every method to a gear body gives, and its pictures, for bodies meshed here and made elsewhere; how a body was
+"""Results of every method to a gear body, and its pictures, for bodies meshed here and made elsewhere; how a body was
 made."""
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def provenance(seconds: float) -> dict[str, Any]:
 
 
 def _peak_memory() -> float | None:
-    """Largest resident memory of this process so far; None where the system does not tell (Windows)."""
+    """Largest resident memory of this process so far; None where the system does not report it (Windows)."""
     if sys.platform == "win32":
         return None
     import resource

@@ -42,7 +42,7 @@ Progress = Callable[[str, float], None]
 
 
 def gear_work(member: Member) -> Work | None:
-    """What the reduction of a gear meshed here takes; None of one meshed elsewhere. Raises MeshError."""
+    """Memory and time for the reduction of a gear meshed here; None of one meshed elsewhere. Raises MeshError."""
     gear, geometry = member.gear, member.geometry
     if gear.imported is not None:
         return None

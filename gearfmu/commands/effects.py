@@ -1,4 +1,4 @@
-"""The verb effects: the table of effects (stage/effects.py), with a stage what it has."""
+"""The verb effects: the table of effects (stage/effects.py), with a stage its own numbers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FIELDS = ("formula", "matters", "off", "switch", "code")
 @click.command()
 @click.argument("stage", required=False, shell_complete=stage_names)
 def effects(stage: str | None) -> None:
-    """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
+    """The effects there are: formula, when each matters, its price, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs
     from gearfmu.stage.run.inertia import NEGLECTED
 
@@ -48,7 +48,7 @@ def _cost(cost: Cost | None) -> str:
 
 
 def _numbers(stage: str) -> dict[str, str]:
-    """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
+    """Data of a stage for each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
     from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape
@@ -122,7 +122,7 @@ def _film(stage: Stage, mesh: EngagementSpec) -> str:
 
 
 def _whirling(model: StageModel) -> str:
-    """What turning does to the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
+    """Influence of rotation on the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
     from gearfmu.body import load_bodies
     from gearfmu.stage.run.inertia import WHIRL_BAND, whirling
 
@@ -135,7 +135,7 @@ def _whirling(model: StageModel) -> str:
 
 
 def _left_out(stage: str) -> Iterable[str]:
-    """Sizes of what is left out, a line for every gear whose file tells."""
+    """Sizes of neglected terms, a line for every gear whose file has them."""
     from gearfmu.commands.models import bodies_of
     from gearfmu.stage.build.observed import gear_bodies
     from gearfmu.stage.run.inertia import inertia_terms

@@ -24,8 +24,8 @@ UNITS = {
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def inspect(path: Path, as_json: bool) -> None:
-    """Say what FILE holds: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage. Lengths
-    in mm or µm, angles in degrees, speeds in rpm; with --json all in SI."""
+    """Show the contents of FILE: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage.
+    Lengths in mm or µm, angles in degrees, speeds in rpm; with --json all in SI."""
     if as_json:
         click.echo(json.dumps(facts_of(path), indent=2, ensure_ascii=False, default=str))
     else:
@@ -60,7 +60,7 @@ def _schema_text(kind: str) -> str:
 
 
 def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
-    """What the file at `path` holds, by its kind; plain: numbers in SI, else specs with quantities as text. Raises
+    """Contents of the file at `path`, by its kind; plain: numbers in SI, else specs with quantities as text. Raises
     GearfmuError for a file that is none of ours."""
     from gearfmu.errors import GearfmuError
 
@@ -75,7 +75,7 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 
 
 def _shipped(name: Path) -> Path:
-    """File of a shipped scene, or of a stage as `find_stage` knows it; an error that names all when there is none."""
+    """File of a shipped scene, or of a stage as `find_stage` finds it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
     from gearfmu.spec.reading.library import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
@@ -152,7 +152,7 @@ def _toml(path: Path) -> dict[str, Any]:
 
 
 def _needs(stage: Stage) -> str | dict[str, dict[str, float]]:
-    """What the reduction of every body takes, estimated from its mesh; or why it cannot be meshed."""
+    """Unknowns and memory for the reduction of every body, estimated from its mesh; or why it cannot be meshed."""
     from gearfmu.body import body_needs
     from gearfmu.errors import MeshError
 
@@ -179,7 +179,7 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
 
 
 def in_units(found: object, key: str = "") -> Any:
-    """Numbers whose unit the name does not tell as text with it, here in what follows from a stage and in bodies."""
+    """Numbers without a unit in their name as text with it, here in what follows from a stage and in bodies."""
     from gearfmu.units import quantity_text
 
     if isinstance(found, dict):

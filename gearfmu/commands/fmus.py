@@ -98,7 +98,7 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
 
 
 def how_to_load(path: Path, model: StageModel) -> str:
-    """What an importer connects, and how Python loads the FMU."""
+    """Inputs for an importer to connect, and how Python loads the FMU."""
     names = [variable.name for variable in model.kernel_variables() if variable.causality == "input"]
     connect = f"connect {', '.join(names[:6])}{' …' if len(names) > 6 else ''}" if names else "it has no inputs"
     return (

@@ -62,7 +62,7 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list
 @contextmanager
 def reducing(title: str = "reducing") -> Iterator[Progress]:
     """A progress function for the reduction of bodies: a bar on a terminal, else a line on standard error for every
-    body that is being made, and every ten seconds one that says what is being done and how far it is."""
+    body that is being made, and every ten seconds one with the present task and its share done."""
     with progress_bar(title, named=_body) as progress:
         yield progress
 
@@ -73,13 +73,13 @@ def _body(text: str) -> str:
 
 
 def by_text(progress: Progress) -> Callable[[str, float], None]:
-    """The progress function of reduce_bodies, called with (what is being done, share done)."""
+    """The progress function of reduce_bodies, called with (present task, share done)."""
     return lambda text, share: progress(share, text)
 
 
 def parameters(model: StageModel, settings: tuple[str, ...], option: str = "--set") -> dict[str, float]:
-    """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for what the model
-    does not know, SpecError for numbers out of range."""
+    """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for names that the
+    model lacks, SpecError for numbers out of range."""
     from gearfmu.errors import ModelError
     from gearfmu.stage.run import steady
 

@@ -112,7 +112,7 @@ def stage_table(found: StageModes) -> list[str]:
 
 def crossing_lines(found: Iterable[Crossing], shaft: str, several: bool) -> list[str]:
     """A line for each mode and each kind of equal meshes: the orders that meet it, and where. several: the stage has
-    several meshes, whose names are told."""
+    several meshes, whose names are given."""
     lines: dict[tuple[str, int], list[str]] = {}
     for crossing in found:
         rpm = 30 / math.pi * crossing.speed

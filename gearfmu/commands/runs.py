@@ -23,7 +23,7 @@ OUT = click.Path(path_type=Path, file_okay=False)
 
 
 def _list(context: click.Context, option: object, wanted: bool) -> None:
-    """Print the shipped scenes and what they show, and end."""
+    """Print the shipped scenes with their descriptions, and end."""
     if not wanted or context.resilient_parsing:
         return
     from gearfmu.spec.scene import load_scene, shipped_scenes
@@ -230,7 +230,7 @@ def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:
 
 
 def run_plan(path: Path, out: Path | None, unit: str | Path) -> int:
-    """Run a plan.toml, print what became of it; 0 when the run reached its end, else 1."""
+    """Run a plan.toml, print its outcome; 0 when the run reached its end, else 1."""
     from gearfmu.api.plans import run_plan as run_it
     from gearfmu.planning.book import Plan
     from gearfmu.planning.table import run_text

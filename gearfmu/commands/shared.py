@@ -1,4 +1,4 @@
-"""What several verbs share: quantities with units as options, progress bars, printing of name–value lists."""
+"""Shared by several verbs: quantities with units as options, progress bars, printing of name–value lists."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def progress_bar(title: str, named: Callable[[str], str] | None = None) -> Itera
 
 
 class Told:
-    """Lines of progress on standard error: one every `_EVERY` seconds that says what is being done, how far it is and
+    """Lines of progress on standard error: one every `_EVERY` seconds with the present task, its share done and
     for how long nothing new was heard; and one for every new `named(text)`, where that is given."""
 
     def __init__(self, title: str, named: Callable[[str], str] | None = None) -> None:
@@ -113,7 +113,7 @@ class Told:
         self._end.set()
 
     def __call__(self, fraction: float | None, text: str = "") -> None:
-        """What is done now, and the share of it that is done; None where that is not known."""
+        """The present task, and the share of it that is done; None where that is not known."""
         text, share = text.removeprefix(f"{self.title} "), "" if fraction is None else f"{100 * fraction:.0f} %"
         self._doing, self._heard = ", ".join(part for part in (text, share) if part), time.monotonic()
         if self._named and (part := self._named(text)) not in self._seen:
@@ -123,7 +123,7 @@ class Told:
             self._tell_if_due()
 
     def _beat(self) -> None:
-        """Tells also while nothing is heard."""
+        """Reports also while no news arrives."""
         while not self._end.wait(0.1 * _EVERY):
             self._tell_if_due()
 

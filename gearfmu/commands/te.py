@@ -140,7 +140,7 @@ def _draw_flanks(model: StageModel, out: Path) -> None:
 
 
 def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
-    """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
+    """Say on standard error which torques (N·m) on the input are beyond the limits of the stage."""
     from gearfmu.stage.run.limits import beyond_limits
 
     for torque in torques:
@@ -171,7 +171,7 @@ def efficiency(stage: str, torque: float, speed: float, pitches: int, level: str
     P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction. Power
     is that which rolls through a mesh: in a planetary set less than the input's.
 
-    The coefficient follows what the stage says ([contact] friction), else it is 0.05. Losses of bearings, seals and
+    The coefficient follows the stage file ([contact] friction), else it is 0.05. Losses of bearings, seals and
     churned oil are in neither number."""
     from gearfmu.commands.models import level_of
     from gearfmu.stage.run.efficiency import mesh_efficiency

@@ -124,7 +124,7 @@ class KernelUnit:
         self.kernel.restore(state)
 
     def adopt(self, other: KernelUnit) -> None:
-        """Instead of `initialize`: go on where `other` stands (`Kernel.adopt`)."""
+        """Instead of `initialize`: continue from the state of `other` (`Kernel.adopt`)."""
         self.kernel.adopt(other.kernel)
 
     def close(self) -> None:
@@ -132,7 +132,7 @@ class KernelUnit:
 
 
 class UnitSource(Protocol):
-    """What a run needs of a source: the stage's model, and a fresh unit of it with these start values."""
+    """A source of the stage of a run: its model, and a fresh unit of it with these start values."""
 
     @property
     def model(self) -> StageModel: ...

@@ -44,7 +44,7 @@ WHOLE = Wiring()
 @dataclass(frozen=True)
 class Staged:
     """A scene with the model of its stage, whose ports are those that the scene's drivetrain needs. fmu : the FMU that
-    the model was taken from, None for one that was assembled; remarks : in what the FMU's ports differ."""
+    the model was taken from, None for one that was assembled; remarks : differences of the FMU's ports."""
 
     scene: SceneSpec
     model: StageModel
@@ -92,9 +92,9 @@ def run(
 
     unit : "fmu" (exported into out_dir) or "kernel". fmu_path : an FMU exported earlier, whose stage is run in place of
     the scene's (`Staged.of_fmu`).
-    verify : run again with half the communication step and estimate the coupling error. progress : told the done
-    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
-    [deformation]. The trace's meta is the summary: outcome "ok" or the name of what stopped the run, last good time,
+    verify : run again with half the communication step and estimate the coupling error. progress : called with
+    the part done, 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
+    [deformation]. The trace's meta is the summary: outcome "ok" or the reason of an early end, last good time,
     CPU time of the whole loop, energy residual of the cut, errors, hashes, versions. Raises CouplingError, SpecError,
     BodyError, FmuError when the run cannot begin.
     """
@@ -202,7 +202,7 @@ def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None 
 
 
 def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
-    """Of the stage: what the scene chooses and what follows from it."""
+    """Of the stage: values that the scene chooses or that follow from it."""
     choice = scene.stage
     return {
         "level": choice.level,

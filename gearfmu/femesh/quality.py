@@ -37,7 +37,7 @@ def flank_element_length(grid: FlankGrid, r_b: float) -> float:
 def mesh_report(mesh: FeMesh, r_b: float | None = None, strip_half_width: float | None = None) -> dict[str, Any]:
     """Plain facts of a mesh: counts, quality, volume (m³).
 
-    With the base radius r_b (m) also the length of its flank elements (m), with the load strip (m) how many lie in one.
+    With the base radius r_b (m) also the length of its flank elements (m), with the load patch (m) their number in one.
     """
     quality = scaled_jacobian(mesh)
     facts: dict[str, Any] = {

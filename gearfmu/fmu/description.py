@@ -36,7 +36,7 @@ LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class Identity:
-    """What modelDescription.xml says about the FMU as a whole.
+    """Entries of modelDescription.xml about the FMU as a whole.
 
     identifier: modelIdentifier, a C name; guid: of the model, checked by the binary; native: the binary needs
     nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/;
@@ -96,7 +96,7 @@ def enumeration_type(variable: Variable) -> str:
 
 
 def _capabilities(identity: Identity) -> dict[str, str]:
-    """Only what is real: input interpolation, output derivatives and directional derivatives are not offered."""
+    """No more than implemented: input interpolation, output derivatives and directional derivatives are not offered."""
     able = {
         "canHandleVariableCommunicationStepSize": True,
         "canGetAndSetFMUstate": True,

@@ -42,7 +42,7 @@ LONGEST_NAME = 40
 
 
 class Extras(TypedDict, total=False):
-    """What an FMU may also carry. terminals : terminalsAndIcons.xml, which FMI Library 3 refuses in FMI 2
+    """Optional contents of an FMU. terminals : terminalsAndIcons.xml, which FMI Library 3 refuses in FMI 2
     (docs/howto-fmu.md). sources : the C sources of the binary and a build description (native only). author,
     copyright, license : of the model, for its description; nothing is said there without them."""
 
@@ -205,7 +205,7 @@ def _pythonfmu_folder() -> Path:
 
 
 def source_files() -> dict[str, bytes]:
-    """Path below sources/ → content: the C files of the kernel, what they include, and the headers of FMI 2."""
+    """Path below sources/ → content: the C files of the kernel, included files, and the headers of FMI 2."""
     root = HERE / "src"
     own = {path.relative_to(root).as_posix(): path for path in sources()}
     head = {".c": HIDDEN.encode()}

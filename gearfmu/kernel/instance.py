@@ -309,7 +309,7 @@ class Recording:
 
     def advance(self, steps: int, given: Mapping[str, np.ndarray] | None = None) -> None:
         """Make `steps` more. given: inputs by name, each (steps,), set before every step. ModelError where one is
-        refused; SimulationError where a step fails: what was made until then is kept."""
+        refused; SimulationError where a step fails: steps made until then are kept."""
         given = given or {}
         assert self.done + steps < len(self.rows) and all(values.shape == (steps,) for values in given.values())
         inputs, references = np.empty((steps, len(given))), self.kernel.references(given)

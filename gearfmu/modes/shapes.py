@@ -1,4 +1,4 @@
-"""Modes of one body with their shapes on its surface: what pictures, .vtu files and tables are made from."""
+"""Modes of one body with their shapes on its surface: the source of pictures, .vtu files and tables."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Mode:
 
     @property
     def name(self) -> str:
-        """What the shape is called: umbrella, torsion, breathing, tilting, …"""
+        """Name of the shape: umbrella, torsion, breathing, tilting, …"""
         radial, tangential, axial = self.energy
         if self.motion == "out-of-plane":
             return {0: "umbrella" if axial > 0.5 else "counter-torsion", 1: "tilting"}.get(
@@ -94,7 +94,7 @@ def harmonic_shares(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """Parts (MOST + 1,) of a shape's mean square that go with cos and sin of ν times the angle, ν = 0 … MOST.
 
     points (P, 3) m of a body of revolution or nearly so, shape (P, 3). The cylindrical components of the points in each
-    ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time: where points stand at few
+    ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time: where points lie at few
     angles, as on bolts, several ν fit and the parts add up to more than 1.
     """
     angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])

@@ -55,7 +55,7 @@ class Segment:
     was taken over settled before, s; bound, error: of the chosen set, budgets; safety: what the bound is multiplied by;
     noise: of the full model, budgets; price: processor time of the stage over that of level fast at its default step;
     realtime: processor seconds of the stage per simulated second. price_full, price_default, error_default: of the full
-    model and of what the scene asks for itself.
+    model and of the outputs that the scene itself records.
     """
 
     name: str

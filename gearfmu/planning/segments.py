@@ -61,7 +61,7 @@ def parts(scene: SceneSpec, model: StageModel, request: Request) -> Iterator[Par
 def _transient(
     name: str, span: tuple[float, float], scene: SceneSpec, known: tuple[StageModel, Request, float, float]
 ) -> Part:
-    """A part of a transient scene; its window lies in it, after settling where there is room."""
+    """A part of a transient scene; its window lies in it, after settling where it is long enough."""
     start, end = span
     length, settle = first_window(*known)
     room = end - start

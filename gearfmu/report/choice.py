@@ -1,4 +1,4 @@
-"""Which figures a run is told by: a pair or train mesh by mesh, a set planet by planet, a run-up by its orders."""
+"""Choice of a run's figures: a pair or train mesh by mesh, a set planet by planet, a run-up by its orders."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _late(run: Run) -> tuple[float, float]:
 
 
 def _deformed(run: Run) -> tuple[list[Maker], list[str]]:
-    """What makes the pictures and films of deformed gears, and why others are missing."""
+    """Makers of pictures and films of deformed gears, and why others are missing."""
     gears, missing = deformed_gears(run)
     kinds = (drawn.pictures, drawn.film)
     assert run.deformation is not None or not gears

@@ -58,7 +58,7 @@ def error_curves(
 
 
 def label_of(method: str) -> str:
-    """A method's name for a legend; what follows a blank in `method` stays as it is."""
+    """A method's name for a legend; text behind a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
 

@@ -1,4 +1,4 @@
-"""What a report begins with: the stage and its operating point, and the key numbers of a planetary set."""
+"""Head of a report: the stage and its operating point, and the key numbers of a planetary set."""
 
 from __future__ import annotations
 

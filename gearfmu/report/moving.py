@@ -84,7 +84,7 @@ class View:
 
     @property
     def caption(self) -> str:
-        """What is seen, and what was left out."""
+        """Caption: visible bodies and omissions."""
         span = 1e3 * (self.time[-1] - self.time[0])
         text = (
             f"{span:.3g} ms of the run, slowed down; gears turn by their recorded angles. Elastic displacement under "
@@ -166,7 +166,7 @@ def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray,
 
 
 def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
-    """Angle (n,) rad of a rotor in the fixed axes; a rotor that stands does not turn."""
+    """Angle (n,) rad of a rotor in the fixed axes; a rotor at rest does not turn."""
     if stage.rotors[rotor].stands:
         return np.zeros(trace.time.size)
     return trace[f"{rotor}{GEAR_PHI}"] if f"{rotor}{GEAR_PHI}" in trace else None

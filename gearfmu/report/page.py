@@ -70,7 +70,7 @@ def contents(links: Mapping[str, str]) -> str:
 
 
 def tiles(results: Sequence[tuple[str, str, str]]) -> str:
-    """The key results: value, unit, what it is."""
+    """The key results: value, unit, description."""
     found = "".join(
         f"<div><b>{escape(value.replace('-', '−'))}<small>{escape(unit)}</small></b><span>{escape(label)}</span></div>"
         for value, unit, label in results
@@ -79,7 +79,7 @@ def tiles(results: Sequence[tuple[str, str, str]]) -> str:
 
 
 def facts(pairs: Mapping[str, str]) -> str:
-    """How it was run: what it is → value."""
+    """Conditions of the run: description → value."""
     rows = "".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in pairs.items())
     return f'<dl class="run">{rows}</dl>'
 
@@ -119,7 +119,7 @@ def _told(plot: Plot) -> str:
 
 
 def section(title: str, *parts: str, name: str = "") -> str:
-    """A titled section around ready-made parts; name: what links call it."""
+    """A titled section around ready-made parts; name: target of links."""
     mark = f' id="{name}"' if name else ""
     return f"<section{mark}><h2>{escape(title)}</h2>{''.join(parts)}</section>"
 

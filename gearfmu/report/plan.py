@@ -1,4 +1,4 @@
-"""What a planned run tells of its plan: effects with their error and price, the work–precision chart, tripwires, spot
+"""Chapter on the plan of a planned run: effects with their error and price, the work–precision chart, tripwires, spot
 checks. Everything comes from the trace's meta "plan" (gearfmu/planning/run.py); nothing is computed here."""
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _told(item: Mapping[str, Any], kind: str) -> str:
 
 
 def _number(value: float | None) -> str:
-    """None is what JSON has for a failed run or an unknown number."""
+    """None: of a failed run, or an unknown number."""
     return "" if value is None else f"{value:.2g}"
 
 
@@ -115,7 +115,7 @@ def _precision(panel: Axes, segment: Mapping[str, Any]) -> None:
 
 
 def _bars(left: Axes, right: Axes, lines: Sequence[Mapping[str, Any]]) -> None:
-    """Errors, and savings, of what was a choice."""
+    """Errors and savings of the choices."""
     known = [line for line in lines if line["error"] is not None or line["effect"] in ("modes", "slices", "step")]
     places = list(range(len(known)))
     error = [min(line["error"] or 0.0, MOST_SHOWN) for line in known]

@@ -149,7 +149,7 @@ def pin_force(trace: Trace, planet: str) -> np.ndarray | None:
 
 
 def energy(trace: Trace) -> Plot | None:
-    """Work of every shaft, stored and dissipated energy, and what the balance leaves."""
+    """Work of every shaft, stored and dissipated energy, and the residual of the balance."""
     works = [name for name in trace.channels if name.startswith("drive.") and name.endswith(".work")]
     works = [name for name in works if name != "drive.energy.work"] or ["energy.work"]
     if any(name not in trace for name in (*works, *ENERGIES)):

@@ -33,12 +33,12 @@ SENSOR = "sensor."
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 MARKED_ORDERS = 12  # of a set
 STEADY = 0.1  # nine tenths of the speeds lie as close together, over their median, where mesh orders are marked
-SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
+SHOWN_TO = 12e3  # Hz; the data reach half the sampling rate
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Of signals: what the names of their figures begin with, title of their spectra, unit, reference of levels."""
+    """Of signals: prefix of the names of their figures, title of their spectra, unit, reference of levels."""
 
     prefix: str
     spectra: str
@@ -61,7 +61,7 @@ ACCELERATIONS = Kind("housing_", "Spectra of the accelerations of the housing", 
 
 def force_channels(trace: Trace) -> list[str]:
     """The channels whose sound matters: bearing forces, then mesh forces. Where the mean over the communication step
-    was recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back. Forces that
+    was recorded ("…_mean") it replaces the sample at its end: averaging weakens folded parts. Forces that
     cancel are left out (`noise_floor`)."""
     names = [f"bearing.{name}.{direction}" for name in bearings(trace) for direction in ("fx", "fy")]
     names += [f"{mesh}.force" for mesh in meshes(trace)]

@@ -67,7 +67,7 @@ class Run:
 
     @cached_property
     def shown_meshes(self) -> list[str]:
-        """Engagements whose statics stand in the report: all, of a set the first of every central gear."""
+        """Engagements with statics in the report: all, of a set the first of every central gear."""
         forces = [mesh for mesh in meshes(self.trace) if f"{mesh}.force" in self.trace]
         if self.planets is None:
             return forces
@@ -99,7 +99,7 @@ class Run:
 
     @property
     def title(self) -> str:
-        """What was run."""
+        """Name of scene or run."""
         return str(self.summary.get("scene") or self.trace.meta.get("scene") or "simulation")
 
     @property

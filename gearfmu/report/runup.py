@@ -24,7 +24,7 @@ from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
-BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution
+BACKWARD = 0.02  # of it: largest loss on the way, wobble of the drive below one swing per revolution
 LEAST_SAMPLES = 5  # between two knots of the spline that follows the angle
 SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
@@ -36,7 +36,7 @@ MODES = 30  # of the linearised stage, the lowest
 
 @dataclass(frozen=True)
 class Signal:
-    """values (n,); unit, and what its level refers to; sides: for every mesh order the orders beside it, of the
+    """values (n,); unit, and reference of its level; sides: for every mesh order the orders beside it, of the
     carrier, that the signal has by the passing of the planets."""
 
     values: np.ndarray

@@ -41,7 +41,7 @@ FACTOR_WORDS = (
 
 
 def tiles(run: Run) -> list[tuple[str, str, str]]:
-    """The key results: value, unit, what it is; of several meshes the largest, with its name."""
+    """The key results: value, unit, description; of several meshes the largest, with its name."""
     results, names = {**key_results(run.trace), **dynamic_factors(run.trace)}, meshes(run.trace)
     found = []
     for key, scale, unit, words in (
@@ -115,7 +115,7 @@ def _row(key: str, value: float, names: Sequence[str]) -> str:
 
 
 def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
-    """A result of key_results: words, its channel, its unit. names: of the meshes; of several the name is told."""
+    """A result of key_results: words, its channel, its unit. names: of the meshes; of several with the name."""
     mesh = next((name for name in names if len(names) > 1 and key.startswith(f"{name}_")), "")
     inner = key.removeprefix(f"{mesh}_") if mesh else key
     if inner in WORDS:
@@ -147,7 +147,7 @@ def planets(run: Run) -> list[str]:
 
 
 def warned(trace: Trace) -> list[str]:
-    """What the sampling does to spectra, as a warning."""
+    """Influence of the sampling on spectra, as a warning."""
     try:
         warning = plots_nvh.sampling_warning(trace)
     except MetricsError:
@@ -207,7 +207,7 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 
 
 def _left_of_slices(run: Run) -> str:
-    """What the number of slices of a helical pair leaves open; "" for other stages, where that takes minutes, and
+    """Error by the number of slices of a helical pair; "" for other stages, where that takes minutes, and
     without torque or bodies."""
     torque = run.summary.get("torque")
     if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
@@ -305,7 +305,7 @@ def provenance(summary: Mapping[str, object]) -> dict[str, str]:
 
 
 def channels(trace: Trace) -> str:
-    """The channels of the trace: plain name, name, unit, what it is."""
+    """The channels of the trace: plain name, name, unit, description."""
     rows = [
         f"<tr><td>{escape(plain(name))}</td><td><code>{escape(name)}</code></td><td>{escape(own.unit)}</td>"
         f"<td>{escape(own.description)}</td></tr>"

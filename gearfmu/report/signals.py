@@ -1,4 +1,4 @@
-"""What a trace tells about itself: which meshes and bearings it has, where it is in steady operation, how fast the
+"""Facts of a trace: which meshes and bearings it has, where it is in steady operation, how fast the
 teeth mesh."""
 
 from __future__ import annotations

@@ -117,7 +117,7 @@ def _about_mean(axis: Axes, drawn: Sequence[Drawn], unit: str) -> None:
 
 
 def _harmonics(axis: Axes, drawn: Sequence[Drawn]) -> None:
-    """Bars side by side; harmonics that the positions cannot tell apart are left out."""
+    """Bars side by side; harmonics that the positions do not resolve are left out."""
     width = 0.8 / len(drawn)
     for number, (colour, _, _, _, line) in enumerate(drawn):
         at = np.arange(1, line.size + 1) + (number - (len(drawn) - 1) / 2) * width

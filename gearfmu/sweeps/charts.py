@@ -22,7 +22,7 @@ LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
 
 
 def write_charts(table: SweepTable, out: Path) -> list[Path]:
-    """Write what the table allows as .png into `out`; returns the paths.
+    """Write the charts of the table as .png into `out`; returns the paths.
 
     harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders
     over torque. levels : of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two

@@ -1,5 +1,5 @@
-"""What is known of a sweep's points, kept as it comes: JSON lines, one a point, so that a sweep that was interrupted
-goes on where it stopped."""
+"""Results of a sweep's points, kept in order of arrival: JSON lines, one a point, so that an interrupted sweep is
+continued."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Journal:
                 file.write("\n")
 
     def get(self, identity: str) -> Outcome | None:
-        """What became of a point, None where it was not computed."""
+        """Outcome of a point, None where it was not computed."""
         return self._known.get(identity)
 
     def add(self, identity: str, outcome: Outcome) -> None:

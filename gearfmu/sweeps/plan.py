@@ -1,4 +1,4 @@
-"""What a sweep computes: points of a grid, and what each key of a point belongs to.
+"""Points of a sweep's grid, and the owner of each key of a point.
 
 A *scene* is run at every point. A *stage* is run alone where its points have a `speed`, else its loaded transmission
 error is taken. Keys:
@@ -61,7 +61,7 @@ class Plan:
     axes: tuple[str, ...]
 
     def unit(self, key: str) -> str | None:
-        """SI unit of a key, "" for a plain number; None for what is no quantity."""
+        """SI unit of a key, "" for a plain number; None where it is no quantity."""
         if key in OWN.get(self.what, {}):
             return OWN[self.what][key]
         quantity = self._quantity(key)

@@ -21,14 +21,14 @@ from gearfmu.sweeps.points import LOST, OK, Outcome, Task, Variant, compute, pre
 from gearfmu.sweeps.runners import Lost, Runner
 from gearfmu.sweeps.table import SweepTable, column, column_name
 
-FORMAT = 1  # of what is kept: points of another format are computed anew
+FORMAT = 1  # of the stored points: those of another format are computed anew
 JOURNAL, TRACES, BODIES = "points.jsonl", "traces", "bodies"
 Progress = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class _Point:
-    """A point, the variant of the stage it stands on, and the fingerprint of all that decides its numbers."""
+    """A point, its variant of the stage, and the fingerprint of all that decides its numbers."""
 
     values: Mapping[str, Any]
     variant: Variant
@@ -36,7 +36,7 @@ class _Point:
 
 
 def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress: Progress | None = None) -> SweepTable:
-    """Compute what is not yet in the folder `out` and return all of it.
+    """Compute the points that are not yet in the folder `out`; returns all.
 
     Writes points.jsonl after every point; at the end sweep.parquet or sweep.csv, of transmission errors also curves.…;
     traces/*.h5 where `traces`; bodies/ where points need other bodies than those beside the stage file, which are made
@@ -80,7 +80,7 @@ def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
 
 def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) -> tuple[Variant, str]:
     """The variant with the folder of its bodies, and a fingerprint of its numbers: a stage that was changed so that
-    the bodies beside its file do not fit has bodies of its own in `out`. fitting: what is known of that, by the
+    the bodies beside its file do not fit has bodies of its own in `out`. fitting: results of this check, by the
     fingerprints of bodies."""
     spec = variant.spec()
     hashes = body_hashes(spec)
@@ -115,7 +115,7 @@ def _prepare(points: list[_Point], runner: Runner, told: Progress) -> None:
 
 
 def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) -> Outcome | None:
-    """What is known of a point: refused ones, and those of the journal that need not be computed again."""
+    """Known outcome of a point: refused ones, and those of the journal that need not be computed again."""
     if isinstance(point, Outcome):
         return point
     known = journal.get(point.identity)

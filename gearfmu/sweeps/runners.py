@@ -26,7 +26,7 @@ Runner = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[tuple[int, Any
 
 @dataclass(frozen=True)
 class Lost:
-    """What stands for a result when workers died over it."""
+    """In place of a result when workers died over it."""
 
     message: str
 

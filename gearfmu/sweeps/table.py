@@ -24,7 +24,7 @@ NO_NUMBERS = ("point", "outcome", "message", "trace")
 @dataclass(frozen=True)
 class SweepTable:
     """columns : name → (n,), one row a point: `point`; the keys of the points, SI, unit behind the name (torque_Nm,
-    speed_rad_s); `outcome`, "ok" or what went wrong; `message`; `trace`, name of its file or ""; then the results, NaN
+    speed_rad_s); `outcome`, "ok" or the fault; `message`; `trace`, name of its file or ""; then the results, NaN
     where a point has none.
     axes : names of the columns that were swept. curves : of a transmission error, the same for all positions of all
     points. folder : of the files.
@@ -46,12 +46,12 @@ class SweepTable:
 
     @property
     def failures(self) -> list[str]:
-        """A sentence for every point that has no results: its values, what went wrong."""
+        """A sentence for every point that has no results: its values, the fault."""
         bad = np.flatnonzero(self["outcome"] != "ok")
         return [f"{self.values(i)}: {self['outcome'][i]}: {self['message'][i]}" for i in bad.tolist()]
 
     def values(self, row: int) -> str:
-        """What was swept, as text: "torque_Nm = 100, speed_rad_s = 200"."""
+        """Swept keys and values, as text: "torque_Nm = 100, speed_rad_s = 200"."""
         return ", ".join(f"{name} = {_shown(self[name][row])}" for name in self.axes)
 
     def trace(self, row: int) -> Trace:

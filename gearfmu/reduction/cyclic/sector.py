@@ -143,7 +143,7 @@ class SectorBody:
 
     @property
     def knows_stress(self) -> bool:
-        """Whether stresses of the spinning body can be told from its mesh, and so what its modes feel."""
+        """Whether stresses of the spinning body follow from its mesh, and so their effect on its modes."""
         return True
 
     @cached_property

@@ -24,7 +24,7 @@ _AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
 
 
 def sound_mesh(source: FilesSpec) -> ImportedMesh:
-    """The mesh of a FilesSpec in metres, its axis along z. MeshError lists what is wrong with it."""
+    """The mesh of a FilesSpec in metres, its axis along z. MeshError lists its faults."""
     file = Path(source.file)
     mesh = read_mesh(file, source.length, tuple(source.ignore))
     mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])

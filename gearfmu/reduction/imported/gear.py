@@ -69,7 +69,7 @@ def checked_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> Checked
 
     source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, is reduced by
     cyclic symmetry; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore by the mean tooth.
-    MeshError lists what is wrong with the files.
+    MeshError lists the faults of the files.
     """
     file = Path(source.file)
     mesh = sound_mesh(source)

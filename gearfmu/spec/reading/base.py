@@ -43,7 +43,7 @@ SpecType = TypeVar("SpecType", bound=Spec)
 @dataclass(frozen=True)
 class Quantity:
     """Annotation of a float field: the name of its range (`gearfmu.ranges`), which says unit and limits, and words that
-    may stand instead of a number.
+    may replace a number.
 
     `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
     plain number.
@@ -232,7 +232,7 @@ def _unknown_key(key: str, known: list[str]) -> str:
 
 
 def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
-    """The fields of the model that stands at `loc` inside a `kind`."""
+    """The fields of the model at `loc` inside a `kind`."""
     choices = [kind]
     for part in loc:
         if field := fields_by_key(choices[0]).get(part):
@@ -264,7 +264,7 @@ def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
 
 
 def _own_first(kind: type[BaseModel]) -> list[str]:
-    """Names of the fields, what the bases have last."""
+    """Names of the fields, those of the bases last."""
     bases = [base for base in kind.__bases__ if issubclass(base, BaseModel)]
     inherited = [name for base in bases for name in _own_first(base)]
     return [name for name in kind.model_fields if name not in inherited] + inherited

@@ -53,7 +53,7 @@ class Card:
 
 
 class Shown:
-    """What a session shows as its `card`; a dataclass of this kind has repr=False."""
+    """Shown in a session as its `card`; a dataclass of this kind has repr=False."""
 
     @property
     def card(self) -> Card:

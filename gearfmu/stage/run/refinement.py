@@ -31,7 +31,7 @@ def twice(stage: Stage, slices: int) -> int:
 
 @dataclass(frozen=True)
 class Change:
-    """What twice the slices change in orders 1 … ORDERS of the static transmission error: the largest change (m), and
+    """Change by twice the slices of orders 1 … ORDERS of the static transmission error: the largest change (m), and
     the largest in level (dB) of those that change by more than HEARD."""
 
     slices: int

@@ -67,7 +67,7 @@ class Steady(Wound):
     @cached_property
     def winding(self) -> float:
         """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh. Its
-        meshes carry the mean of what goes in and what comes out."""
+        meshes carry the mean of input and output."""
         known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
         ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
         taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)

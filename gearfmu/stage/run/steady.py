@@ -81,7 +81,7 @@ class LoadCase:
 
     @property
     def scene(self) -> str:
-        """What the run is, in words."""
+        """Kind of the run, in words."""
         if self.profile is not None:
             return "torque and speed over time"
         return "constant speed and load" if self.end_speed is None else "run-up under constant torque"
@@ -103,7 +103,7 @@ def _case_problems(case: LoadCase) -> Iterator[Problem]:
 
 def parameters(model: StageModel, settings: Mapping[str, object]) -> dict[str, float]:
     """Kernel parameters (docs/variables.md) as numbers, from {"level": "fast", "slices": 10, "effect.hertz": False} or
-    the same as text. ModelError, naming what there is, for a name or value that the model does not know; SpecError
+    the same as text. ModelError, naming the choices, for a name or value that the model lacks; SpecError
     with every number that is out of range, in the words in which a stage file with that number is refused."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     unknown = [name for name in settings if name not in known]

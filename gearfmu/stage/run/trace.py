@@ -49,7 +49,7 @@ class Trace(Shown):
 
     time : (n,) float64, s, strictly increasing.
     channels : name → Channel, each with (n,) finite values; integers and booleans keep their type.
-    meta : what the run was (scene, level, outcome, hashes, …); any JSON value.
+    meta : facts of the run (scene, level, outcome, hashes, …); any JSON value.
 
     Raises TraceError, naming every bad channel, when lengths, order or numbers are not so.
     """
