@@ -1,4 +1,4 @@
-"""Masters: order of steps, values exchanged by a stage (motion in, torque out) and a drivetrain (torque in, motion out).
+"""Masters: a stage (motion in, torque out) and a drivetrain (torque in, motion out) stepped in turn.
 
 gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion over the step with the stage's last mean
          torque and take it back. (2) Step the stage along that motion: φ, w at the start, and the constant
