@@ -50,11 +50,9 @@ def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot | None:
     names = [name for row in rows for name in row]
     if not names:
         return None
-    end = GEAR_SPEED if groups else ""
     panels = []
     for row in rows:
-        values = {n: trace[n] if groups else np.abs(trace[n]) for n in row}
-        curves = (Curve(trace.time, w * RPM, n.removesuffix(end), "rpm") for n, w in values.items())
+        curves = (Curve(trace.time, (trace[n] if groups else np.abs(trace[n])) * RPM, n, "rpm") for n in row)
         panels.append(Panel("speed in rpm", tuple(curves), height=150 if groups else 200))
     means = ", ".join(f"{n.removesuffix(GEAR_SPEED)} {np.mean(trace[n]) * RPM:.1f}" for n in names)
     words = f"Mean in rpm: {means}; the data are in rad/s." if groups else "Magnitudes; the data keep sign and rad/s."
