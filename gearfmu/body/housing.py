@@ -25,9 +25,9 @@ def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> B
     found = imported_housing(housing)
     tell(f"{housing.name}: {housing.method}, {found.full.size} unknowns", 0.1)
     surface = found.surface
-    mesh = found.facts | ({} if surface is None else {"holes_of_the_skin": surface.holes})
+    mesh = found.facts | {"holes_of_the_skin": surface.holes}
     how = How.of(housing, housing.method, mesh)
-    read = Read(found.sensors) if surface is None else Read(found.sensors, surface.points, surface.faces, found.skin)
+    read = Read(found.sensors, surface.points, surface.faces, found.skin)
     judging = Judging.over(lines=LINES, damping_ratio=housing.modal_damping)
     body = whole_body(found.full, how, Size(housing.modes), judging, read)
     return replace(
