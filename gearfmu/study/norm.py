@@ -14,7 +14,7 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.run.set_te import set_error
+from gearfmu.stage.run.te import set_error
 from gearfmu.stage.run.trace import Channel, Trace
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
@@ -22,7 +22,7 @@ OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 
 @dataclass(frozen=True)
 class Signals:
-    """What a run is judged by, sampled every `interval` s from `start` s on.
+    """Signals by which a run is judged, sampled every `interval` s from `start` s on.
 
     te (n,) m, transmission error at the sample; of a train (n, meshes) · force (n,) N, mesh force, mean over the
     interval; of a train or set (n, meshes) · bearing (n, 2 B) N, x and y forces of every bearing (of a set: every pin),
