@@ -26,7 +26,7 @@ COARSE = {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
 
 
 def walked(run: Callable[[], object], skip: tuple[str, ...] = ()) -> list[str]:
-    """Modules of the functions that `run` enters, in the order of their first calls. skip: packages that are left out."""
+    """Modules of the functions that `run` enters, in the order of first calls. skip: packages left out."""
     found, seen = list[str](), set[CodeType]()
 
     def entered(frame: FrameType, event: str, _: object) -> None:
@@ -96,8 +96,12 @@ def signatures(names: str = "Any") -> int:
                 own = node.args
                 args = [*own.posonlyargs, *own.args, *own.kwonlyargs, *filter(None, (own.vararg, own.kwarg))]
                 notes = [arg.annotation for arg in args] + [node.returns]
-                found += sum(names in ast.unparse(note).replace("[", " ").split() or
-                             bool(re.search(rf"\b{names}\b", ast.unparse(note))) for note in notes if note is not None)
+                found += sum(
+                    names in ast.unparse(note).replace("[", " ").split()
+                    or bool(re.search(rf"\b{names}\b", ast.unparse(note)))
+                    for note in notes
+                    if note is not None
+                )
     return found
 
 
@@ -117,13 +121,18 @@ def rows() -> Iterator[tuple[str, str]]:
     for name, walk in models.items():
         yield f"stage.toml → model, {name}", f"{len(set(walk))} modules"
     body = to_body()
+    for name in SCENES:
+        yield f"scene.toml → trace, {name}", f"{len(set(to_trace(name)))} modules"
     yield "table → body, pinion of fzg_c", "{} modules, {} stays, {} returns".format(len(set(body)), *stays(body))
     yield "forms of files below spec", "{} lines in {} files".format(*mentions(FORMS, "spec"))
     yield "classes of bodies below spec", f"{mentions(BODIES, 'spec')[0]}"
     yield "places that ask for a drive by its class", "{} lines in {} files".format(*mentions(DRIVES, "spec"))
     yield "annotations with Any", f"{signatures()}"
     sizes = [len(path.read_text(encoding="utf-8").splitlines()) for path in PRODUCT.rglob("*.py")]
-    yield "lines of Python in the wheel", f"{sum(sizes)} in {len(sizes)} files, {sum(size < 50 for size in sizes)} below 50"
+    yield (
+        "lines of Python in the wheel",
+        f"{sum(sizes)} in {len(sizes)} files, {sum(size < 50 for size in sizes)} below 50",
+    )
 
 
 if __name__ == "__main__":
