@@ -101,12 +101,14 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     gk_glide *glide = engaged->glide;
     gk_system *s = &engaged->system;
     memcpy(glide->gap, s->g, (size_t)s->stride * sizeof *s->g);
+    glide->expressed = glide->anew = 0;
     gk_glide_rows(setup, work, e);
     memcpy(glide->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
     recall_friction(engaged, &GK_OF(data, meshing)[e], glide);
     gk_glide_freely(setup, data, work, k->h, e);
     find_coefficients(model, setup, data, k->h, e, engaged);
-    gk_glide_moves(setup, k, work, e);
+    if (!engaged->kept.again) gk_glide_moves(setup, k, work, e);
+    gk_glide_yields(s, glide);
     const gk_mesh *mesh = &setup->mesh[e];
     const int follows = glide->rolls && (mesh->rides || mesh->coupled); /* a spur pair alone gains nothing by it */
     for (int i = 0; i < s->contacts; i++) {
@@ -122,106 +124,186 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
 /* sliding in the step */
 static void find_sliding(gk_glide *glide, const gk_system *s)
 {
-    for (int k = 0; k < s->contacts; k++) {
-        const double *moved = glide->gap_moves + k * s->stride, *yielded = glide->gap_yields + k * s->stride;
-        double sum = glide->free[k] + glide->others[k] - glide->others_start[k];
-        for (int i = 0; i < s->n; i++)
-            sum += moved[i] * s->z[i] + yielded[i] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]);
-        glide->slid[k] = sum;
-    }
+    const int quads = s->stride / 4, across = (s->contacts + 3) / 4;
+    double late[MAX_STRIDE];
+    for (int i = 0; i < s->stride; i++)
+        late[i] = i < s->n ? s->force[i] + s->end[i] - s->force0[i] - s->end0[i] : 0.0;
+    for (int k = 0; k < s->contacts; k++)
+        glide->slid[k] = glide->free[k] + glide->others[k] - glide->others_start[k] +
+                         (gk_dot_quads(glide->gap_moves + k * s->stride, s->z, quads) +
+                          gk_dot_quads(glide->gap_yields + k * s->stride, late, quads));
     for (int j = 0; j < s->contacts; j++) {
-        const double *moved = glide->moves + j * s->stride, *yielded = glide->yields + j * s->stride;
-        const double step = glide->step[j], more = glide->end[j] - glide->start_end[j];
-        for (int k = 0; k < s->contacts; k++) glide->slid[k] += moved[k] * step + yielded[k] * more;
+        const double more = glide->end[j] - glide->start_end[j];
+        if (glide->step[j] != 0.0) gk_axpy(glide->step[j], glide->moves + j * s->stride, glide->slid, 0, across);
+        if (more != 0.0) gk_axpy(more, glide->yields + j * s->stride, glide->slid, 0, across);
     }
 }
 
-/* x ← a⁻¹ x, both (n, width) by rows, a close to symmetric positive definite: no pivoting */
-static void solve_small(double *a, double *x, int width, int n)
+/* x ← a⁻¹ x by rows, a (n, n) close to symmetric positive definite, x (n, columns): no pivoting */
+static void solve_small(double *a, int n, double *x, int columns)
 {
     for (int k = 0; k < n; k++)
         for (int i = k + 1; i < n; i++) {
-            const double f = a[i * width + k] / a[k * width + k];
+            const double f = a[i * n + k] / a[k * n + k];
             if (f == 0.0) continue;
-            for (int j = k; j < n; j++) a[i * width + j] -= f * a[k * width + j];
-            for (int c = 0; c < width; c++) x[i * width + c] -= f * x[k * width + c];
+            for (int j = k; j < n; j++) a[i * n + j] -= f * a[k * n + j];
+            for (int c = 0; c < columns; c++) x[i * columns + c] -= f * x[k * columns + c];
         }
     for (int k = n - 1; k >= 0; k--)
-        for (int c = 0; c < width; c++) {
-            for (int j = k + 1; j < n; j++) x[k * width + c] -= a[k * width + j] * x[j * width + c];
-            x[k * width + c] /= a[k * width + k];
+        for (int c = 0; c < columns; c++) {
+            for (int j = k + 1; j < n; j++) x[k * columns + c] -= a[k * n + j] * x[j * columns + c];
+            x[k * columns + c] /= a[k * n + k];
         }
 }
 
-/* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
- * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
- * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears
- * that roll on coefficients have the mean c̄ = (1 − θ) c₀ + θ c₁. What forces at the end of the step are more than z is
- * taken from the last round. */
+/* Friction by the present forces and how it follows them: p̄ = mean + Σ by_z Δz, at the end of the step end + end_by_z Δz
+ * + end_by_mean Δp̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is that of
+ * both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears that roll on
+ * coefficients have the mean c̄ = (1 − θ) c₀ + θ c₁. The slopes are those of some rounds ago as long as no contact has
+ * another status: then the factors of the normal forces still serve. */
+typedef struct laws {
+    double mean[MAX_CONTACTS], end[MAX_CONTACTS]; /* of contacts below the limit 0, and the end without its mean */
+    double by_z[MAX_CONTACTS], end_by_z[MAX_CONTACTS], end_by_mean[MAX_CONTACTS];
+    signed char held[MAX_CONTACTS]; /* below the limit */
+} laws;
+
 /* would the mean of both ends push along the sliding? Then there is none. */
 static int turns_round(const gk_glide *glide, int j)
 {
     return glide->limit[j] && !glide->rolls && glide->limit[j] * glide->start_end[j] < -glide->most_end[j];
 }
 
-static void express_limits(gk_glide *glide, const gk_system *s)
+static void find_laws(gk_glide *glide, const gk_system *s, laws *law)
 {
-    memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
         const int touches = glide->most_force[j] > 0.0;
-        glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
-        if (!glide->held[j]) glide->full[j] = 0;
+        const int held = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
+        if (!held) glide->full[j] = 0;
         const double ratio = glide->limit[j] * glide->most[j], last = ratio + glide->full[j] * glide->most[j];
-        const double present = s->force[j] + s->end[j], by_z = s->hold[j] ? 0.0 : last;
-        const double end = last * present - by_z * s->z[j];
+        const double end = last * (s->force[j] + s->end[j]), by_z = s->hold[j] ? 0.0 : last;
         const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
-        const int free = glide->held[j] && !glide->full[j];
-        glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
-        glide->end_by_z[j] = by_z;
-        glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
-                          : glide->rolls                      ? 0.5 * ratio * s->force0[j]
-                                                              : 0.5 * (glide->start_end[j] + end);
-        const double by_mean = glide->rolls ? glide->share[j] / glide->by_end[j] : 1.0 / (0.5 + glide->damps[j]);
-        const double from_start = glide->rolls ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * present
-                                               : (glide->damps[j] - 0.5) * by_mean * glide->start_end[j];
-        glide->end_fixed[j] = free ? from_start : end;
-        glide->end_by_mean[j] = free ? by_mean : 0.0;
+        const int follows = held && !glide->full[j];
+        const double still = held || !touches || turns ? 0.0
+                             : glide->rolls            ? 0.5 * ratio * s->force0[j]
+                                                       : 0.5 * (glide->start_end[j] + end - by_z * s->z[j]);
+        law->held[j] = (signed char)held;
+        law->by_z[j] = turns ? 0.0 : 0.5 * ratio;
+        law->mean[j] = still + law->by_z[j] * s->z[j];
+        law->end_by_z[j] = by_z;
+        law->end_by_mean[j] = !follows       ? 0.0
+                              : glide->rolls ? glide->share[j] / glide->by_end[j]
+                                             : 1.0 / (0.5 + glide->damps[j]);
+        law->end[j] = !follows ? end
+                      : glide->rolls
+                          ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * (s->force[j] + s->end[j])
+                          : (glide->damps[j] - 0.5) * law->end_by_mean[j] * glide->start_end[j];
     }
 }
 
-static void express_friction(gk_glide *glide, const gk_system *s)
+/* do the slopes that D contains belong to the same status? */
+static int slopes_stand(const gk_glide *glide, const laws *law, int contacts)
 {
-    const int width = s->n + 1;
-    double *const all_a = glide->small, *const all_x = all_a + s->contacts * width;
+    int same = glide->expressed;
+    for (int j = 0; j < contacts && same; j++)
+        same = glide->held[j] == law->held[j] && glide->by_own_z[j] == law->by_z[j] &&
+               glide->end_by_z[j] == law->end_by_z[j] &&
+               (glide->end_by_mean[j] != 0.0) == (law->end_by_mean[j] != 0.0);
+    return same;
+}
+
+/* Contacts below the limit: the mean of their friction, and with `slopes` how it follows the normal forces */
+static void hold(gk_glide *glide, const gk_system *s, laws *law, int slopes)
+{
+    const int columns = slopes ? s->n + 1 : 1;
     int held[MAX_CONTACTS], n = 0;
-    express_limits(glide, s);
-    for (int j = 0; j < s->contacts; j++) held[n] = j, n += glide->held[j] != 0;
-    for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
+    for (int j = 0; j < s->contacts; j++) held[n] = j, n += law->held[j] != 0;
+    double *const all_a = glide->small, *const all_x = all_a + n * n;
+    for (int k = 0; k < n; k++) { /* Δs without friction of these contacts */
         const int i = held[k];
         const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = gk_friction_slid(glide, i), *a = all_a + k * width, *x = all_x + k * width;
-        for (int r = 0; r < s->n; r++) {
-            const double each = moved[r] + yielded[r];
-            rest -= each * s->z[r], x[r] = -each;
-        }
+        double rest = gk_friction_slid(glide, i), *a = all_a + k * n, *x = all_x + k * columns;
+        for (int r = 0; r < columns - 1; r++) x[r] = -(moved[r] + yielded[r]);
         for (int j = 0; j < s->contacts; j++) {
             const int at = j * s->stride + i;
             const double moves = 2.0 * glide->moves[at], yields = glide->yields[at];
-            rest += moves * (glide->fixed[j] - glide->mean[j]) + yields * (glide->end_fixed[j] - glide->end[j]);
-            x[j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
+            rest += moves * (law->mean[j] - glide->mean[j]) + yields * (law->end[j] - glide->end[j]);
+            if (slopes) x[j] -= moves * law->by_z[j] + yields * law->end_by_z[j];
         }
-        x[s->n] = -rest;
+        x[columns - 1] = -rest;
         for (int j = 0; j < n; j++) {
             const int at = held[j] * s->stride + i;
-            a[j] = 2.0 * glide->moves[at] + glide->end_by_mean[held[j]] * glide->yields[at];
+            a[j] = 2.0 * glide->moves[at] + law->end_by_mean[held[j]] * glide->yields[at];
         }
         a[k] += glide->creep[i] / glide->most_force[i];
     }
-    solve_small(all_a, all_x, width, n);
+    solve_small(all_a, n, all_x, columns);
     for (int k = 0; k < n; k++) {
-        glide->fixed[held[k]] = all_x[k * width + s->n];
-        memcpy(glide->by_z + held[k] * s->stride, all_x + k * width, (size_t)s->n * sizeof(double));
+        const int j = held[k];
+        law->mean[j] = all_x[k * columns + columns - 1];
+        law->end[j] += law->end_by_mean[j] * law->mean[j];
+        if (slopes) memcpy(glide->by_z + j * s->stride, all_x + k * columns, (size_t)s->n * sizeof(double));
     }
+}
+
+/* what friction follows of the present z in its mean */
+static double followed(const gk_glide *glide, const gk_system *s, int j)
+{
+    if (!glide->held[j]) return glide->by_own_z[j] * s->z[j];
+    double sum = 0.0;
+    for (int r = 0; r < s->n; r++) sum += glide->by_z[j * s->stride + r] * s->z[r];
+    return sum;
+}
+
+/* D with friction as a function of the forces in the step */
+static void apply_slopes(const gk_glide *glide, gk_system *s)
+{
+    const int quads = s->stride / 4;
+    memcpy(s->D, glide->D, (size_t)(s->n * s->stride) * sizeof *s->D);
+    for (int j = 0; j < s->contacts; j++) {
+        const double *moved = glide->gap_moves + j * s->stride, *yielded = glide->gap_yields + j * s->stride;
+        double each[MAX_STRIDE];
+        for (int i = 0; i < s->stride; i++) each[i] = 2.0 * moved[i] + glide->end_by_mean[j] * yielded[i];
+        if (glide->end_by_z[j] != 0.0) gk_axpy(glide->end_by_z[j], yielded, s->D + j * s->stride, 0, quads);
+        if (!glide->held[j] && glide->by_own_z[j] != 0.0)
+            gk_axpy(glide->by_own_z[j], each, s->D + j * s->stride, 0, quads);
+        for (int r = 0; r < s->n && glide->held[j]; r++)
+            gk_axpy(glide->by_z[j * s->stride + r], each, s->D + r * s->stride, 0, quads);
+    }
+}
+
+/* gaps with friction, less what D knows of it */
+static void apply(const gk_glide *glide, gk_system *s)
+{
+    const int quads = s->stride / 4;
+    memcpy(s->g, glide->gap, (size_t)s->stride * sizeof *s->g);
+    for (int j = 0; j < s->contacts; j++) {
+        const double moves = 2.0 * glide->fixed[j] - glide->start[j];
+        const double yields = glide->end_fixed[j] + glide->end_by_mean[j] * glide->fixed[j];
+        if (moves != 0.0) gk_axpy(moves, glide->gap_moves + j * s->stride, s->g, 0, quads);
+        if (yields != 0.0) gk_axpy(yields, glide->gap_yields + j * s->stride, s->g, 0, quads);
+    }
+}
+
+/* Friction as a function of the normal forces; returns how far it is from what they were solved with, N */
+static double express_friction(gk_glide *glide, gk_system *s)
+{
+    laws law;
+    double largest = 0.0;
+    find_laws(glide, s, &law);
+    const int stand = slopes_stand(glide, &law, s->contacts);
+    hold(glide, s, &law, !stand);
+    glide->anew |= !stand;
+    glide->expressed = 1;
+    for (int j = 0; j < s->contacts; j++) {
+        if (!stand) {
+            glide->held[j] = law.held[j], glide->by_own_z[j] = law.by_z[j];
+            glide->end_by_z[j] = law.end_by_z[j], glide->end_by_mean[j] = law.end_by_mean[j];
+        }
+        glide->fixed[j] = law.mean[j] - followed(glide, s, j);
+        glide->end_fixed[j] = law.end[j] - glide->end_by_z[j] * s->z[j] - glide->end_by_mean[j] * law.mean[j];
+        largest = gk_max(largest, gk_max(fabs(law.mean[j] - glide->mean[j]), fabs(law.end[j] - glide->end[j])));
+    }
+    return largest;
 }
 
 /* friction at the end of the step, before anything is known of it */
@@ -233,19 +315,17 @@ static void guess_end(gk_glide *glide, const gk_system *s)
                                         : glide->start_end[j];
 }
 
-/* Mean friction by the present forces, and the sliding with it; returns the largest change */
+/* Mean friction by the present forces; returns the largest change */
 static double follow(gk_glide *glide, const gk_system *s)
 {
     double largest = 0.0;
     for (int j = 0; j < s->contacts; j++) {
-        const double *by_z = glide->by_z + j * s->stride, before = glide->mean[j], end = glide->end[j];
-        glide->mean[j] = glide->fixed[j];
-        for (int r = 0; r < s->n; r++) glide->mean[j] += by_z[r] * s->z[r];
+        const double before = glide->mean[j], end = glide->end[j];
+        glide->mean[j] = glide->fixed[j] + followed(glide, s, j);
         glide->step[j] = 2.0 * glide->mean[j] - glide->start[j];
         glide->end[j] = glide->end_fixed[j] + glide->end_by_z[j] * s->z[j] + glide->end_by_mean[j] * glide->mean[j];
         largest = gk_max(largest, gk_max(fabs(glide->mean[j] - before), fabs(glide->end[j] - end)));
     }
-    find_sliding(glide, s);
     return largest;
 }
 
@@ -303,44 +383,42 @@ static int change_status(gk_glide *glide, const gk_system *s, int patient)
     return count;
 }
 
-/* D and gaps with friction as a function of the forces in the step */
-static void apply(const gk_glide *glide, gk_system *s)
-{
-    memcpy(s->g, glide->gap, (size_t)s->stride * sizeof *s->g);
-    memcpy(s->D, glide->D, (size_t)(s->n * s->stride) * sizeof *s->D);
-    for (int j = 0; j < s->contacts; j++) {
-        const double *moved = glide->gap_moves + j * s->stride, *yielded = glide->gap_yields + j * s->stride;
-        const double *by_z = glide->by_z + j * s->stride, by_mean = glide->end_by_mean[j];
-        double each[MAX_STRIDE];
-        for (int i = 0; i < s->stride; i++) each[i] = 2.0 * moved[i] + by_mean * yielded[i];
-        gk_axpy(glide->fixed[j], each, s->g, 0, s->stride / 4);
-        gk_axpy(-glide->start[j], moved, s->g, 0, s->stride / 4);
-        gk_axpy(glide->end_fixed[j], yielded, s->g, 0, s->stride / 4);
-        gk_axpy(glide->end_by_z[j], yielded, s->D + j * s->stride, 0, s->stride / 4);
-        for (int r = 0; r < s->n; r++)
-            if (by_z[r] != 0.0) gk_axpy(by_z[r], each, s->D + r * s->stride, 0, s->stride / 4);
-    }
-}
-
 /* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
- * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
-double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
+ * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. What is
+ * less than `enough` is not solved again. */
+double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands, double enough)
 {
     GK_ASSERT(glide && round >= 0);
     GK_ASSERT(gk_system_is_sound(s));
-    find_limits(glide, s);
+    const double largest = find_limits(glide, s);
     if (!round) guess_end(glide, s);
     find_sliding(glide, s);
     const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
-    express_friction(glide, s);
+    glide->moved = express_friction(glide, s);
+    if (round && !changed && !(glide->moved > enough * largest)) return glide->moved / largest;
     apply(glide, s);
-    gk_solve_settle(s);
+    if (glide->anew) {
+        apply_slopes(glide, s);
+        s->factored = 0;
+        gk_solve_settle(s);
+    }
+    glide->anew = 0;
     gk_solve_contacts(s);
     glide->moved = follow(glide, s);
-    s->rubbing = gk_friction_defect(glide, s);
-    s->rubbed = gk_friction_taken(glide, s);
     if (changed || (!stands && !round)) return 1.0;
     return glide->moved / find_limits(glide, s);
+}
+
+/* what friction leaves and takes of energy, for the scalar of the step's energy */
+void gk_friction_account(gk_glide *glide, gk_system *s)
+{
+    GK_ASSERT(glide);
+    GK_ASSERT(gk_system_is_sound(s));
+    find_sliding(glide, s);
+    for (int j = 0; j < s->stride; j++)
+        glide->grown[j] = j < s->contacts ? glide->end[j] - glide->start_end[j] : 0.0;
+    s->rubbing = gk_friction_defect(glide, s);
+    s->rubbed = gk_friction_taken(glide, s);
 }
 
 /* the speed of gear A as a mean over the last millisecond */
@@ -361,7 +439,6 @@ double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide);
     GK_ASSERT(gk_system_is_sound(s));
-    find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double end = s->force[j] + s->end[j];
         glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;

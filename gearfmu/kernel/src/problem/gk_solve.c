@@ -231,7 +231,7 @@ static void newton(gk_system *s)
         }
         last = change;
     }
-    s->factored = s->coupled && !films && !s->rubs;
+    s->factored = (s->coupled || s->rubs) && !films;
     gk_solve_settle(s);
 }
 
