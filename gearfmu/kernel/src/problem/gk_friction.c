@@ -126,8 +126,7 @@ static void find_sliding(gk_glide *glide, const gk_system *s)
 {
     const int quads = s->stride / 4, across = (s->contacts + 3) / 4;
     double late[MAX_STRIDE];
-    for (int i = 0; i < s->stride; i++)
-        late[i] = i < s->n ? s->force[i] + s->end[i] - s->force0[i] - s->end0[i] : 0.0;
+    for (int i = 0; i < s->stride; i++) late[i] = i < s->n ? s->force[i] + s->end[i] - s->force0[i] - s->end0[i] : 0.0;
     for (int k = 0; k < s->contacts; k++)
         glide->slid[k] = glide->free[k] + glide->others[k] - glide->others_start[k] +
                          (gk_dot_quads(glide->gap_moves + k * s->stride, s->z, quads) +
@@ -193,10 +192,9 @@ static void find_laws(gk_glide *glide, const gk_system *s, laws *law)
         law->end_by_mean[j] = !follows       ? 0.0
                               : glide->rolls ? glide->share[j] / glide->by_end[j]
                                              : 1.0 / (0.5 + glide->damps[j]);
-        law->end[j] = !follows ? end
-                      : glide->rolls
-                          ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * (s->force[j] + s->end[j])
-                          : (glide->damps[j] - 0.5) * law->end_by_mean[j] * glide->start_end[j];
+        law->end[j] = !follows       ? end
+                      : glide->rolls ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * (s->force[j] + s->end[j])
+                                     : (glide->damps[j] - 0.5) * law->end_by_mean[j] * glide->start_end[j];
     }
 }
 
@@ -206,8 +204,7 @@ static int slopes_stand(const gk_glide *glide, const laws *law, int contacts)
     int same = glide->expressed;
     for (int j = 0; j < contacts && same; j++)
         same = glide->held[j] == law->held[j] && glide->by_own_z[j] == law->by_z[j] &&
-               glide->end_by_z[j] == law->end_by_z[j] &&
-               (glide->end_by_mean[j] != 0.0) == (law->end_by_mean[j] != 0.0);
+               glide->end_by_z[j] == law->end_by_z[j] && (glide->end_by_mean[j] != 0.0) == (law->end_by_mean[j] != 0.0);
     return same;
 }
 
@@ -415,8 +412,7 @@ void gk_friction_account(gk_glide *glide, gk_system *s)
     GK_ASSERT(glide);
     GK_ASSERT(gk_system_is_sound(s));
     find_sliding(glide, s);
-    for (int j = 0; j < s->stride; j++)
-        glide->grown[j] = j < s->contacts ? glide->end[j] - glide->start_end[j] : 0.0;
+    for (int j = 0; j < s->stride; j++) glide->grown[j] = j < s->contacts ? glide->end[j] - glide->start_end[j] : 0.0;
     s->rubbing = gk_friction_defect(glide, s);
     s->rubbed = gk_friction_taken(glide, s);
 }

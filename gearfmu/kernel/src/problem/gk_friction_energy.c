@@ -58,8 +58,8 @@ double gk_friction_defect(const gk_glide *glide, const gk_system *s)
         const double *gap = glide->gap_yields + j * s->stride;
         if (glide->grown[j] != 0.0) sum -= glide->grown[j] * gk_dot_quads(gap, mean, quads);
         if (glide->mean[j] != 0.0)
-            sum -= glide->mean[j] * (gk_dot_quads(gap, more, quads) +
-                                     gk_dot_quads(glide->yields + j * s->stride, glide->grown, across));
+            sum -= glide->mean[j] *
+                   (gk_dot_quads(gap, more, quads) + gk_dot_quads(glide->yields + j * s->stride, glide->grown, across));
     }
     return sum;
 }

@@ -43,7 +43,8 @@ GK_INLINE void slide_residual(const slide_nodes side[2], int places, int stride,
                 const gk_real *const normal[2] = {side[0].normal + at[0], side[1].normal + at[1]};
                 const gk_real *const along[2] = {side[0].own + at[0], side[1].own + at[1]};
                 for (int b = 0; b < strips; b++, gap += stride, own += stride) {
-                    *gap = slid_between(normal[0] + b, next[0], part[0]) + slid_between(normal[1] + b, next[1], part[1]);
+                    *gap = slid_between(normal[0] + b, next[0], part[0]) +
+                           slid_between(normal[1] + b, next[1], part[1]);
                     *own = slid_between(along[0] + b, next[0], part[0]) + slid_between(along[1] + b, next[1], part[1]);
                 }
             }
@@ -70,24 +71,28 @@ static slide_lanes lanes_of(const gk_setup *setup, const gk_mesh *mesh, const gk
     return l;
 }
 
-/* doubles in whole halves */
+/* doubles in whole halves; their count is a multiple of four */
 static void round_lanes(const double *from, int count, gk_half *to)
 {
-    int k = 0;
-    for (; k < count / 8; k++) to[k] = GK_ROUNDED(((const gk_eight *)from)[k]);
+    const int whole = count / 8;
+    for (int k = 0; k < whole; k++) to[k] = GK_ROUNDED(((const gk_eight *)from)[k]);
     if (count % 8 == 0) return;
-    to[k] = (gk_half){0};
-    for (int i = 8 * k; i < count; i++) to[k][i - 8 * k] = (gk_real)from[i];
+    to[whole] = (gk_half){0};
+    *(gk_four *)(to + whole) = __builtin_convertvector(*(const gk_quad *)(from + 8 * whole), gk_four);
 }
 
 static void fill_lanes(const slide_lanes *l, gk_real *const basis[2], const double *ground, const gk_mesh *mesh,
                        const double (*rigid)[MAX_STRIDE], int contacts, int count, gk_half *to)
 {
-    const gk_half *modes[2] = {(const gk_half *)basis[0], (const gk_half *)basis[1]};
-    for (int i = 0; i < count; i++, to += l->all) {
-        gk_half *lane = to;
-        for (int w = 0; w < 2; lane += l->modes[w++])
-            for (int k = 0; k < l->modes[w]; k++) lane[k] = i < contacts ? *modes[w]++ : (gk_half){0};
+    gk_half *lane = to;
+    for (int w = 0; w < 2; lane += l->modes[w++]) {
+        const gk_half *from = (const gk_half *)basis[w];
+        for (int i = 0; i < contacts; i++, from += l->modes[w])
+            for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = from[k];
+        for (int i = contacts; i < count; i++)
+            for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = (gk_half){0};
+    }
+    for (int i = 0; i < count; i++, lane += l->all) {
         round_lanes(ground + (size_t)(i * mesh->local), mesh->local, lane);
         lane[l->ground] = (gk_half){0};
         for (int d = 0; d < mesh->spins; d++) lane[l->ground][d] = (gk_real)rigid[d][i];
@@ -107,8 +112,8 @@ static void fill_coefficients(const slide_lanes *l, const gk_setup *setup, const
     round_lanes(ground, mesh->local, to);
     to[l->ground] = (gk_half){0};
     for (int d = 0; d < mesh->spins; d++)
-        to[l->ground][d] =
-            (gk_real)((kappa ? k->rigid_kappa : k->rigid_mobility) * setup->inverse_inertia[mesh->spin[d]]);
+        to[l->ground][d] = (gk_real)((kappa ? k->rigid_kappa : k->rigid_mobility) *
+                                     setup->inverse_inertia[mesh->spin[d]]);
 }
 
 /* What friction does through oscillators and spins in the step k: (contacts, stride) of the gaps and, symmetric, of the
@@ -151,13 +156,14 @@ void gk_glide_rows(const gk_setup *setup, gk_work *work, int e)
     gk_glide *glide = engaged->glide;
     const int stride = engaged->system.stride;
     const size_t size = (size_t)(engaged->system.contacts * stride);
-    double **matrix[] = {&glide->gap_moves, &glide->gap_kappa, &glide->moves, &glide->kappa, &glide->gap_yields,
-                         &glide->yields,    &glide->by_z,      &glide->D}; /* D is the largest */
+    double **matrix[] = {&glide->gap_moves,  &glide->gap_kappa, &glide->moves, &glide->kappa,
+                         &glide->gap_yields, &glide->yields,    &glide->by_z,  &glide->D}; /* D is the largest */
     for (size_t i = 0; i < 8; i++) *matrix[i] = glide->matrix + i * size;
     for (size_t i = 0; i < size; i += 4) gk_clear(glide->gap_yields + i, 1), gk_clear(glide->yields + i, 1);
     gk_rows_form_along(setup, work, e);
     if (!GK_ON(setup, residual)) return;
-    const slide_nodes side[2] = {nodes_of(engaged, &setup->mesh[e].side[0]), nodes_of(engaged, &setup->mesh[e].side[1])};
+    const slide_nodes side[2] = {nodes_of(engaged, &setup->mesh[e].side[0]),
+                                 nodes_of(engaged, &setup->mesh[e].side[1])};
     GK_STRIPPED(GK_STRIPS(setup), slide_residual, side, engaged->places, stride, glide)
 }
 

@@ -55,16 +55,15 @@ typedef struct gk_glide {
         most_end[MAX_STRIDE];                   /* the one at the end */
     double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
     double by_end[MAX_STRIDE];                  /* weight of the end of the step in the mean coefficient */
-    signed char limit[MAX_STRIDE], held[MAX_STRIDE];    /* ±1: at that limit; 1: below it */
-    signed char full[MAX_STRIDE];                       /* ±1: at the limit at the end alone, where the gears roll */
-    int rolls;                                          /* the gears do: friction fades, it does not stick */
-    double moved;                                       /* by the last round, N */
-    double fixed[MAX_STRIDE], by_own_z[MAX_STRIDE],
-        *by_z;                                          /* mean friction as a function of z, (contacts, stride): of
+    signed char limit[MAX_STRIDE], held[MAX_STRIDE];       /* ±1: at that limit; 1: below it */
+    signed char full[MAX_STRIDE];                          /* ±1: at the limit at the end alone, where the gears roll */
+    int rolls;                                             /* the gears do: friction fades, it does not stick */
+    double moved;                                          /* by the last round, N */
+    double fixed[MAX_STRIDE], by_own_z[MAX_STRIDE], *by_z; /* mean friction as a function of z, (contacts, stride): of
                                                            contacts below the limit, else of their own z */
-    double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE], /* friction at the end as a function of z and its mean */
+    double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE],    /* friction at the end as a function of z and its mean */
         end_by_mean[MAX_STRIDE];
-    int expressed, anew; /* these slopes are known; D does not yet contain them */
+    int expressed, anew;                             /* these slopes are known; D does not yet contain them */
     double *D;                                       /* D without friction */
     double creep[MAX_STRIDE];                        /* sliding in the step below which friction is less than that */
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */

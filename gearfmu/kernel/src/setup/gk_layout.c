@@ -248,7 +248,8 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     of->near = reals(b, model->engagements > 1 ? rows * ((size_t)setup->base.n + 2 * LANES) : 0);
     of->matrix = doubles(b, 8 * rows * rows);
     of->small = doubles(b, 2 * rows * rows);
-    const size_t modes = (size_t)setup->modal[setup->mesh[e].side[0].gear].n + (size_t)setup->modal[setup->mesh[e].side[1].gear].n;
+    const size_t modes = (size_t)setup->modal[setup->mesh[e].side[0].gear].n +
+                         (size_t)setup->modal[setup->mesh[e].side[1].gear].n;
     of->lanes = reals(b, (2 * rows + 4) * (modes + (size_t)setup->mesh[e].local + 2 * LANES));
 }
 
