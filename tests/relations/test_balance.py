@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
 
-from gearfmu.spec.forms.general import CarrierBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.stage import assemble
 from gearfmu.stage.build.groups import Layout
 from gearfmu.stage.build.layout import place_of, stage_layout

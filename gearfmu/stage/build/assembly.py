@@ -230,10 +230,15 @@ def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]])
         [rotors.index(stage.rotor_of(port.body)), *own[:2]]
         for port, own in zip(stage.ports.values(), numbers, strict=True)
     ]
-    return port_compliances(group, nodes) | {
-        "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
-        "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
-    }
+    plays = np.array([port.play for port in stage.ports.values()])
+    return (
+        port_compliances(group, nodes)
+        | ({"port_play": plays} if plays.any() else {})
+        | {
+            "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
+            "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
+        }
+    )
 
 
 def _port_numbers(port: PortSpec) -> np.ndarray:

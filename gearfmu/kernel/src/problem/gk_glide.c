@@ -143,7 +143,8 @@ void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *wo
         gk_multiply_rows(l.yields, row, contacts - j, l.all, l.all, to[3] + j);
         for (int i = 0; i < j; i++)
             to[2][i] = glide->moves[i * s->stride + j], to[3][i] = glide->kappa[i * s->stride + j];
-        for (int i = s->n - s->clutches; i < s->n; i++) to[1][i] = 0.0; /* a row of speeds: nothing yields at once */
+        for (int i = s->n - s->joint.clutches; i < s->n; i++)
+            to[1][i] = 0.0; /* a row of speeds: nothing yields at once */
     }
 }
 
