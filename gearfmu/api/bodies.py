@@ -10,12 +10,12 @@ from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, load
 from gearfmu.api.settings import Quantity, checked
+from gearfmu.body.housing import housing_order
 from gearfmu.body.imported import imported_full_order
 from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.housing import imported_housing
 from gearfmu.reduction.judged import Judgement, judged
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
@@ -78,15 +78,15 @@ def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
     housings = {housing.name: housing for housing in spec.housings}
     part = toothed[body].gear if body in toothed else housings[body] if body in housings else carrier_of(spec).part
-    imported = part.imported
-    if imported is not None and scale is not None:
+    imported = body in housings or part.imported is not None
+    if imported and scale is not None:
         remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
         raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
     if body in housings:
-        return imported_housing(housings[body]).full
+        return housing_order(housings[body]).full
     if body not in toothed:
         return carrier_full_order(carrier_of(spec), **factor)
-    if imported is not None:
+    if imported:
         return imported_full_order(toothed[body])
     full_order = ring_full_order if isinstance(toothed[body].gear, RingBody) else gear_full_order
     return full_order(toothed[body], **factor)

@@ -120,8 +120,9 @@ def _load_general(layers: Layers) -> Read:
         return None, problems
     bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
     for own in spec.housings:
+        field = "imported" if own.imported else "reduced"
         bodies[own.name] = own.model_copy(
-            update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")}
+            update={field: own.made_of.located(layers, f"bodies.{own.name}.{own.table}")}
         )
     return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies})), []
 

@@ -46,6 +46,7 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
     """The finite elements of a housing. MeshError for sets that are missing, no circle or no surface, for holes in
     the skin, and as of every import."""
     source = housing.imported
+    assert source is not None and housing.material is not None
     mesh = sound_mesh(source)
     with naming(Path(source.file)):
         require_memory(whole_need(mesh.nodes.size, 3 * housing.modes, HOUSING_FACTORS), MESH_COARSER)

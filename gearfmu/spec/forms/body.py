@@ -65,8 +65,9 @@ def _ring_inputs(ring: RingBody) -> dict[str, Any]:
 def _housing_inputs(stage: Stage, name: str) -> dict[str, object]:
     """Everything that shapes a housing: not its name, nor what of it is dynamic."""
     housing = next(own for own in stage.housings if own.name == name)
-    tables = housing.model_dump(exclude={"name", "imported", "dynamic_to"})
-    return tables | {"import": import_inputs(housing.imported, stage.source, f"bodies.{name}.import")}
+    tables = housing.model_dump(exclude={"name", "imported", "reduced", "dynamic_to"})
+    own = housing.table
+    return tables | {own: import_inputs(housing.made_of, stage.source, f"bodies.{name}.{own}")}
 
 
 def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def housing_problems(stage: Stage) -> Found:
             if housing.name in (support.body, support.to):
                 yield from _support(housing, support)
         if not any(s.body == housing.name for s in stage.supports):
-            feet = ", ".join(housing.imported.feet) or "none in its import: name node sets in feet = {…}"
+            feet = ", ".join(housing.made_of.feet) or f"none in its {housing.table}: name them in feet = {{…}}"
             remedy = (
                 f'nothing holds it: write [[supports]] with body = "{housing.name}" and node one of its feet ({feet}); '
                 'one that hangs freely has soft ones, e.g. radial = "1e4 N/m"'
@@ -41,7 +41,7 @@ def _alone(stage: Stage, housing: HousingBody) -> Found:
 
 def _support(housing: HousingBody, support: SupportSpec) -> Found:
     place, foot = f"supports.{support.name}", support.body == housing.name
-    known, what = (housing.imported.feet, "feet") if foot else (housing.imported.seats, "seats")
+    known, what = (housing.made_of.feet, "feet") if foot else (housing.made_of.seats, "seats")
     if foot and support.to is not None:
         yield f"{place}.to", support.to, f"a foot of {housing.name} stands on the ground: leave `to` away"
     if foot and support.bearing is not None:
@@ -49,7 +49,7 @@ def _support(housing: HousingBody, support: SupportSpec) -> Found:
     if foot and support.at is not None:
         yield f"{place}.at", f"{support.at:g}", "its node set says where a foot lies: leave it away"
     if support.node not in known:
-        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or 'not named in its import'}"
+        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or f'not named in its {housing.table}'}"
         yield f"{place}.node", support.node or "missing", remedy
     if not foot and support.torsion is not None:
         yield f"{place}.torsion", f"{support.torsion}", "a bearing on a housing cannot hold a spin: leave it away"
