@@ -9,6 +9,7 @@ import pytest
 from refused import refused
 
 from gearfmu.body.bodies import expected_hash
+from gearfmu.errors import SpecError
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 
@@ -54,10 +55,18 @@ def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, field: st
     assert words in told, told
 
 
-def test_without_feet_it_is_told_how_to_hang_it_up(tmp_path: Path) -> None:
+def test_a_free_housing_is_read_but_cannot_carry_a_load(tmp_path: Path) -> None:
+    """It can be reduced and put under a finished run; a run of its own has no equilibrium."""
     text = find_stage(HOUSED).read_text(encoding="utf-8")
     feet = text[text.index("\n[[supports]]                # assumed: bolted to a stiff frame") :]
-    assert "soft ones" in problems(tmp_path, (feet, "\n"))["bodies.housing"]
+    for name in ("stage.toml", "housing.inp"):
+        shutil.copy(find_stage(HOUSED).parent / name, tmp_path / ("base.toml" if name == "stage.toml" else name))
+    path = tmp_path / "free.toml"
+    path.write_text(text.replace(feet, "\n").replace('base = "stage.toml"', 'base = "base.toml"'), encoding="utf-8")
+    stage = load_stage(path)
+    assert expected_hash(stage, "housing") == expected_hash(load_stage(HOUSED), "housing")
+    with pytest.raises(SpecError, match=r"bodies\.housing.*reaction torque.*\(foot0, foot1, foot2, foot3\), soft ones"):
+        stage.require_motion()
 
 
 def test_what_is_dynamic_does_not_make_a_body_stale() -> None:

@@ -1,5 +1,5 @@
-"""A housing that another program has reduced: K and M over the motions of its seats and feet and over modal coordinates,
-as a FullOrder whose interfaces are rows of the unit matrix.
+"""A housing that another program has reduced: K and M over the motions of its seats and feet and over modal
+coordinates, as a FullOrder whose interfaces are rows of the unit matrix.
 
 Its rigid motion follows from the places of its points: R of the points, and of the modal coordinates z whatever leaves
 no force on them, K_zz z = −K_zp R; 0 for those of modes with the points held (Craig–Bampton). A point that its recovery
@@ -9,11 +9,10 @@ points are L⁻¹ times moments (theory, section 7).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import meshio
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
@@ -22,6 +21,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.matrices import read_labelled, read_recovery, read_unknowns
 from gearfmu.fem.nastran_matrices import Labelled
+from gearfmu.femesh.imported import read_surface
 from gearfmu.femesh.points import read_points
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.housing import ImportedHousing
@@ -90,10 +90,10 @@ def superelement(housing: HousingBody) -> ImportedHousing:
         interfaces=(*seats, *feet),
         ground=tuple(source.feet),
         length=max(float(np.linalg.norm(i.point)) for i in (*seats, *feet)),
-        cells=np.arange(size)[None],
-        node_of_dof=np.arange(size),
+        cells=np.zeros((1, 1), int),
+        node_of_dof=np.zeros(size, int),
     )
-    facts = {"file": Path(source.stiffness).name, "method": "superelement", "dof_body": size, "points": len(read.points)}
+    facts = {"file": Path(source.stiffness).name, "method": "superelement", "dof_body": size}
     return ImportedHousing(full, facts, {}, tuple(sensors), surface, skin)
 
 
@@ -114,15 +114,13 @@ def _read(source: HousingReducedSpec) -> _Read:
     stiffness = read_labelled(Path(source.stiffness), stated)
     mass = read_labelled(Path(source.mass), stated)
     rows = stiffness.unknowns if stated is None else stated
-    number = {(int(label), int(component)): k for k, (label, component) in enumerate(rows)}
-    if len(number) > MOST:
+    if len(rows) > MOST:
         remedy = f"reduce to at most {MOST}, or give the mesh with these matrices in the table import"
-        raise MeshError(f"{source.stiffness}: {len(number)} unknowns: {remedy}")
-    if len(number) != len(rows):
-        raise MeshError(f"{source.stiffness}: a row of one point and direction comes twice: check `unknowns`")
+        raise MeshError(f"{source.stiffness}: {len(rows)} unknowns: {remedy}")
+    number = _numbered(rows, source.unknowns)
     turning = set(source.rotations.values())
     arm = np.array([source.length if c >= 3 or point in turning else 1.0 for point, c in number])
-    given = _numbered(read_recovered(source), source.recovered)
+    given = _numbered(read_unknowns(Path(source.recovered)) if source.recovered else [], source.recovered)
     recovery = sp.csr_array((0, len(number)))
     if source.recovery:
         recovery = read_recovery(Path(source.recovery), np.array(list(given)), len(number))
@@ -136,12 +134,7 @@ def _read(source: HousingReducedSpec) -> _Read:
     )
 
 
-def read_recovered(source: HousingReducedSpec) -> np.ndarray:
-    """(r, 2) point and component of the rows of recovery."""
-    return read_unknowns(Path(source.recovered)) if source.recovered else np.zeros((0, 2), int)
-
-
-def _numbered(rows: np.ndarray, file: str) -> dict[tuple[int, int], int]:
+def _numbered(rows: Iterable[tuple[int, int]], file: str) -> dict[tuple[int, int], int]:
     found = {(int(label), int(component)): k for k, (label, component) in enumerate(rows)}
     if len(found) != len(rows):
         raise MeshError(f"{file}: a row of one point and direction comes twice")
@@ -202,15 +195,7 @@ def _surface(read: _Read, source: HousingReducedSpec) -> tuple[Surface | None, s
     """The skin, and its displacement (3P, N) by the unknowns."""
     if not source.surface:
         return None, None
-    path = Path(source.surface)
-    try:
-        mesh = meshio.read(path)
-    except (OSError, meshio.ReadError, SystemExit, ValueError, KeyError) as error:
-        raise MeshError(f"{path}: the surface cannot be read ({error}): write quadrilaterals and triangles") from None
-    blocks = [b.data[:, [0, 1, 2, 3 if b.type == "quad" else 2]] for b in mesh.cells if b.type in ("quad", "triangle")]
-    if not blocks:
-        raise MeshError(f"{path}: no quadrilaterals and no triangles: write the outer surface")
-    labels = np.asarray(getattr(mesh, "points_id", np.arange(1, len(mesh.points) + 1)), int)
-    surface = enclosed(source.length * np.asarray(mesh.points, float), np.vstack(blocks), path.name)
-    moved = sp.vstack([read.motion(int(label), range(3), f"surface {path.name}") for label in labels])
+    points, faces, labels = read_surface(Path(source.surface), source.length)
+    surface = enclosed(points, faces, source.surface)
+    moved = sp.vstack([read.motion(int(label), range(3), "surface") for label in labels])
     return surface, sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ moved)

@@ -1,5 +1,5 @@
-"""Does a housing fit the stage that it carries? One housing, seats that exist, feet that hold it. Where seats lie is
-known from its mesh (stage/build/housed.py)."""
+"""Does a housing fit the stage that it carries? One housing, seats and feet that exist. Where seats lie is known from its
+mesh (stage/build/housed.py); what hangs freely is refused by `Stage.require_motion`."""
 
 from __future__ import annotations
 
@@ -21,13 +21,6 @@ def housing_problems(stage: Stage) -> Found:
         for support in stage.supports:
             if housing.name in (support.body, support.to):
                 yield from _support(housing, support)
-        if not any(s.body == housing.name for s in stage.supports):
-            feet = ", ".join(housing.made_of.feet) or f"none in its {housing.table}: name them in feet = {{…}}"
-            remedy = (
-                f'nothing holds it: write [[supports]] with body = "{housing.name}" and node one of its feet ({feet}); '
-                'one that hangs freely has soft ones, e.g. radial = "1e4 N/m"'
-            )
-            yield f"bodies.{housing.name}", "no feet", remedy
 
 
 def _alone(stage: Stage, housing: HousingBody) -> Found:
