@@ -18,8 +18,7 @@ def whirl_rows(group: Group) -> tuple[np.ndarray, np.ndarray]:
             own = free.spinning or rigid_spinning(free.mass, free.omega.size)
             for turns, matrix in ((r, own.gyroscopic), (frame, own.coriolis)):
                 if turns >= 0:
-                    own_shapes = group.shapes[group.at[body]] * group.reads(body)
-                    found = skew_pairs(matrix[np.ix_(*2 * [_unknowns(layout, body)])]) @ own_shapes
+                    found = skew_pairs(matrix[np.ix_(*2 * [_unknowns(layout, body)])]) @ group.shapes[group.at[body]]
                     rotors += len(found) * [turns]
                     rows += list(found)
     return np.array(rotors, int), np.array(rows).reshape(-1, 2, group.omega.size)
