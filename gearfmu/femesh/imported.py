@@ -95,14 +95,18 @@ def read_surface(source: Path, length: float) -> tuple[np.ndarray, np.ndarray, n
     one without faces."""
     file_format = _FORMATS.get(source.suffix.lower())
     if file_format is None:
-        raise MeshError(f"{source}: '{source.suffix}' is no surface that is read here: write one of {', '.join(_FORMATS)}")
+        raise MeshError(
+            f"{source}: '{source.suffix}' is no surface that is read here: write one of {', '.join(_FORMATS)}"
+        )
     if file_format == "nastran" and (problem := nastran_problems(source)):
         raise MeshError(problem)
     mesh = _read_by_meshio(source, file_format)
     wide = {"quad": [0, 1, 2, 3], "triangle": [0, 1, 2, 2]}
     blocks = [block.data[:, wide[block.type]] for block in mesh.cells if block.type in wide]
     if not blocks:
-        raise MeshError(f"{source}: no quadrilaterals and no triangles of corner nodes: write the outer surface as these")
+        raise MeshError(
+            f"{source}: no quadrilaterals and no triangles of corner nodes: write the outer surface as these"
+        )
     labels = np.asarray(getattr(mesh, "points_id", np.arange(1, len(mesh.points) + 1)), int)
     return length * np.asarray(mesh.points, float), np.vstack(blocks), labels
 

@@ -224,14 +224,14 @@ def test_a_free_rigid_housing_yields_by_its_mass() -> None:
 
 
 def test_gears_read_the_oscillators_of_their_rotors() -> None:
-    """Beside a housing each reads some of what all rotors share, and all that its own one has: what it leaves out would
-    move the transmission error by 1e-6."""
+    """Beside a housing: what it leaves out would move the transmission error by 1e-7, forces and sensors by less than
+    the step errs."""
     group = mount_sets(drawn_layout(drawn()))[0]
     counts = [int(group.reads(gear).sum()) for gear in range(4)]
-    assert max(counts) < 0.8 * group.omega.size and counts[1] == counts[2]
+    assert max(counts) < 0.9 * group.omega.size and counts[1] == counts[2]
     assert not np.any(~np.any([group.reads(gear) for gear in range(4)], axis=0) & (group.rigid_share > 0.5))
     with patch("gearfmu.stage.build.groups.HEARD", 0.0):
-        whole = assemble(stage(), [*gears(), drawn()])
+        whole = assemble(stage(), [*gears(), replace(drawn())])
     at_rest = [statics_of(model, level=1.0).transmission(0.0, TORQUE).te for model in (housed(), whole)]
     assert at_rest[0] == pytest.approx(at_rest[1], rel=1e-6)
     few, all_of_them = run(housed()), run(whole)
@@ -290,7 +290,7 @@ def test_the_order_of_supports_changes_nothing(damped: bool, most: float) -> Non
     Margin: without dashpots 1.7e-5 of a sensor after 1 ms, with them 2.3e-3, of forces 3e-6; at the start 1e-9."""
     chosen = stage() if damped else undamped(stage())
     turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
-    own, other = (run(assemble(order, [*gears(), drawn()]), h=1e-5) for order in (chosen, turned))
+    own, other = (run(assemble(order, [*gears(), drawn()])) for order in (chosen, turned))
     for name in own.channels:
         differ = np.abs(own[name] - other[name]).max()
         if name.startswith("sensor."):

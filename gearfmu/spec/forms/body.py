@@ -25,10 +25,10 @@ def body_inputs(stage: Stage, name: str) -> dict[str, Any]:
     The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
-    if isinstance(stage.written, PlanetarySpec):
-        return _set_inputs(stage.written, name)
     if name in {housing.name for housing in stage.housings}:
         return _housing_inputs(stage, name)
+    if isinstance(stage.written, PlanetarySpec):
+        return _set_inputs(stage.written, name)
     member = member_of(stage, name)
     inputs = _ring_inputs(member.gear) if isinstance(member.gear, RingBody) else _gear_inputs(member.gear)
     return inputs | _imported_inputs(member, inputs["body"], stage.source)
@@ -101,7 +101,7 @@ def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
     part = parts[name]
     gear = part.model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
     if gear.get("mounts"):
-        gear["mounts"].pop("damping_ratio")
+        gear["mounts"] = {key: gear["mounts"][key] for key in ("points", "stiffness")}
     if name != "ring":
         gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
     if part.imported is not None:

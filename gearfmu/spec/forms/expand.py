@@ -108,7 +108,8 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
     carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
     springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
-    its own the ring turns in them, held by the port.
+    its own the ring turns in them, held by the port. A housing stands in the axes of the ground: it holds the ring in
+    the two directions that are the same in both, along and about its axis.
 
     What a set needs to move and does not say is 0 or left out, and refused by `Stage.require_motion`.
     """
@@ -121,6 +122,7 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     bodies["ring"] = RingBody(
         **_fields(RingSpec, spec.ring) | {"mounts": None}, kind="ring", **_angles(spec.set, HANDS["ring"])
     )
+    bodies |= spec.bodies
     bodies[CARRIER] = CarrierBody(**_fields(CarrierSpec, spec.carrier), name=CARRIER, kind="carrier")
     own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
@@ -210,19 +212,19 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
     if not (sun and pin and carrier and mounts):
         return ()
     all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
+    across = {"radial": all_mounts, "tilt": all_mounts * radius**2 / 2}
+    along = {"axial": all_mounts, "torsion": None if "ring" in spec.ports else all_mounts * radius**2}
+    own: dict[str, Any] = {"body": "ring", "damping_ratio": mounts.damping_ratio}
+    seat = {"to": mounts.to, "node": mounts.node}
+    held = [SupportSpec(name="ring", **own, **across, **along)]
+    if mounts.to is not None:
+        held = [SupportSpec(name="ring", **own, **across), SupportSpec(name="ring_seat", **own, **along, **seat)]
     return (
         _held("sun", sun),
         *(_held(name, pin, to="carrier", node=f"bolt{k}") for k, name in enumerate(planets)),
         _held("carrier", carrier, node="bore"),
-        SupportSpec(
-            name="ring",
-            body="ring",
-            radial=all_mounts,
-            axial=all_mounts,
-            tilt=all_mounts * radius**2 / 2,
-            torsion=None if "ring" in spec.ports else all_mounts * radius**2,
-            damping_ratio=mounts.damping_ratio,
-        ),
+        *held,
+        *spec.supports,
     )
 
 

@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec
-from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables, refuse
 from gearfmu.spec.tables.bearings import Bearings, LaterFields, OperatingSpec
 from gearfmu.spec.tables.gear import (
     Backlash,
@@ -241,12 +241,7 @@ class Stage(LaterFields):
     @field_validator("bodies", mode="before")
     @classmethod
     def _named(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        return {
-            name: {"kind": "gear"} | body | {"name": name} if isinstance(body, dict) else body
-            for name, body in value.items()
-        }
+        return named_tables(value, kind="gear")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Stage:
         """A copy with other fields; where the file of a pair or set could not say them, a general stage without it.

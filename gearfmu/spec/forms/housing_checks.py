@@ -1,5 +1,5 @@
-"""Does a housing fit the stage that it carries? One housing, seats and feet that exist. Where seats lie is known from its
-mesh (stage/build/housed.py); what hangs freely is refused by `Stage.require_motion`."""
+"""Does a housing fit the stage that it carries? One housing, seats and feet that exist. Where seats lie is known from
+its mesh (stage/build/housed.py); what hangs freely is refused by `Stage.require_motion`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def housing_problems(stage: Stage) -> Found:
         yield from _alone(stage, housing)
         for support in stage.supports:
             if housing.name in (support.body, support.to):
-                yield from _support(housing, support)
+                yield from _support(stage, housing, support)
 
 
 def _alone(stage: Stage, housing: HousingBody) -> Found:
@@ -32,7 +32,7 @@ def _alone(stage: Stage, housing: HousingBody) -> Found:
             yield f"ports.{name}.body", housing.name, "a housing does not turn: name a shaft or a gear"
 
 
-def _support(housing: HousingBody, support: SupportSpec) -> Found:
+def _support(stage: Stage, housing: HousingBody, support: SupportSpec) -> Found:
     place, foot = f"supports.{support.name}", support.body == housing.name
     known, what = (housing.made_of.feet, "feet") if foot else (housing.made_of.seats, "seats")
     if foot and support.to is not None:
@@ -44,5 +44,6 @@ def _support(housing: HousingBody, support: SupportSpec) -> Found:
     if support.node not in known:
         remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or f'not named in its {housing.table}'}"
         yield f"{place}.node", support.node or "missing", remedy
-    if not foot and support.torsion is not None:
+    spins = not foot and support.body in stage.bodies and not stage.rotors[stage.rotor_of(support.body)].stands
+    if spins and support.torsion is not None:
         yield f"{place}.torsion", f"{support.torsion}", "a bearing on a housing cannot hold a spin: leave it away"

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, Strict, model_validator
 
-from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.reading.base import Count, Name, Quantity, Text, Whole, refuse
+from gearfmu.spec.tables.bearings import LaterFields
 from gearfmu.spec.tables.gear import Material, ModalDamping
 from gearfmu.spec.tables.imported import FilesSpec, SourceSpec
 
@@ -90,10 +91,11 @@ def _check_names(seats: Mapping[str, object], feet: Mapping[str, object], sensor
         raise refuse(f"the name of the sensor {long[0]} has more than {LONGEST} characters: shorten it")
 
 
-class HousingBody(Spec):
+class HousingBody(LaterFields):
     """A housing that stands: bearings sit on its seats, its feet on the ground ([[supports]])."""
 
     model_config = ConfigDict(populate_by_name=True)
+    later = ("material", "imported", "reduced")
 
     name: Name = Field(description="name of the housing")
     kind: Literal["housing"] = Field(description="kind of body")

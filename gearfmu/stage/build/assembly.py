@@ -23,7 +23,7 @@ from gearfmu.stage.build.far import far_sections
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.flanks import deviation_sections
 from gearfmu.stage.build.ground_part import PartFlank
-from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, mount, node_directions
+from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.build.housed import Sensed, sensor_sections, widened
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
@@ -230,10 +230,15 @@ def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]])
         [rotors.index(stage.rotor_of(port.body)), *own[:2]]
         for port, own in zip(stage.ports.values(), numbers, strict=True)
     ]
-    return port_compliances(group, nodes) | {
-        "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
-        "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
-    }
+    plays = np.array([port.play for port in stage.ports.values()])
+    return (
+        port_compliances(group, nodes)
+        | ({"port_play": plays} if plays.any() else {})
+        | {
+            "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
+            "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
+        }
+    )
 
 
 def _port_numbers(port: PortSpec) -> np.ndarray:
@@ -308,7 +313,7 @@ def flank_sections(
     assert flank is not None
     port = np.zeros((*flank.node.shape[1:4], len(nodes)))
     port[..., [p for p, (own, _) in enumerate(nodes) if own == index]] = flank.node[0][..., SPIN, None]
-    reads = [np.flatnonzero(group.reads(index)) for group in groups]
+    reads = [np.flatnonzero(group.owner == families(group.layout)[index]) for group in groups]
     found = flank_tables(index, flank, degrees) | {
         f"node_support{index}": node_directions(layout, index).T,
         f"port_residual{index}": port,
@@ -339,9 +344,9 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
             f"support_rows{number}": group.support_rows,
             f"support_compliance{number}": own,
             f"kappa{number}": group.kappa,
-            f"port_rows{number}": np.array(
-                [group.node_rows(body, node, SPIN) * group.reads(body) for body, node in nodes]
-            ).reshape(len(nodes), group.omega.size),
+            f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
+                len(nodes), group.omega.size
+            ),
         }
     )
 

@@ -39,7 +39,6 @@ SPIN = 5
 UNCOUPLED = 1e-12  # of the diagonal: smaller terms of the stiffness are rounding
 EQUAL = 1e-8  # relative difference of eigenvalues of one cluster
 FLOATING = 1e-14  # of the largest eigenvalue of a block: below it a motion is free
-HEARD = 1e-5  # of the kinetic energy of an oscillator: less of it in a rotor does not move the gears there
 REGULAR = 1e-12  # least eigenvalue of the supports' compliance, scaled to a unit diagonal
 
 
@@ -170,24 +169,6 @@ class Group:
             mass = self.layout.bodies[body].mass
             rows[i] = mass[:2] @ self.rigid(body) / math.sqrt(mass[0, 0])
         return rows
-
-    def reads(self, body: int) -> np.ndarray:
-        """(n,) bool: oscillators that move a body; beside a housing, which joins all rotors, those with at least HEARD
-        of their energy in the body's rotor."""
-        own = self.owner == families(self.layout)[body]
-        rotor = next((rotor for rotor in self.layout.rotors if body in rotor), None)
-        housed = len(self.layout.bodies) > sum(map(len, self.layout.rotors))
-        return own & (self._energy(rotor) >= HEARD) if housed and rotor else own
-
-    def _energy(self, bodies: Sequence[int]) -> np.ndarray:
-        """(n,): part of the kinetic energy of an oscillator that is in some bodies."""
-        found = np.zeros(self.omega.size)
-        for body in bodies:
-            freedoms, shapes = self.layout.freedoms(body), self.shapes[self.at[body]]
-            rigid, elastic = shapes[: len(freedoms)], shapes[len(freedoms) :]
-            mass = self.layout.bodies[body].mass[np.ix_(freedoms, freedoms)]
-            found += np.einsum("ik,ij,jk->k", rigid, mass, rigid) + np.einsum("ik,ik->k", elastic, elastic)
-        return found
 
     def rigid(self, body: int) -> np.ndarray:
         """(6, n): rigid motion of a body about its origin."""

@@ -16,7 +16,7 @@ from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.ground_part import NODE_MEMBERS
-from gearfmu.stage.build.groups import Group
+from gearfmu.stage.build.groups import Group, families
 from gearfmu.stage.build.model import StageModel
 
 MOTION, MODE = ".motion.", ".mode_"
@@ -43,7 +43,7 @@ def observed_sections(index: int, bodies: Sequence[Body], groups: Sequence[Group
         f"mode_scale{index}": np.array([1 / math.sqrt(body.total_mass)]),
     }
     for s, group in enumerate(groups):
-        read = np.flatnonzero(group.reads(index))
+        read = np.flatnonzero(group.owner == families(group.layout)[index])
         elastic = group.shapes[group.at[index]][len(layout.freedoms(index)) :]
         rows = np.vstack([group.rigid(index), elastic / math.sqrt(body.total_mass)])
         found[f"own_rows{index}_{s}"] = np.ascontiguousarray(rows[:, read])

@@ -181,11 +181,10 @@ static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
     return ground->omega[k] < cut || (setup->level > LEVEL_STANDARD && ground->omega[k] <= setup->highest);
 }
 
-/* the rotor whose part of the ground group an oscillator belongs to: of the last gear that reads it, so that what the
- * rotors of a train share lies between what the last has alone and what those before it have */
+/* the rotor whose part of the ground group an oscillator belongs to: of the first gear that reads it */
 static int rotor_of(const gk_model *model, int set, int k)
 {
-    for (int g = model->gears - 1; g >= 0; g--)
+    for (int g = 0; g < model->gears; g++)
         for (int i = 0; i < model->gear[g].ground[set].reads; i++)
             if (model->gear[g].ground[set].list[i] == k) return model->gear[g].rotor;
     return model->rotors - 1;
