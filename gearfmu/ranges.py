@@ -165,6 +165,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "roll": ("m", 1e-6, 20, "a length of roll on the flank; leave it away for the point of single contact"),
     "pitch_deviation": ("m", -2.5e-3, 2.5e-3, "pitch deviations are some hundredths of a millimetre"),
     "angle": ("rad", -1e4, 1e4, _CHECK),
+    "play": ("rad", 0, 1, "of splines some tenths of a degree; leave it away for none"),
     "wobble": ("rad", 0, 5e-3, "of the order of 0.1 mrad"),
     "tolerance_class": ("", 1, 11, "classes of ISO 1328-1"),
     "seed": ("", 0, 2**31 - 1, "any whole number, 1 for a start"),

@@ -16,7 +16,7 @@ from evidence.pages_made import MARK, filled, made
 from evidence.sources import Sources, c_code, python_code
 
 ROOT = Path(__file__).resolve().parents[1]
-LAW = "gearfmu/kernel/src/force/gk_law.c"
+LAW = "gearfmu/kernel/src/problem/gk_law.c"
 GENERATED = (
     r"evidence/.*\.(csv|json|png|svg)|docs/pictures/.*\.(png|svg)|docs/(stability|variables|effects)\.md|"
     r"gearfmu/.*\.csv|reduced_models/.*\.csv"

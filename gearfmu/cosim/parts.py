@@ -68,7 +68,7 @@ def part_ports(file: str, parts: Drivetrain, stage: Stage) -> dict[str, PortSpec
     for name, shaft in parts.ports.items():
         own = stage.ports[name]
         k, c = (a if a is not None else b for a, b in ((shaft.stiffness, own.k), (shaft.damping, own.c)))
-        found[name] = PortSpec(kind="spring", k=k, c=c)
+        found[name] = PortSpec(kind="spring", k=k, c=c, play=own.play)
     return found
 
 
@@ -252,7 +252,8 @@ def _angles(
         stiffness = port.stiffness if port.stiffness is not None else stage.ports[name].k
         assert stiffness is not None, "part_ports refuses others"
         node, held = (f"{GROUND}.{name}", ground) if port.on == GROUND else (port.on, known)
-        held.setdefault(node, bore[name] + torque[name] / stiffness)
+        twisted = bore[name] + torque[name] / stiffness
+        held.setdefault(node, twisted + np.sign(torque[name]) * stage.ports[name].side)
     twist = {name: torque[name] / part.stiffness for name, part in parts.shafts.items()}
     for name in [*known, *parts.inertias]:
         known.setdefault(name, 0.0)

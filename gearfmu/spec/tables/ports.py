@@ -93,7 +93,15 @@ class PortSpec(Spec):
     )
     k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
     c: Damping | None = Field(default=None, description="damping of the port spring")
+    play: Annotated[float, Quantity("play")] = Field(
+        default=0.0, description="angle through which the port spring is free between both sides, as in a spline"
+    )
     chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    @property
+    def side(self) -> float:
+        """Angle (rad) from the middle of the play of the port spring to either side; 0 where there is no spring."""
+        return 0.5 * self.play if self.kind == "spring" else 0.0
 
     @property
     def no_spring(self) -> str:

@@ -62,12 +62,18 @@ class Steady(Wound):
 
     @cached_property
     def winding(self) -> float:
-        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh. Its
-        meshes carry the mean of what goes in and what comes out."""
+        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh, and
+        the plays of its port springs. Its meshes carry the mean of what goes in and what comes out."""
         known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
         ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
         taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)
-        return taken - 0.5 * slope * self.lost
+        return taken - 0.5 * slope * self.lost + self._play
+
+    @property
+    def _play(self) -> float:
+        shafts, ports = self.model.shafts, self.model.stage.ports
+        sides = (ports[shafts.input].side, abs(float(shafts.ratio)) * ports[shafts.output].side)
+        return float(sum(sides) * np.sign(self.torque))
 
     @property
     def lost(self) -> float:

@@ -205,7 +205,6 @@ void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *m
     gk_posed q = pair_of(model, setup, mesh, pose);
     const double step = 1e-5;
     gk_apart(&q, d);
-    mesh->distance = sqrt(d[0] * d[0] + d[1] * d[1]);
     nominal_action(&q, mesh);
     for (int i = 0; i < 2; i++) {
         for (int c = 0; c < 2; c++) pose[XB + c] = i * step * d[c] / mesh->distance;

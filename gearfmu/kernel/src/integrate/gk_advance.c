@@ -122,7 +122,7 @@ static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup
 {
     if (!turns(setup, g)) return k->flow[g].bv;
     gk_frame_finish(&setup->modal[g], &k->flow[g], angle_of(model, data, k, g), work, g);
-    return work->zero;
+    return work->room.zero;
 }
 
 /* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of
@@ -226,7 +226,7 @@ static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work 
         const gk_system *s = &work->engaged[e].system;
         for (int l = 0; l < mesh->spins; l++) {
             double last = gk_dot_quads(s->rigid[l], s->last, s->stride / 4);
-            for (int i = s->n - s->clutches; i < s->n; i++) last -= s->rigid[l][i] * s->force[i];
+            for (int i = s->n - s->joint.clutches; i < s->n; i++) last -= s->rigid[l][i] * s->force[i];
             z[mesh->spin[l]] += gk_dot_quads(s->rigid[l], s->z, s->stride / 4);
             force[mesh->spin[l]] += last;
             if (!GK_ON(setup, friction)) continue;
@@ -266,7 +266,7 @@ void gk_advance_correct(const gk_model *model, const gk_setup *setup, gk_work *w
         if (GK_ON(setup, modal_damping))
             data->energy.dissipated += correct_damped(setup, work, k, g, bv_left, q);
         else /* what rounding gave or took */
-            work->engaged[e].system.energy_error -= correct_undamped(setup, work, k, g, bv_left, q);
+            work->engaged[e].system.energy.error -= correct_undamped(setup, work, k, g, bv_left, q);
         take_force(work->next[g], n, k->h, q + 2 * n);
     }
     data->energy.dissipated += correct_ground(model, setup, work, data, k);

@@ -5,6 +5,7 @@
 #include "gk.h"
 #include "model/gk_data.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 GK_HOT double gk_advance_predict(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,

@@ -130,7 +130,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
         const gk_real *a = gk_modal_seen(setup, data, g) + 2 * n;
         for (int i = 0; i < n; i++) sum += (double)a[i] * a[i];
     }
-    return gk_energy_invariant(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
+    return gk_energy_invariant(model, setup, data, &work->room.explicit_rows) - 0.125 * h * h * sum;
 }
 
 /* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the
@@ -142,14 +142,14 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, c
     const double full = model->engagement[e].force_max / model->engagement[e].width;
     if (!gk_closed_place(model, setup, work, data, e, position)) return 0;
     for (int i = 0; i < s->n; i++) {
-        s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
-        s->slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->width[i]) : 0.0;
+        s->active[i] = gk_row_is_stiff(s, i);
+        s->local.slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->flank.width[i]) : 0.0;
     }
     gk_closed_compliance(s, s->A, full, 0, s->J);
     for (int i = 0; i < s->contacts && setup->nodal; i++) { /* the penalty in place of the law */
-        const double slope = setup->mesh[e].compliance * s->per_width[i];
-        s->J[i * s->n + i] += slope - s->slope[i];
-        s->slope[i] = slope;
+        const double slope = setup->mesh[e].compliance * s->flank.per_width[i];
+        s->J[i * s->n + i] += slope - s->local.slope[i];
+        s->local.slope[i] = slope;
     }
     return gk_cholesky(s->J, s->n);
 }

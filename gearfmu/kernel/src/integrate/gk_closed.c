@@ -31,7 +31,6 @@ static void yielding(const double *S, const double *damping, int n, double *X)
 }
 
 /* a row that no spring carries has no part in the limit */
-static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
 
 /* C (n, n): compliance of the quasi-static part with all contacts closed under the line load `full`, Q (n, stride)
  * without the κ part; with dashpots what yields to a force of alternating sign */
@@ -41,22 +40,23 @@ void gk_closed_compliance(const gk_system *s, const double *Q, double full, int 
     GK_ASSERT(Q && C);
     const int n = s->n, strips = s->strips;
     for (int i = 0; i < n * n; i++)
-        C[i] = counts(s, i / n) && counts(s, i % n) ? Q[i / n * s->stride + i % n] : i / n == i % n;
+        C[i] = gk_row_is_stiff(s, i / n) && gk_row_is_stiff(s, i % n) ? Q[i / n * s->stride + i % n] : i / n == i % n;
     for (int p = 0; p * strips < s->contacts; p++) {
         const int first = p * strips;
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
         for (int a = 0; a < strips * strips; a++) S[a] = s->P[(first + a / strips) * s->stride + first + a % strips];
-        for (int a = 0; a < strips; a++) S[a * strips + a] += gk_law_slope(s, first + a, full * s->width[first + a]);
+        for (int a = 0; a < strips; a++)
+            S[a * strips + a] += gk_law_slope(s, first + a, full * s->flank.width[first + a]);
         if (dashpots)
-            yielding(S, s->damping + first, strips, X);
+            yielding(S, s->dashpot.coefficient + first, strips, X);
         else
             memcpy(X, S, (size_t)(strips * strips) * sizeof *X);
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
     }
     for (int i = s->contacts; i < n; i++)
-        if (counts(s, i)) {
+        if (gk_row_is_stiff(s, i)) {
             const double spring = s->P[i * s->stride + i];
-            C[i * n + i] += spring / (1.0 + (dashpots ? AT_NYQUIST * s->damping[i] * spring : 0.0));
+            C[i * n + i] += spring / (1.0 + (dashpots ? AT_NYQUIST * s->dashpot.coefficient[i] * spring : 0.0));
         }
 }
 
@@ -66,7 +66,7 @@ static void kappa_part(const gk_system *s, const double *Q, double *K)
     const int n = s->n;
     for (int i = 0; i < n * n; i++) {
         const int at = i / n * s->stride + i % n;
-        K[i] = counts(s, i / n) && counts(s, i % n) ? Q[at] - s->A[at] : 0.0;
+        K[i] = gk_row_is_stiff(s, i / n) && gk_row_is_stiff(s, i % n) ? Q[at] - s->A[at] : 0.0;
     }
 }
 
@@ -78,7 +78,7 @@ static void friction_of(const gk_model *model, const gk_setup *setup, const gk_e
     const double ratio = model->gear[engagement->gear[0]].r_b / model->gear[engagement->gear[1]].r_b;
     for (int i = 0; i < engaged->system.contacts; i++) {
         const double *slide =
-            gk_point_of(setup, &engaged->place[engaged->system.place_of[i]], i % GK_STRIPS(setup))->slide;
+            gk_point_of(setup, &engaged->place[engaged->system.flank.place_of[i]], i % GK_STRIPS(setup))->slide;
         const double speed = slide[PHIA] - engagement->kind * ratio * slide[PHIB];
         share[i] = speed > 0.0 ? -most : most;
     }
@@ -89,7 +89,7 @@ static void add_symmetric(const gk_system *s, const double *Y, const double *sha
 {
     for (int j = 0; j < s->contacts; j++)
         for (int i = 0; i < s->n; i++) {
-            const double half = counts(s, i) ? 0.5 * sign * share[j] * Y[j * s->stride + i] : 0.0;
+            const double half = gk_row_is_stiff(s, i) ? 0.5 * sign * share[j] * Y[j * s->stride + i] : 0.0;
             M[i * s->n + j] += half, M[j * s->n + i] += half;
         }
 }
@@ -100,10 +100,11 @@ static void add_stuck(const gk_system *s, const double *Y, const double *L, doub
 {
     double y[MAX_CONTACTS];
     for (int k = 0; k < s->n; k++) {
-        for (int j = 0; j < s->contacts; j++) y[j] = counts(s, k) ? Y[j * s->stride + k] : 0.0;
+        for (int j = 0; j < s->contacts; j++) y[j] = gk_row_is_stiff(s, k) ? Y[j * s->stride + k] : 0.0;
         gk_cholesky_solve(L, y, s->contacts);
         for (int i = 0; i < s->n; i++)
-            for (int j = 0; j < s->contacts && counts(s, i); j++) M[i * s->n + k] += sign * Y[j * s->stride + i] * y[j];
+            for (int j = 0; j < s->contacts && gk_row_is_stiff(s, i); j++)
+                M[i * s->n + k] += sign * Y[j * s->stride + i] * y[j];
     }
 }
 
@@ -122,8 +123,8 @@ static int form(const gk_model *model, const gk_setup *setup, gk_work *work, con
                 const gk_coefficients *k, int e)
 {
     const gk_search near = {.k = k, .reach = NEAR, .anew = 1};
-    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
-    work->ground_y = work->ground_zero;
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->room.zero;
+    work->ground_y = work->room.ground_zero;
     return gk_engage(model, setup, work, data, &near, e);
 }
 
@@ -155,7 +156,7 @@ int gk_closed_place(const gk_model *model, const gk_setup *setup, gk_work *work,
     GK_ASSERT(gk_is_mesh(setup, e) && gk_is_engagement(model, e));
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     roll(model, work, e, position);
-    return form(model, setup, work, data, &work->explicit_rows, e);
+    return form(model, setup, work, data, &work->room.explicit_rows, e);
 }
 
 /* ---- an island at a position ------------------------------------------------------------------------------------- */
@@ -171,7 +172,7 @@ static int within(const island *of, int e) { return of->setup->mesh[e].island ==
 
 static double *kept_at(const gk_work *work, int e, int position)
 {
-    return work->columns + (size_t)(e * LIMIT_POSITIONS + position) * MAX_STRIDE * MAX_STRIDE;
+    return work->room.columns + (size_t)(e * LIMIT_POSITIONS + position) * MAX_STRIDE * MAX_STRIDE;
 }
 
 /* forms all problems of the island, with rows along the profile where there is friction */
@@ -205,7 +206,7 @@ void gk_closed_keep(const gk_model *model, const gk_setup *setup, gk_work *work,
     GK_ASSERT(model && setup && work && data);
     island of = {.model = model, .setup = setup, .work = work, .data = data, .number = -1, .first = -1};
     while (next_place(&of)) {
-        if (!form_island(&of, &work->explicit_rows)) continue;
+        if (!form_island(&of, &work->room.explicit_rows)) continue;
         for (int e = 0; e < model->engagements; e++) {
             const gk_system *s = &work->engaged[e].system;
             if (within(&of, e)) memcpy(kept_at(work, e, of.position), s->A, (size_t)(s->n * s->stride) * sizeof *s->A);
@@ -253,14 +254,15 @@ static void add_coupling(const island *of, const gk_coefficients *k, double fact
     gk_far_list(&coupled);
     for (int from = 0; from < of->model->engagements; from++)
         for (int i = 0; within(of, from) && i < of->work->engaged[from].system.n; i++) {
-            if (!counts(&of->work->engaged[from].system, i)) continue;
+            if (!gk_row_is_stiff(&of->work->engaged[from].system, i)) continue;
             gk_pass_unit(&coupled, from, i);
             for (int to = 0; to < from; to++) {
                 const gk_system *s = &of->work->engaged[to].system;
                 if (!within(of, to)) continue;
                 const double *read = of->work->engaged[to].moved[YIELDED];
                 for (int j = 0; j < s->n; j++)
-                    if (counts(s, j)) M[(size_t)(of->at[from] + i) * of->rows + of->at[to] + j] += factor * read[j];
+                    if (gk_row_is_stiff(s, j))
+                        M[(size_t)(of->at[from] + i) * of->rows + of->at[to] + j] += factor * read[j];
             }
         }
 }
@@ -290,7 +292,7 @@ static int holds_at(island *of, const gk_coefficients *k, double mu)
     memset(coupling, 0, size * sizeof *coupling);
     if (of->rows > of->work->engaged[of->first].system.n) {
         add_coupling(of, k, 1.0, coupling);
-        add_coupling(of, &of->work->explicit_rows, mu - 1.0, coupling);
+        add_coupling(of, &of->work->room.explicit_rows, mu - 1.0, coupling);
     }
     for (motion slides = rubs ? FORWARDS : FRICTIONLESS; slides <= (rubs ? STICKING : FRICTIONLESS); slides++) {
         memcpy(L, coupling, size * sizeof *L);

@@ -3,6 +3,7 @@
 #define GK_CLOSED_H
 #include "gk.h"
 #include "problem/gk_system.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 void gk_closed_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);

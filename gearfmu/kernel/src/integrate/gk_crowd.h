@@ -4,6 +4,7 @@
 #include "base/gk_lanes.h"
 #include "gk.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 GK_HOT void gk_crowd_turn(const gk_base *base, const gk_coefficients *k, const gk_data *data, double *v);

@@ -55,26 +55,27 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
 {
     double held = 0.0, taken = 0.0;
     for (int i = 0; i < s->n; i++) {
-        const int port = s->port_of[i];
+        const int port = s->joint.port[i];
         const double mean = gk_solve_mean(s, i);
-        if (s->kind[i] == ROW_CLUTCH) {
+        if (!gk_row_yields(s, i)) {
             taken -= mean * (work->moved[gk_inertia_of(model, port)] - work->moved[gk_disc_of(model, port)]);
             GK_OF(data, locked)[port] = s->active[i];
             continue;
         }
-        taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->damper[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
-        held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
-        if (s->kind[i] == ROW_TORQUE) {
+        taken += mean * (s->dashpot.lag[i] - s->dashpot.lag0[i]) -
+                 0.5 * s->dashpot.mean[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
+        held += s->dashpot.lag[i] * (s->force[i] + 0.5 * s->dashpot.end[i]);
+        if (gk_row_is_given(s, i)) {
             const double angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
             const double yielded = gk_solve_quasi_static(s, i) + s->g0[i];
             feed(&data->energy, mean * (angle - GK_OF(data, angle)[port]) - 0.5 * s->jump[i] * yielded);
             GK_OF(data, angle)[port] = angle;
-        } else if (s->joint_of[i] == JOINT_PORT) {
+        } else if (s->joint.which[i] == JOINT_PORT) {
             feed(&data->energy, mean * (work->outer[port] - work->outer_before[port]));
         }
     }
-    data->energy.dissipated += taken - (held - s->held0);
-    if (work->another) data->energy.baseline += s->stored0 + s->held0;
+    data->energy.dissipated += taken - (held - s->energy.held0);
+    if (work->another) data->energy.baseline += s->energy.stored0 + s->energy.held0;
     return gk_solve_stored(s) + held;
 }
 

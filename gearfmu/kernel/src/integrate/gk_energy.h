@@ -5,6 +5,7 @@
 #include "gk.h"
 #include "model/gk_data.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 GK_HOT double gk_energy_dynamic(const gk_model *model, const gk_setup *setup, const gk_data *data,

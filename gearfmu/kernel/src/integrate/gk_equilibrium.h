@@ -8,6 +8,7 @@
 #include "model/gk_model.h"
 #include "problem/gk_work.h"
 #include "setup/gk_kinematics.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 typedef struct gk_equilibrium { /* a search for rest */

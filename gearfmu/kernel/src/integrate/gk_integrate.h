@@ -3,6 +3,7 @@
 #define GK_INTEGRATE_H
 #include "problem/gk_engage.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_tables.h"
 
 /* gk_step.c */

@@ -16,7 +16,7 @@ static const double WARNED = 0.7; /* γ */
 static int holds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
                  double gamma)
 {
-    return gk_closed_holds(model, setup, work, data, gk_flow_for(model, setup, work, h, gamma), MU_MOST);
+    return gk_closed_holds(model, setup, work, data, gk_flow_for(model, setup, &work->room, h, gamma), MU_MOST);
 }
 
 /* γ for which μ′ stays at its bound */

@@ -28,11 +28,12 @@ void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system 
     for (int pass = 0; pass < 2; pass++) {
         gk_solve_path(s, y, path);
         for (int i = 0; i < s->n; i++) {
-            const double of_strip = GK_ON(setup, contact_damping) ? mesh->damping * mesh->cosine * s->width[i] : 0.0;
-            const double c = !s->active[i]               ? 0.0
-                             : s->kind[i] == ROW_CONTACT ? of_strip
-                                                         : setup->joint[s->port_of[i]][s->joint_of[i]].damping;
-            y[i] = (path[i] + s->slope[i] * y[i]) * (pass ? s->active[i] : c);
+            const double of_strip = GK_ON(setup, contact_damping) ? mesh->damping * mesh->cosine * s->flank.width[i]
+                                                                  : 0.0;
+            const double c = !s->active[i]     ? 0.0
+                             : i < s->contacts ? of_strip
+                                               : setup->joint[s->joint.port[i]][s->joint.which[i]].damping;
+            y[i] = (path[i] + s->local.slope[i] * y[i]) * (pass ? s->active[i] : c);
         }
     }
 }
@@ -49,23 +50,22 @@ static void add_dashpots(const gk_setup *setup, const gk_mesh *mesh, gk_system *
     gk_tangent_solve(s, y);
     for (int i = 0; i < s->n; i++) {
         if (!s->active[i]) continue;
-        const double dashpot = s->kind[i] == ROW_CONTACT ? gk_clamp(y[i], -s->force[i], s->force[i]) : y[i];
+        const double dashpot = i < s->contacts ? gk_clamp(y[i], -s->force[i], s->force[i]) : y[i];
         s->z[i] = s->force[i] + dashpot;
-        s->end[i] = dashpot;
+        s->dashpot.end[i] = dashpot;
     }
 }
 
 /* problem of an engagement at the trial state; 0 when the poses mean nothing */
 static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
-    const gk_search how = {.k = &work->explicit_rows, .reach = 50e-6};
+    const gk_search how = {.k = &work->room.explicit_rows, .reach = 50e-6};
     gk_system *s = &work->engaged[e].system;
     if (!gk_engage(model, setup, work, data, &how, e)) return 0;
-    for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
+    for (int r = 0; r < s->contacts; r++) s->dashpot.coefficient[r] = 0.0;
     if (setup->nodal) gk_nodal_leave(s);
-    gk_memory_recall(setup, work, data, e, s);
-    for (int r = 0; r < s->n; r++)
-        if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
+    gk_memory_recall(model, setup, work, data, e);
+    for (int r = s->contacts; r < s->n; r++) s->dashpot.clip[r] = 2;
     gk_solve_status(s);
     return 1;
 }
@@ -79,7 +79,7 @@ static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work
         gk_film_begin_rates(setup, work, e, rate);
     }
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, &work->explicit_rows, i, 0, 0, GK_FIRST_RATE, 0, 0};
+        gk_coupled coupled = {model, setup, work, &work->room.explicit_rows, i, 0, 0, GK_FIRST_RATE, 0, 0};
         const gk_island island = gk_couple_island(&coupled);
         gk_balance_plain(&island);
     }
@@ -243,8 +243,8 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
-            if (s->kind[i] == ROW_TORQUE)
-                GK_OF(data, angle)[s->port_of[i]] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+            if (gk_row_is_given(s, i))
+                GK_OF(data, angle)[s->joint.port[i]] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     }
 }
 

@@ -36,13 +36,13 @@ static int press(gk_equilibrium *r)
         work->spin[d] = GK_OF(r->data, x)[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
         work->speed[d] = 2.0 * work->spin[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
-    for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->zero;
+    for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->room.zero;
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (gk_equilibrium_has(r, e)) { /* given torques move the pose, not the place */
             const gk_search how = {.k = &r->k, .spin = GK_OF(r->data, x), .reach = SEE};
             if (!gk_engage(r->model, &r->setup, work, r->data, &how, e)) return 0;
-            gk_memory_recall(&r->setup, work, r->data, e, &work->engaged[e].system);
+            gk_memory_recall(r->model, &r->setup, work, r->data, e);
         }
     gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0, 0, 0};
     const gk_island island = gk_couple_island(&coupled);
@@ -174,7 +174,7 @@ static int search(gk_equilibrium *r)
 /* κ = −1/ω² puts the dynamic modes of the gear groups into C′ too */
 static void set_compliance(gk_equilibrium *r)
 {
-    r->k = r->work->explicit_rows;
+    r->k = r->work->room.explicit_rows;
     r->k.timeless = 0;
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &r->setup.modal[g];
@@ -246,7 +246,7 @@ static void spread(gk_equilibrium *r)
         const gk_system *s = &work->engaged[e].system;
         for (int l = 0; l < mesh->spins; l++)
             for (int i = 0; i < s->n; i++)
-                if (s->kind[i] != ROW_CLUTCH) GK_OF(data, f)[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
+                if (gk_row_yields(s, i)) GK_OF(data, f)[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
         gk_rows_pose(setup, work, e, GK_OF(data, x), work->rest_ground, GK_OF(data, meshing)[e].frozen);
     }
 }

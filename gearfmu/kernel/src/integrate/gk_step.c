@@ -39,8 +39,9 @@ static void express(const gk_model *model, const gk_setup *setup, gk_work *work,
                     const gk_coefficients *k)
 {
     if (data->state_h == k->h && data->state_gamma == k->gamma) return;
-    const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(model, setup, work, data->state_h, data->state_gamma)
-                                                     : &work->explicit_rows;
+    const gk_coefficients *old = data->state_h > 0.0
+                                     ? gk_flow_for(model, setup, &work->room, data->state_h, data->state_gamma)
+                                     : &work->room.explicit_rows;
     const double before = gk_energy_dynamic(model, setup, data, old);
     express_ground(&k->ground, &old->ground, setup->base.n, gk_ground_of(data));
     for (int g = 0; g < model->gears; g++)
@@ -73,7 +74,7 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
 static void find_jumps(const gk_work *work, gk_system *s)
 {
     for (int i = s->contacts; i < s->n; i++)
-        if (s->kind[i] == ROW_TORQUE) s->jump[i] = work->torque[s->port_of[i]] - s->force0[i];
+        if (gk_row_is_given(s, i)) s->jump[i] = work->torque[s->joint.port[i]] - s->force0[i];
 }
 
 /* Tip corners off: did a pair that carried load end with its flank? */
@@ -126,17 +127,17 @@ static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_wor
     GK_ASSERT(h > 0.0 && gk_finite(h));
     GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
     GK_ASSERT(setup->magic == GK_SETUP_MAGIC && data->magic == GK_DATA_MAGIC);
-    const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
+    const gk_coefficients *k = gk_flow_for(model, setup, &work->room, h, gamma);
     gk_outcome outcome;
     GK_MARK(work);
     if (GK_ON(setup, elastic) && h == data->table_h && gamma == gk_limit_gamma(setup, work, data, h) &&
-        !(h == work->table_h && gamma == work->table_gamma))
-        gk_side_step(model, setup, work, k);
+        !(h == work->room.table_h && gamma == work->room.table_gamma))
+        gk_side_step(model, setup, &work->room, k);
     work->another = data->expressed_h != h || data->expressed_gamma != gamma;
     express(model, setup, work, data, k);
     const double damped = gk_advance_predict(model, setup, work, data, k);
     if (!passable(model, work, data)) return GK_DIVERGED;
-    work->by_tables = work->table_h > 0.0 && h == work->table_h && gamma == work->table_gamma;
+    work->by_tables = work->room.table_h > 0.0 && h == work->room.table_h && gamma == work->room.table_gamma;
     if (work->by_tables) gk_felt_see(model, setup, work);
     GK_LAP(work, PHASE_PREDICT);
     const gk_search how = {.k = k};
@@ -145,7 +146,7 @@ static gk_outcome step_once(const gk_model *model, const gk_setup *setup, gk_wor
         if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
         find_jumps(work, &work->engaged[e].system);
-        gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
+        gk_memory_recall(model, setup, work, data, e);
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
         GK_LAP(work, PHASE_SYSTEM);
     }

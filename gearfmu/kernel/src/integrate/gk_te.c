@@ -8,7 +8,7 @@ static double driven_angle(const gk_model *model, const gk_work *work, int port)
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
-            if (s->port_of[i] == port && s->joint_of[i] == JOINT_PORT)
+            if (s->joint.port[i] == port && s->joint.which[i] == JOINT_PORT)
                 angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     }
     return angle;

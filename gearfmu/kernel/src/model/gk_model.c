@@ -137,7 +137,12 @@ static void read_ports(gk_reader *r, gk_model *m)
     const double *v = gk_read_take(r, F_MODEL_ports);
     m->port_residual = gk_read_bounded(r, F_MODEL_port_residual, 1e3);
     m->port_support = gk_read_bounded(r, F_MODEL_port_support, 1e3);
-    for (int i = 0; i < m->ports && !r->outcome; i++) read_port(r, m, i, kinds + 3 * i, v + 6 * i);
+    const double *play = gk_read_bounded(r, F_MODEL_port_play, 1.0);
+    for (int i = 0; i < m->ports && !r->outcome; i++) {
+        read_port(r, m, i, kinds + 3 * i, v + 6 * i);
+        m->port[i].play = play ? play[i] : 0.0;
+        if (m->port[i].play < 0.0) gk_read_refuse(r, "plays of ports", "are negative");
+    }
     for (int i = 0; i < m->ports; i++)
         for (int j = 0; j < i; j++)
             if (m->port[i].rotor == m->port[j].rotor) gk_read_refuse(r, "ports", "share a rotor");

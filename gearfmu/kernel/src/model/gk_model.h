@@ -110,6 +110,7 @@ typedef struct gk_port {
     gk_port_kind kind;
     int rotor, chain; /* chain: its number among the chains + 1, 0: none */
     double k, c, inertia, disc, shaft_k, shaft_c;
+    double play; /* of the port spring, between both sides, rad */
 } gk_port;
 
 /* ground oscillators of one set */

@@ -238,20 +238,12 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
     return GK_OK;
 }
 
-gk_outcome gk_defaults(const gk_model *model, gk_data *data)
+void gk_vars_start(const gk_model *model, gk_data *data)
 {
     GK_ASSERT(model && data);
-    const size_t size = gk_data_size(model);
-    memset(data, 0, size);
-    gk_data_plan(model, data->at);
-    data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) - data->at[OF_oscillator] -
-                       model->amplitudes; /* until they have their place */
-    data->magic = GK_DATA_MAGIC;
-    data->phase = PHASE_NEW;
     for (int i = 0; i < ROWS; i++)
         for (int k = 0; k < instances(model, TABLE[i].scope); k++)
             *value_of(data, &TABLE[i], k) = start_of(model, &TABLE[i], k);
-    return GK_OK;
 }
 
 static int in_range(const gk_row *row, double value)

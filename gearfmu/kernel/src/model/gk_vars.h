@@ -24,6 +24,7 @@ enum {
 #undef GK_VARS_END
 };
 
+void gk_vars_start(const gk_model *model, gk_data *data); /* all values */
 /* may a parameter of this model start with this value? */
 int gk_start_allowed(const gk_model *model, uint32_t reference, double value);
 

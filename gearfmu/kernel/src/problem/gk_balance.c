@@ -28,7 +28,7 @@ static int open_balance(const balance *b, double tolerance)
  * work from outside and counts with its quasi-static displacement alone */
 static double gap_change(const gk_system *s, int i)
 {
-    const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
+    const int rests = (s->active[i] && !gk_film_sinks(s, i)) || gk_row_is_given(s, i);
     return (rests ? -gk_solve_quasi_static(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
 }
 
@@ -39,19 +39,20 @@ static double share(const gk_system *s, int i)
 
 static int takes_part(const gk_system *s, int i)
 {
-    return s->kind[i] != ROW_CLUTCH && (s->force[i] != 0.0 || s->force0[i] != 0.0 || s->direction[i] != 0.0);
+    return gk_row_yields(s, i) && (s->force[i] != 0.0 || s->force0[i] != 0.0 || s->direction[i] != 0.0);
 }
 
 /* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀), and what earlier steps left of it: small defects of the same sign do not
  * add up */
 static balance defect(const gk_system *s)
 {
-    balance b = {s->energy_correction - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
+    balance b = {s->energy.correction - s->energy.stored0 + s->energy.rubbing, 0.0, 0.0, fabs(s->energy.stored0), 0.0};
     if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
-            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->beyond[i] + s->linear[i]) + s->potential[i];
+            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->others.deflection[i] + s->linear[i]) +
+                                  s->local.potential[i];
             b.defect += energy;
             b.scale += fabs(energy);
         }
@@ -72,7 +73,7 @@ static void sensitivity(const gk_system *s, double *p, double *damper)
     gk_tangent_solve(s, p);
     gk_solve_path(s, p, path);
     for (int i = 0; i < s->n; i++) {
-        damper[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
+        damper[i] = s->dashpot.gain[i] * (path[i] + s->local.slope[i] * p[i]) + s->dashpot.pull[i] * p[i];
     }
 }
 
@@ -82,16 +83,16 @@ static void expand(const gk_system *s, const double *p, const double *damper, ba
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
         w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + damper[i],
-        late[i] = s->late[i] * damper[i] + s->held[i] * p[i];
+        late[i] = s->dashpot.late[i] * damper[i] + s->dashpot.held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
     gk_solve_times(s, s->A, late, lag);
     for (int i = 0; i < s->n; i++) {
         const double lift = gk_film_lift(s, i), direct = (1.0 + lift) * p[i] + s->direction[i];
-        if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
-        const double quasi_static = yields[i] + path[i] + s->slope[i] * p[i];
-        const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
+        if (!gk_row_yields(s, i) || (!takes_part(s, i) && direct == 0.0)) continue;
+        const double quasi_static = yields[i] + path[i] + s->local.slope[i] * p[i];
+        const int rests = (s->active[i] && !gk_film_sinks(s, i)) || gk_row_is_given(s, i);
         const double gap = rests ? -quasi_static : moved[i] + lag[i];
         b->c1 += s->force[i] * quasi_static + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
         b->c2 += 0.5 * p[i] * quasi_static + 0.5 * direct * gap;
@@ -101,20 +102,26 @@ static void expand(const gk_system *s, const double *p, const double *damper, ba
     b->c1 += gk_film_grows(s, p, yields, &b->c2);
 }
 
+static int opened_or_closed(const gk_system *s, int i)
+{
+    if (i < s->contacts) return (s->force0[i] > 0.0 && !gk_film_sinks(s, i)) != gk_solve_touches(s, i);
+    return gk_row_opens(s, i) && (s->force0[i] != 0.0) != (s->force[i] != 0.0);
+}
+
 static int status_changed(const gk_system *s)
 {
-    for (int i = 0; i < s->contacts; i++)
-        if ((s->force0[i] > 0.0 && !gk_film_sinks(s, i)) != gk_solve_touches(s, i)) return 1;
+    for (int i = 0; i < s->n; i++)
+        if (opened_or_closed(s, i)) return 1;
     return 0;
 }
 
-/* the rows that share η: the contacts that are closed at either end; bearings, shafts and ports only where that finds
- * no balance, because η on them rings their modes */
+/* the rows that share η: contacts that are closed at either end, joints that close or open; other bearings, shafts and
+ * ports only where that finds no balance, because η on them rings their modes */
 static void choose_direction(gk_system *s, int all_rows)
 {
     for (int i = 0; i < s->n; i++) {
         const int film = gk_film_sinks(s, i) && !gk_solve_touches(s, i);
-        const int may = (s->kind[i] == ROW_CONTACT && !film) || (all_rows && s->kind[i] == ROW_SPRING);
+        const int may = i < s->contacts ? !film : opened_or_closed(s, i) || (all_rows && gk_row_is_stiff(s, i));
         s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
     }
 }
@@ -159,8 +166,8 @@ void gk_balance_plain(const gk_island *island)
 /* the step is balanced but for b: the next ones make that good; the first member keeps the account */
 static int leave(const gk_island *island, const balance *b)
 {
-    for (int m = 0; m < island->count; m++) island->member[m]->energy_error -= island->member[m]->energy_correction;
-    island->member[0]->energy_error += b->defect;
+    for (int m = 0; m < island->count; m++) island->member[m]->energy.error -= island->member[m]->energy.correction;
+    island->member[0]->energy.error += b->defect;
     return 1;
 }
 
@@ -168,7 +175,7 @@ static int leave(const gk_island *island, const balance *b)
 static double energy_correction_of(const gk_island *island)
 {
     double sum = 0.0;
-    for (int m = 0; m < island->count; m++) sum += island->member[m]->energy_correction;
+    for (int m = 0; m < island->count; m++) sum += island->member[m]->energy.correction;
     return sum;
 }
 
@@ -257,11 +264,11 @@ static int bursts(const gk_island *island, double defect)
 static int rubs_away(const gk_island *island, double defect)
 {
     double taken = 0.0;
-    for (int m = 0; m < island->count; m++) taken += island->member[m]->rubs ? island->member[m]->rubbed : 0.0;
+    for (int m = 0; m < island->count; m++) taken += island->member[m]->rubs ? island->member[m]->energy.rubbed : 0.0;
     if (!(fabs(defect) < taken)) return 0;
     for (int m = 0; m < island->count; m++) {
         gk_system *s = island->member[m];
-        if (s->rubs) s->unbalanced = defect * s->rubbed / taken;
+        if (s->rubs) s->energy.unbalanced = defect * s->energy.rubbed / taken;
     }
     return 1;
 }
@@ -272,7 +279,8 @@ static int friction_owes(const gk_island *island, double defect)
 {
     static const double ELSE = 0.1; /* least share of another cause that is told */
     double rubbing = 0.0;
-    for (int m = 0; m < island->count; m++) rubbing += island->member[m]->rubs ? island->member[m]->rubbing : 0.0;
+    for (int m = 0; m < island->count; m++)
+        rubbing += island->member[m]->rubs ? island->member[m]->energy.rubbing : 0.0;
     return fabs(defect - rubbing) < ELSE * fabs(rubbing);
 }
 
@@ -302,7 +310,7 @@ void gk_balance_solve(const gk_island *island)
     const double changing = island->count > 1 ? COUPLED_CHANGE : BALANCE;
     int curved = 0, rubs = 0;
     for (int m = 0; m < island->count; m++) {
-        curved |= GK_HAS(hertz) && island->member[m]->curved;
+        curved |= GK_HAS(hertz) && island->member[m]->flank.curved;
         rubs |= GK_HAS(friction) && island->member[m]->rubs;
     }
     curved |= rubs;

@@ -150,9 +150,9 @@ static void joint_residual(const gk_setup *setup, gk_engaged *engaged, int e)
     for (int r = s->contacts; r < s->n; r++) {
         if (!gk_rows_at_bore(setup, s, r)) continue;
         double *A = s->A + r * s->stride;
-        A[r] += setup->port_own[s->port_of[r]];
+        A[r] += setup->port_own[s->joint.port[r]];
         for (int w = 0; w < 2; w++)
-            for (int i = 0; i < s->contacts && setup->mesh[e].side[w].port_of == s->port_of[r]; i++)
+            for (int i = 0; i < s->contacts && setup->mesh[e].side[w].port_of == s->joint.port[r]; i++)
                 A[i] -= engaged->bore[w][i];
     }
 }
@@ -202,7 +202,7 @@ static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
     if (GK_ON(setup, residual) && GK_ON(setup, contact_damping)) /* else no damper asks for it */
         GK_STRIPPED(GK_STRIPS(setup), paths, setup, engaged, e)
     for (int i = s->contacts; i < s->n; i++)
-        s->P[i * s->stride + i] = setup->joint[s->port_of[i]][s->joint_of[i]].compliance;
+        s->P[i * s->stride + i] = setup->joint[s->joint.port[i]][s->joint.which[i]].compliance;
 }
 
 /* D, A and P of the contacts and of the joints' residual; from the tables of the step, or for any step from the rows;

@@ -38,12 +38,12 @@ static double take_whole(const gk_coupled *c, int e)
         for (int i = 0; i < s->contacts; i++) engaged->glide->others[i] = engaged->glide->moved_along[i] - along[i];
     }
     for (int i = 0; i < s->n; i++) {
-        const double others = engaged->moved[WHOLE][i] - ((rubs ? own[i] : s->Dz[i]) + s->lag[i] + s->Al[i]);
+        const double others = engaged->moved[WHOLE][i] - ((rubs ? own[i] : s->Dz[i]) + s->dashpot.lag[i] + s->Al[i]);
         if (i < judged) {
-            change = gk_max(change, fabs(others - s->outer[i] - s->beyond[i]));
+            change = gk_max(change, fabs(others - s->others.gap[i] - s->others.deflection[i]));
             scale = gk_max(scale, fabs(s->Dz[i]) + fabs(s->Al[i]) + (s->contacts ? fabs(s->g[i]) : 0.0));
         }
-        s->outer[i] = others - s->beyond[i];
+        s->others.gap[i] = others - s->others.deflection[i];
     }
     return change / scale;
 }
@@ -55,9 +55,9 @@ static void part_at_once(gk_engaged *engaged)
     double own[MAX_STRIDE];
     gk_solve_times(s, s->A, engaged->forces.of[AT_ONCE], own);
     for (int i = 0; i < s->n; i++) {
-        const double beyond = s->kind[i] == ROW_CLUTCH ? 0.0 : engaged->moved[YIELDED][i] - own[i];
-        s->outer[i] += s->beyond[i] - beyond;
-        s->beyond[i] = beyond;
+        const double beyond = !gk_row_yields(s, i) ? 0.0 : engaged->moved[YIELDED][i] - own[i];
+        s->others.gap[i] += s->others.deflection[i] - beyond;
+        s->others.deflection[i] = beyond;
     }
 }
 
@@ -72,7 +72,7 @@ static void part_all(const gk_coupled *c)
 static double solve_own(const gk_coupled *c, int e, int round)
 {
     gk_engaged *engaged = &c->work->engaged[e];
-    engaged->system.dashpots_stand = round >= SETTLED;
+    engaged->system.dashpot.stand = round >= SETTLED;
     if (GK_ON(c->setup, friction))
         return gk_friction_solve(engaged->glide, &engaged->system, round, engaged->system.alpha != 0.0);
     gk_solve_contacts(&engaged->system);
@@ -100,7 +100,7 @@ static void rub(const gk_island *island)
     const int e = (int)c->alone;
     double change = INFINITY;
     for (int round = 0; round < PASSES && !(change < FRICTION_TOLERANCE); round++) change = solve_own(c, e, round);
-    island->member[0]->dashpots_stand = 0;
+    island->member[0]->dashpot.stand = 0;
     if (!(change < FRICTION_TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
 }
 
@@ -123,7 +123,7 @@ static double solve_each(gk_coupled *c, int round, int in_turn, double *gaps)
         const double taken = take_whole(c, e), enough = c->sweeps ? AT_REST_TOLERANCE : TOLERANCE;
         *gaps = gk_max(*gaps, taken);
         if (!GK_ON(c->setup, friction))
-            c->work->engaged[e].system.bends = gk_clamp(BENT * taken, 0.1 * enough, ROUGHLY);
+            c->work->engaged[e].system.others.bends = gk_clamp(BENT * taken, 0.1 * enough, ROUGHLY);
         change = gk_max(change, solve_own(c, e, round));
     }
     return change;
@@ -149,7 +149,7 @@ static void sweep(const gk_island *island)
         in_turn |= round >= TURNS && c->rate > SLOW;
     }
     c->known = 1;
-    for (int m = 0; m < island->count; m++) island->member[m]->dashpots_stand = 0;
+    for (int m = 0; m < island->count; m++) island->member[m]->dashpot.stand = 0;
     if (!parted) {
         gk_pass_forces(c, PRESENT);
         gk_pass(c, 0, 1);
@@ -165,7 +165,7 @@ gk_island gk_couple_island(gk_coupled *c)
     for (int e = 0; e < c->model->engagements; e++)
         if (gk_is_within(c, e)) island.member[island.count++] = &c->work->engaged[e].system, c->alone = e;
     if (island.count > 1) gk_far_list(c);
-    for (int m = 0; m < island.count; m++) island.member[m]->coupled = island.count > 1;
+    for (int m = 0; m < island.count; m++) island.member[m]->others.coupled = island.count > 1;
     island.sweep = island.count > 1 ? sweep : GK_ON(c->setup, friction) ? rub : NULL;
     return island;
 }
@@ -198,11 +198,11 @@ void gk_couple_recall(gk_coupled *c)
         gk_system *s = &c->work->engaged[e].system;
         if (!gk_is_within(c, e)) continue;
         for (int i = 0; i < s->n; i++) {
-            s->outer[i] = 0.0;
-            if (s->kind[i] == ROW_CLUTCH) continue;
-            const int entered = i < s->contacts && !s->recalled[i];
-            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_quasi_static(s, i)) : s->g0[i] - s->beyond[i];
-            s->stored0 += 0.5 * s->force0[i] * s->beyond[i];
+            s->others.gap[i] = 0.0;
+            if (!gk_row_yields(s, i)) continue;
+            const int entered = i < s->contacts && !s->flank.recalled[i];
+            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_quasi_static(s, i)) : s->g0[i] - s->others.deflection[i];
+            s->energy.stored0 += 0.5 * s->force0[i] * s->others.deflection[i];
         }
     }
 }

@@ -5,6 +5,7 @@
  * the start, gaps are linear in the coordinates. Then rows and C′ are constant, the mesh does no work of its own, and
  * the scheme's invariant (docs/theory.md, eq. 11) must hold exactly. */
 #include "problem/gk_engage.h"
+#include "problem/gk_row.h"
 #include "problem/gk_rows.h"
 
 static const double PAYABLE = 1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot
@@ -63,71 +64,52 @@ int gk_engage_overlaps(const gk_model *model, const gk_work *work, int e)
 
 /* ---- memory ------------------------------------------------------------------------------------------------------ */
 /* λ0 without dashpots: quasi-static deflection and energy at the start */
-static void recall_forces(const gk_data *data, gk_system *s)
+static void recall_forces(gk_system *s)
 {
     const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
-    s->limit_reached = s->iterations = s->dashpots = s->dashpots_stand = 0;
-    s->alpha = s->bends = 0.0;
+    s->limit_reached = s->iterations = s->dashpot.any = s->dashpot.stand = 0;
+    s->alpha = s->others.bends = 0.0;
     gk_clear(s->direction, quads);
-    gk_clear(s->delta + 4 * whole, joints); /* links know no local law */
-    gk_clear(s->yield + 4 * whole, joints);
-    gk_clear(s->potential + 4 * whole, joints);
+    gk_clear(s->local.delta + 4 * whole, joints); /* links know no local law */
+    gk_clear(s->local.yield + 4 * whole, joints);
+    gk_clear(s->local.potential + 4 * whole, joints);
     memcpy(s->force, s->force0, (size_t)quads * sizeof(gk_quad));
-    for (int i = s->n - s->clutches; i < s->n; i++) {
-        s->active[i] = (unsigned char)GK_OF(data, locked)[s->port_of[i]];
-        s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
-    }
     gk_law_apply(s);
     gk_solve_begin(s);
-    s->stored0 = gk_solve_stored(s);
-    s->held0 = 0.0;
-    for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
+    s->energy.stored0 = gk_solve_stored(s);
+    s->energy.held0 = 0.0;
+    for (int i = 0; i < s->n; i++) s->energy.held0 += s->dashpot.lag0[i] * (s->force0[i] + 0.5 * s->dashpot.end0[i]);
 }
 
 /* The start of the step as this step's compliance sees it: quasi-static deflection and energy under λ0, gaps
  * g0 = s0 − C′λ0 − δ(λ0); then the first guess of status and forces */
-void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
+void gk_memory_recall(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
+    const gk_forming f = {model, setup, data, work, e};
+    gk_system *s = &work->engaged[e].system;
     GK_ASSERT(gk_system_is_sound(s));
-    const gk_engaged *engaged = &work->engaged[e];
     int given = 0; /* forces that are not those of the last step */
-    s->curved = GK_ON(setup, hertz) && s->contacts > 0;
+    s->flank.curved = GK_ON(setup, hertz) && s->contacts > 0;
     s->rubs = GK_ON(setup, friction) && s->contacts > 0;
-    s->rubbing = s->rubbed = s->unbalanced = 0.0;
-    recall_forces(data, s);
+    s->energy.rubbing = s->energy.rubbed = s->energy.unbalanced = 0.0;
+    recall_forces(s);
     for (int i = 0; i < s->n; i++) {
-        const int acted = s->damper0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
-        s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
-        s->tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->damper0[i] - GK_MEMORY * s->end0[i] : 0.0;
+        const int acted = s->dashpot.mean0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
+        s->dashpot.beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
+        s->dashpot.tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->dashpot.mean0[i] - GK_MEMORY * s->dashpot.end0[i]
+                                   : 0.0;
         s->g0[i] = -gk_solve_quasi_static(s, i);
-        s->hold[i] = 0;
+        s->dashpot.hold[i] = 0;
     }
-    for (int i = 0; i < s->contacts; i++) {
-        const int memory = engaged->place[s->place_of[i]].memory;
-        s->recalled[i] = memory >= 0;
-        s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
-                              : s->g0[i] + GK_OF(data, meshing)[e].memory[memory].gap[i % GK_STRIPS(s)];
-        s->apart[i] = s->g0[i] + gk_solve_quasi_static(s, i);
-        s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
-        s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
-    }
-    for (int i = s->contacts; i < s->n; i++) {
-        s->clip[i] = s->kind[i] == ROW_SPRING ? 0 : 2;
-        if (s->kind[i] == ROW_SPRING) s->active[i] = 1;
-        if (s->kind[i] == ROW_CLUTCH) s->g0[i] = s->g[i];
-        if (s->kind[i] != ROW_TORQUE) continue;
-        s->active[i] = 0;
-        s->force[i] = work->torque[s->port_of[i]];
-        given |= s->force[i] != s->force0[i];
-    }
+    for (int b = 0; b < s->blocks; b++) given |= gk_verbs_of(s->block[b].kind)->begin(&f, s, &s->block[b]);
     gk_solve_status(s);
     if (given)
         gk_solve_settle(s);
     else
         gk_solve_begin_dashpots(s);
-    s->energy_error = GK_OF(data, meshing)[e].energy_error;
-    s->energy_correction = gk_clamp(s->energy_error, -PAYABLE * s->stored0, PAYABLE * s->stored0);
+    s->energy.error = GK_OF(data, meshing)[e].energy_error;
+    s->energy.correction = gk_clamp(s->energy.error, -PAYABLE * s->energy.stored0, PAYABLE * s->energy.stored0);
 }
 
 void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
@@ -141,24 +123,10 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     memset(meshing->memory, 0, (size_t)most * sizeof *meshing->memory);
     meshing->pairs = engaged->places;
     for (int p = 0; p < engaged->places; p++) meshing->memory[p].key = engaged->place[p].key;
-    for (int p = 0, i = 0; p < engaged->places; p++) {
-        gk_memory *m = &meshing->memory[p];
-        deepest = gk_max(deepest, -engaged->place[p].gap);
-        for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
-            m->force[strip] = s->force[i];
-            m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
-            m->damper[strip] = s->damper[i];
-            m->end[strip] = s->end[i];
-            if (GK_ON(setup, friction)) m->ratio[strip] = engaged->glide->ratio[i];
-            if (GK_ON(setup, hertz) && s->force[i] > s->law[i / 4].high[i % 4] * s->width[i])
-                data->status |= STATUS_LAW;
-        }
-    }
-    for (int i = s->contacts; i < s->n; i++) GK_OF(data, joint)
-    [s->port_of[i]][s->joint_of[i]] = (gk_joint_state){s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i],
-                                                       s->damper[i], s->end[i]};
+    for (int p = 0; p < engaged->places; p++) deepest = gk_max(deepest, -engaged->place[p].gap);
+    for (int b = 0; b < s->blocks; b++) gk_verbs_of(s->block[b].kind)->keep(setup, engaged, data, &s->block[b]);
     meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
-    meshing->energy_error = s->energy_error;
+    meshing->energy_error = s->energy.error;
 }
 
 /* an engagement without rows */
@@ -166,5 +134,6 @@ void gk_memory_forget(gk_engaged *engaged)
 {
     GK_ASSERT(engaged);
     engaged->places = 0;
-    engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.clutches = 0;
+    engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.joint.clutches = 0;
+    engaged->system.blocks = 0;
 }

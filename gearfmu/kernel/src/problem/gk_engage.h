@@ -5,6 +5,7 @@
 #include "gk.h"
 #include "problem/gk_system.h"
 #include "problem/gk_work.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 typedef struct gk_search {    /* how contacts are looked for */
@@ -18,7 +19,7 @@ typedef struct gk_search {    /* how contacts are looked for */
 GK_HOT int gk_engage(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                      const gk_search *how, int e);
 GK_HOT int gk_engage_overlaps(const gk_model *model, const gk_work *work, int e);
-GK_HOT void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
+GK_HOT void gk_memory_recall(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e);
 GK_HOT void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
 GK_HOT void gk_memory_forget(gk_engaged *engaged);
 #endif

@@ -225,7 +225,7 @@ void gk_exchange_push_bores(const gk_setup *setup, const gk_engaged *engaged, co
     GK_ASSERT(x && sum);
     const gk_system *s = &engaged->system;
     for (int i = s->contacts; i < s->n; i++)
-        if (gk_rows_at_bore(setup, s, i)) sum->moment[s->port_of[i]] += x[i];
+        if (gk_rows_at_bore(setup, s, i)) sum->moment[s->joint.port[i]] += x[i];
     for (int w = 0; w < 2; w++) {
         const int port = setup->mesh[engaged->index].side[w].port_of;
         if (port < 0) continue;
@@ -241,7 +241,7 @@ void gk_exchange_read_bores(const gk_setup *setup, const gk_engaged *engaged, co
     GK_ASSERT(bores && read);
     const gk_system *s = &engaged->system;
     for (int i = s->contacts; i < s->n; i++)
-        if (gk_rows_at_bore(setup, s, i)) read[i] += bores->turned[s->port_of[i]];
+        if (gk_rows_at_bore(setup, s, i)) read[i] += bores->turned[s->joint.port[i]];
     for (int w = 0; w < 2; w++) {
         const int port = setup->mesh[engaged->index].side[w].port_of;
         const int whole = port < 0 || bores->moment[port] == 0.0 ? 0 : s->contacts / 4;

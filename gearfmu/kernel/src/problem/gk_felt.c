@@ -56,7 +56,7 @@ void gk_felt_rows(const gk_setup *setup, gk_work *work, int e, int w)
         }
     }
     for (int i = s->contacts; i < s->n; i++, to += local) {
-        const int slot = gk_rows_at_bore(setup, s, i) ? setup->base.port_slot[side->gear][s->port_of[i]] : -1;
+        const int slot = gk_rows_at_bore(setup, s, i) ? setup->base.port_slot[side->gear][s->joint.port[i]] : -1;
         gk_clear((double *)to, 2 + quads);
         if (slot >= 0) ((double *)to)[slot] = 1.0;
     }
@@ -69,7 +69,7 @@ typedef struct between { /* from the patterns of one gear to those of another */
 
 static between between_of(const gk_setup *setup, const gk_work *work, int to, int from)
 {
-    return (between){work->between[to][from], setup->base.patterns[from], setup->base.patterns[to]};
+    return (between){work->room.between[to][from], setup->base.patterns[from], setup->base.patterns[to]};
 }
 
 static void add_between(between b, const gk_real *x, int kind, gk_real *y)

@@ -42,11 +42,11 @@ static void begin_film(const gk_mesh *mesh, const gk_system *s, int i)
 {
     gk_film *film = s->film;
     double mean = 0.0;
-    for (int k = 0; k < GAPS - 1 && s->yields > 0.0; k++) mean += s->opens[k][i] / GAPS;
+    for (int k = 0; k < GAPS - 1 && s->flank.yields > 0.0; k++) mean += s->flank.opens[k][i] / GAPS;
     film->cut[i] = mesh->film_cut + mean;
     film->inverse_root[i] = inverse_root(film, i, GK_FILM_REACH);
-    const double curvature = gk_max(s->curvature[i], SHARPEST);
-    film->factor[i] = 13.328648814475098 * mesh->friction.viscosity * s->width[i] / (curvature * sqrt(curvature));
+    const double curvature = gk_max(s->flank.curvature[i], SHARPEST);
+    film->factor[i] = 13.328648814475098 * mesh->friction.viscosity * s->flank.width[i] / (curvature * sqrt(curvature));
 }
 
 static void stand(gk_system *s)
@@ -69,12 +69,12 @@ void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
     film->step = h;
     for (int i = 0; i < s->contacts; i++) {
         const double open = s->g0[i] + gk_solve_quasi_static(s, i);
-        if (!s->recalled[i] || !(open > TOUCHES) || !(open < THIN * GK_FILM_REACH)) continue;
+        if (!s->flank.recalled[i] || !(open > TOUCHES) || !(open < THIN * GK_FILM_REACH)) continue;
         begin_film(&setup->mesh[e], s, i);
         film->open[i] = film->left[i] = open;
         film->sinks[i] = 1.0;
-        s->damping[i] = 0.0, s->clip[i] = 2; /* the contact damper acts on flanks that touch */
-        film->delta0[i] = s->delta[i], film->potential0[i] = s->potential[i];
+        s->dashpot.coefficient[i] = 0.0, s->dashpot.clip[i] = 2; /* the contact damper acts on flanks that touch */
+        film->delta0[i] = s->local.delta[i], film->potential0[i] = s->local.potential[i];
         const double u = inverse_root(film, i, open), at_open = impulse(film, i, open, u);
         film->at_open[i] = at_open;
         film->closes[i] = (at_open - impulse(film, i, 0.0, inverse_root(film, i, 0.0))) / h;
@@ -154,7 +154,7 @@ void gk_film_apply(gk_system *s)
 static double deflected(const gk_system *s, int i)
 {
     const double before = s->film->open[i] - s->g0[i] - s->film->delta0[i];
-    return s->Al[i] + s->beyond[i] + s->linear[i] - before;
+    return s->Al[i] + s->others.deflection[i] + s->linear[i] - before;
 }
 
 /* as the gaps of the step say, so that the balance has no defect but that of its contacts */
@@ -169,7 +169,8 @@ static double lost(const gk_system *s, int i)
 {
     const gk_film *film = s->film;
     const double mean = s->force[i] + 0.5 * s->alpha * s->direction[i], sunk = sunk_by(s, i);
-    const double bent = s->force[i] * (s->delta[i] - film->delta0[i]) - s->potential[i] + film->potential0[i];
+    const double bent = s->force[i] * (s->local.delta[i] - film->delta0[i]) - s->local.potential[i] +
+                        film->potential0[i];
     const double late = 0.5 * (s->force[i] - s->force0[i]) * deflected(s, i) + bent;
     if (film->left[i] > 0.0 || !(mean > film->closes[i])) return mean * sunk + late;
     return film->closes[i] * (sunk + late / mean);
@@ -196,8 +197,8 @@ double gk_film_grows(const gk_system *s, const double *p, const double *linear, 
     for (int i = 0; i < s->contacts; i++) {
         if (!s->active[i] || film->sinks[i] == 0.0 || !(film->left[i] > 0.0)) continue;
         const double sinks = film->yields[i] * p[i];
-        sum += p[i] * (sunk_by(s, i) + s->delta[i] - film->delta0[i] + 0.5 * deflected(s, i)) + s->force[i] * sinks +
-               0.5 * (s->force[i] - s->force0[i]) * linear[i];
+        sum += p[i] * (sunk_by(s, i) + s->local.delta[i] - film->delta0[i] + 0.5 * deflected(s, i)) +
+               s->force[i] * sinks + 0.5 * (s->force[i] - s->force0[i]) * linear[i];
         *square += p[i] * (sinks + 0.5 * linear[i]);
     }
     return sum;

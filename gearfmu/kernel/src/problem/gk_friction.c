@@ -20,10 +20,10 @@ static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing
     const gk_system *s = &engaged->system;
     const int strips = GK_STRIPS(s);
     for (int i = 0; i < s->contacts; i++) {
-        const int memory = engaged->place[s->place_of[i]].memory;
+        const int memory = engaged->place[s->flank.place_of[i]].memory;
         const double ratio = memory < 0 ? 0.0 : meshing->memory[memory].ratio[i % strips];
         glide->start[i] = ratio * s->force0[i];
-        glide->start_end[i] = ratio * (s->force0[i] + s->end0[i]);
+        glide->start_end[i] = ratio * (s->force0[i] + s->dashpot.end0[i]);
         glide->mean[i] = glide->step[i] = glide->last[i] = glide->start[i];
         glide->end[i] = glide->start_end[i];
         glide->ratio[i] = ratio;
@@ -61,8 +61,8 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
     glide->rolls = fabs(meshing->rolling) > STEADY * meshing->unsteady; /* a gear that rings about rest sticks */
     for (int i = 0; i < s->contacts; i++) at.total += s->force0[i];
     for (int i = 0; i < s->contacts; i++) {
-        const gk_point *point = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s));
-        at.load = s->force0[i] * s->per_width[i];
+        const gk_point *point = gk_point_of(setup, &engaged->place[s->flank.place_of[i]], i % GK_STRIPS(s));
+        at.load = s->force0[i] * s->flank.per_width[i];
         at.slides = fabs(speed[0] * point->slide[PHIA] + speed[1] * point->slide[PHIB]);
         at.rolls = fabs(speed[0]) * point->roll[0] + fabs(speed[1]) * point->roll[1];
         glide->most[i] = gk_lubrication_coefficient(&mesh->friction, model->engagement[e].width, &at);
@@ -76,7 +76,7 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
 double gk_friction_local_yield(const gk_system *s, int i)
 {
     GK_ASSERT(i >= 0 && i < s->contacts);
-    return s->law[i / 4].slope_high[i % 4] * s->per_width[i];
+    return s->flank.law[i / 4].slope_high[i % 4] * s->flank.per_width[i];
 }
 
 /* Weight θ of the end of the step in the mean coefficient, c̄ = (1 − θ) c₀ + θ c₁. What a contact yields along the
@@ -112,7 +112,7 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     for (int i = 0; i < s->contacts; i++) {
         const double yields = gk_friction_local_yield(s, i);
         glide->yields[i * s->stride + i] += yields;
-        glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
+        glide->damps[i] = gk_min(0.5 * s->dashpot.coefficient[i] * yields, 0.5);
         glide->by_end[i] = follows ? weight_of_end(glide, s, i) : 1.0;
     }
     glide->held0 = gk_friction_held0(glide, s);
@@ -126,7 +126,8 @@ static void find_sliding(gk_glide *glide, const gk_system *s)
         const double *moved = glide->gap_moves + k * s->stride, *yielded = glide->gap_yields + k * s->stride;
         double sum = glide->free[k] + glide->others[k] - glide->others_start[k];
         for (int i = 0; i < s->n; i++)
-            sum += moved[i] * s->z[i] + yielded[i] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]);
+            sum += moved[i] * s->z[i] +
+                   yielded[i] * (s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i]);
         glide->slid[k] = sum;
     }
     for (int j = 0; j < s->contacts; j++) {
@@ -172,7 +173,7 @@ static void express_limits(gk_glide *glide, const gk_system *s)
         glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
         if (!glide->held[j]) glide->full[j] = 0;
         const double ratio = glide->limit[j] * glide->most[j], last = ratio + glide->full[j] * glide->most[j];
-        const double present = s->force[j] + s->end[j], by_z = s->hold[j] ? 0.0 : last;
+        const double present = s->force[j] + s->dashpot.end[j], by_z = s->dashpot.hold[j] ? 0.0 : last;
         const double end = last * present - by_z * s->z[j];
         const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
         const int free = glide->held[j] && !glide->full[j];
@@ -228,7 +229,7 @@ static void express_friction(gk_glide *glide, const gk_system *s)
 static void guess_end(gk_glide *glide, const gk_system *s)
 {
     for (int j = 0; j < s->contacts; j++)
-        glide->end[j] = glide->limit[j] ? glide->limit[j] * glide->most[j] * (s->force[j] + s->end[j])
+        glide->end[j] = glide->limit[j] ? glide->limit[j] * glide->most[j] * (s->force[j] + s->dashpot.end[j])
                         : glide->rolls  ? glide->share[j] * glide->mean[j]
                                         : glide->start_end[j];
 }
@@ -255,7 +256,7 @@ static double find_limits(gk_glide *glide, const gk_system *s)
 {
     double largest = 1e-9;
     for (int j = 0; j < s->contacts; j++) {
-        const double mean = gk_max(0.0, gk_solve_mean(s, j)), end = gk_max(0.0, s->force[j] + s->end[j]);
+        const double mean = gk_max(0.0, gk_solve_mean(s, j)), end = gk_max(0.0, s->force[j] + s->dashpot.end[j]);
         glide->share[j] = mean > 0.0 ? gk_clamp(end / mean, 0.0, 2.0) : 0.0;
         glide->most_force[j] = glide->most[j] * mean;
         glide->most_end[j] = glide->most[j] * end;
@@ -337,8 +338,8 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     gk_solve_settle(s);
     gk_solve_contacts(s);
     glide->moved = follow(glide, s);
-    s->rubbing = gk_friction_defect(glide, s);
-    s->rubbed = gk_friction_taken(glide, s);
+    s->energy.rubbing = gk_friction_defect(glide, s);
+    s->energy.rubbed = gk_friction_taken(glide, s);
     if (changed || (!stands && !round)) return 1.0;
     return glide->moved / find_limits(glide, s);
 }
@@ -363,9 +364,9 @@ double gk_friction_settle(gk_glide *glide, const gk_system *s)
     GK_ASSERT(gk_system_is_sound(s));
     find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
-        const double end = s->force[j] + s->end[j];
+        const double end = s->force[j] + s->dashpot.end[j];
         glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;
         glide->last[j] = glide->ratio[j] * s->force[j];
     }
-    return gk_friction_taken(glide, s) - s->unbalanced;
+    return gk_friction_taken(glide, s) - s->energy.unbalanced;
 }

@@ -19,13 +19,13 @@ static double held(const gk_glide *glide, const gk_system *s, const double *forc
 double gk_friction_held0(const gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide && s);
-    return held(glide, s, s->force0, s->end0, glide->start_end);
+    return held(glide, s, s->force0, s->dashpot.end0, glide->start_end);
 }
 
 double gk_friction_held(const gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide && s);
-    return held(glide, s, s->force, s->end, glide->end);
+    return held(glide, s, s->force, s->dashpot.end, glide->end);
 }
 
 /* What a mean of friction that is not that of both ends leaves of the energy it holds along the profile: taken where it
@@ -52,7 +52,7 @@ double gk_friction_defect(const gk_glide *glide, const gk_system *s)
         const double moved = glide->end[j] - glide->start_end[j];
         for (int i = 0; i < s->n; i++)
             sum -= gap[i] * (gk_solve_static_mean(s, i) * moved +
-                             glide->mean[j] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]));
+                             glide->mean[j] * (s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i]));
         for (int k = 0; k < s->contacts; k++) sum -= glide->mean[k] * own[k] * moved;
     }
     return sum;

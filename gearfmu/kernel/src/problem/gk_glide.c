@@ -14,7 +14,7 @@ static void slide_residual(const gk_engaged *engaged, const gk_side *side, gk_gl
     const size_t node = (size_t)at->node * next;
     for (int i = 0; i < s->contacts; i++)
         for (int j = 0; j < s->contacts; j++) {
-            const gk_place *p = &engaged->place[s->place_of[i]], *q = &engaged->place[s->place_of[j]];
+            const gk_place *p = &engaged->place[s->flank.place_of[i]], *q = &engaged->place[s->flank.place_of[j]];
             const size_t row = (size_t)(p->candidate[side->which] * strips + i % strips);
             const size_t cell = node + row * columns + (size_t)(q->candidate[side->which] * strips + j % strips);
             const gk_real *normal = side->along.normal + cell, *own = side->along.own + cell;
@@ -140,7 +140,7 @@ void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *wo
     slide_ground(setup, work, k, e);
     slide_spins(setup, k, &setup->mesh[e], s, glide);
     for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
-        for (int i = s->n - s->clutches; i < s->n; i++) glide->gap_yields[j * s->stride + i] = 0.0;
+        for (int i = s->n - s->joint.clutches; i < s->n; i++) glide->gap_yields[j * s->stride + i] = 0.0;
 }
 
 /* sliding in the step of length h without its forces */

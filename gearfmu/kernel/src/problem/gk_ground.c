@@ -125,7 +125,7 @@ static void add_spins(const gk_setup *setup, const gk_coefficients *k, gk_system
 /* a clutch is a row of speeds, without κ; clutches are the last rows */
 static void leave_clutches(gk_system *s)
 {
-    for (int i = s->n - s->clutches; i < s->n; i++)
+    for (int i = s->n - s->joint.clutches; i < s->n; i++)
         for (int j = 0; j <= i; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
 }
 
@@ -150,7 +150,7 @@ static void add_tabled(const gk_model *model, const gk_setup *setup, const gk_co
         for (int w = 0; w < 2; w++) {
             const int g = setup->mesh[e].side[w].gear;
             double *D = s->D + r * s->stride, *A = s->A + r * s->stride;
-            if (!setup->base.width[g] || !gk_rows_at_bore(setup, s, r) || gk_port_of(model, g) != s->port_of[r])
+            if (!setup->base.width[g] || !gk_rows_at_bore(setup, s, r) || gk_port_of(model, g) != s->joint.port[r])
                 continue;
             for (int i = 0; i < s->contacts; i++) D[i] += port[w][0][i], A[i] -= port[w][1][i];
             D[r] += engaged->table[w].own[0][bore][bore], A[r] -= engaged->table[w].own[1][bore][bore];

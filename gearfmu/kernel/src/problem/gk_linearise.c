@@ -66,9 +66,9 @@ static int form_all(const gk_model *model, const gk_setup *setup, gk_work *work,
 {
     memcpy(work->spin, GK_OF(data, x), (size_t)setup->spins * sizeof *work->spin);
     memset(work->speed, 0, sizeof work->speed);
-    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
-    work->ground_y = work->ground_zero;
-    const gk_search how = {.k = &work->explicit_rows, .ground = gk_ground_seen(data)};
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->room.zero;
+    work->ground_y = work->room.ground_zero;
+    const gk_search how = {.k = &work->room.explicit_rows, .ground = gk_ground_seen(data)};
     for (int e = 0; e < model->engagements; e++) {
         gk_system *s = &work->engaged[e].system;
         if (!gk_engage(model, setup, work, data, &how, e)) return 0;
@@ -85,7 +85,7 @@ static int list_kept(const gk_model *model, const gk_work *work, kept *rows)
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = 0; i < s->n; i++)
-            if (i < s->contacts ? s->force0[i] > 0.0 : s->kind[i] == ROW_SPRING) rows[count++] = (kept){e, i};
+            if (gk_row_is_stiff(s, i) && (s->force0[i] != 0.0 || !gk_row_opens(s, i))) rows[count++] = (kept){e, i};
     }
     return count;
 }
@@ -98,11 +98,11 @@ static void describe_row(const gk_setup *setup, const gk_work *work, kept row, i
     const int i = row.row, contact = i < s->contacts;
     int32_t *label = out->label + 4 * r;
     out->force[r] = s->force0[i];
-    out->dashpot[r] = DAMPER_AT_UNIT_STEP * s->damping[i];
+    out->dashpot[r] = DAMPER_AT_UNIT_STEP * s->dashpot.coefficient[i];
     out->te[r] = 0.0;
-    label[0] = contact ? row.engagement : -1, label[1] = s->port_of[i], label[2] = s->joint_of[i], label[3] = 0;
+    label[0] = contact ? row.engagement : -1, label[1] = s->joint.port[i], label[2] = s->joint.which[i], label[3] = 0;
     if (!contact) return;
-    const gk_place *place = &engaged->place[s->place_of[i]];
+    const gk_place *place = &engaged->place[s->flank.place_of[i]];
     label[1] = place->key.flank, label[2] = place->key.tooth, label[3] = i % GK_STRIPS(s);
     out->te[r] = (place->key.flank ? 1.0 : -1.0) * setup->mesh[row.engagement].cosine;
 }
@@ -110,7 +110,7 @@ static void describe_row(const gk_setup *setup, const gk_work *work, kept row, i
 /* S between two rows: the path of a tooth pair and its local law; 1/k */
 static double own_compliance(const gk_system *s, int i, int j)
 {
-    return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
+    return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->local.yield[i] : 0.0);
 }
 
 /* what a unit force of one row does at once to all rows of its own engagement, and between bores and flanks to those of
@@ -180,7 +180,7 @@ static double pressed(const gk_setup *setup, const gk_engaged *engaged, const gk
 {
     const gk_position *at = &engaged->position[side->which];
     const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)gk_padded(side->held.width);
-    const int candidate = engaged->place[engaged->system.place_of[i]].candidate[side->which];
+    const int candidate = engaged->place[engaged->system.flank.place_of[i]].candidate[side->which];
     const size_t point = (size_t)at->node * points + (size_t)(candidate * setup->strips + i % setup->strips);
     if (support < side->held.from || support >= side->held.from + side->held.width) return 0.0;
     const double *low = side->support + point * width + (support - side->held.from);
@@ -208,7 +208,7 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
             if (rows[r].row < system->contacts)
                 for (int w = 0; w < 2; w++) force -= pressed(setup, engaged, &side[w], rows[r].row, s);
             else if (gk_rows_at_bore(setup, system, rows[r].row))
-                force = setup->port_support[system->port_of[rows[r].row]][s];
+                force = setup->port_support[system->joint.port[rows[r].row]][s];
             out->support_forces[(size_t)s * (size_t)out->room + (size_t)r] = force;
         }
     }

@@ -283,8 +283,8 @@ static void report(const gk_setup *setup, const nodal_pair *p, int place, gk_sys
     for (int i = 0; i < setup->strips; i++) {
         const int row = place * setup->strips + i;
         s->force[row] = s->z[row] = p->strip[i];
-        s->Al[row] = s->linear[row] = s->beyond[row] = s->end[row] = 0.0;
-        s->potential[row] = i ? 0.0 : p->energy;
+        s->Al[row] = s->linear[row] = s->others.deflection[row] = s->dashpot.end[row] = 0.0;
+        s->local.potential[row] = i ? 0.0 : p->energy;
         if (!i && p->strip[0] == 0.0 && p->energy > 0.0) s->force[row] = 1e-300; /* energy is counted where force is */
     }
 }
@@ -325,7 +325,7 @@ static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, 
         for (int w = 0; w < 2; w++) press_nodes(p, w);
         for (int w = 0; w < 2; w++) {
             gk_real *sum[2] = {work->force[p->e->gear[w]], work->next[p->e->gear[w]]};
-            gk_field_end(p->tooth[w].field, work->zero, sum, work->ground_force);
+            gk_field_end(p->tooth[w].field, work->room.zero, sum, work->ground_force);
         }
         if (p->mesh->runs_out) gk_runout_turn(p->turn, p->push);
         press_pose(setup, work, p->mesh, p->push, spin_rate);
@@ -337,7 +337,7 @@ static void press_engagement(gk_work *work, const gk_data *data, nodal_pair *p, 
 void gk_nodal_leave(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
-    for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->damper0[i] = s->end0[i] = 0.0;
+    for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->dashpot.mean0[i] = s->dashpot.end0[i] = 0.0;
 }
 
 /* adds the forces of nodal contact at the trial state to modal forces, ground forces and rates of the spins' speeds */

@@ -17,9 +17,9 @@ static void forces_of(const gk_setup *setup, gk_engaged *engaged, gk_moment when
     const int start = when == ALONG_START;
     const double *late = when == PRESENT ? s->force : s->force0; /* given torques may have changed */
     for (int i = 0; i < s->stride; i++) {
-        const int row = i < s->n, yields = row && s->kind[i] != ROW_CLUTCH;
+        const int row = i < s->n, yields = row && gk_row_yields(s, i);
         f->of[STEP][i] = row && !start ? s->z[i] : 0.0;
-        f->of[ONCE][i] = !yields ? 0.0 : start ? s->force0[i] + s->end0[i] : s->force[i] + s->end[i];
+        f->of[ONCE][i] = !yields ? 0.0 : start ? s->force0[i] + s->dashpot.end0[i] : s->force[i] + s->dashpot.end[i];
         f->of[AT_ONCE][i] = yields ? late[i] : 0.0;
         if (!GK_ON(setup, friction)) continue;
         const gk_glide *glide = engaged->glide;
@@ -337,7 +337,7 @@ static void read_rows(const gk_coupled *c, int e, int t, const double *far)
     read_group(c, engaged, t, 0, read);
     for (int l = 0; l < mesh->spins; l++) {
         gk_axpy(c->work->move_spin[t][mesh->spin[l]], s->rigid[l], read, 0, s->stride / 4);
-        for (int i = s->n - s->clutches; i < s->n && t == WHOLE; i++)
+        for (int i = s->n - s->joint.clutches; i < s->n && t == WHOLE; i++)
             read[i] += c->work->yield_spin[mesh->spin[l]] * s->rigid[l][i];
     }
     read_bores(c, engaged, t, read);

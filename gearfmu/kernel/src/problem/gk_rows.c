@@ -183,7 +183,7 @@ static void joint_rows(const gk_setup *setup, const gk_mesh *mesh, gk_engaged *e
     double *row = engaged->ground + s->contacts * engaged->local + (w ? engaged->wide[0] : 0);
     for (int i = s->contacts; i < s->n; i++, row += engaged->local)
         if (gk_rows_at_bore(setup, s, i))
-            memcpy(row, setup->base.port_rows + s->port_of[i] * setup->base.n + mesh->part[w].from, size);
+            memcpy(row, setup->base.port_rows + s->joint.port[i] * setup->base.n + mesh->part[w].from, size);
         else
             memset(row, 0, size);
 }

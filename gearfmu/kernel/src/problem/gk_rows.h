@@ -14,8 +14,8 @@
 static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int i)
 {
     GK_ASSERT(i >= s->contacts && i < s->n);
-    GK_ASSERT(s->port_of[i] >= 0 && s->port_of[i] < MAX_PORTS);
-    return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
+    GK_ASSERT(s->joint.port[i] >= 0 && s->joint.port[i] < MAX_PORTS);
+    return s->joint.which[i] == (setup->chained[s->joint.port[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
 
 GK_HOT void gk_rows_pose(const gk_setup *setup, const gk_work *work, int e, const double *spin, const double *ground,

@@ -8,7 +8,7 @@
  * Active-set Newton with chord steps, in an island with one factorisation as long as no status changes. All violated
  * rows flip at once, after four rounds without progress only the last one (block principal pivoting, Júdice & Pires
  * 1994). */
-#include "problem/gk_system.h"
+#include "problem/gk_row.h"
 
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40 };
 /* SOLVED: of the last move; what is left after it is some hundredths of that. PART_KNOWN: of λ0 + λ1, damper of a
@@ -20,9 +20,6 @@ static const double SOLVED = 1e-11, PART_KNOWN = 1e-12;
 enum { DASHPOT_ROUNDS = 8 };
 static const double SOLVED = 1e-7, PART_KNOWN = 1e-5;
 #endif
-
-static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
-static int is_clutch(const gk_system *s, int i) { return s->kind[i] == ROW_CLUTCH; }
 
 GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, double *y, const int quads)
 {
@@ -73,25 +70,25 @@ void gk_solve_status(gk_system *s)
     GK_ASSERT(gk_system_is_sound(s));
     s->factored = 0;
     gk_bits any = {0};
-    for (int i = s->n; i < s->stride; i++) s->active[i] = 0, s->clip[i] = 2, s->hold[i] = 0;
+    for (int i = s->n; i < s->stride; i++) s->active[i] = 0, s->dashpot.clip[i] = 2, s->dashpot.hold[i] = 0;
     for (int q = 0; q < s->stride / 4; q++) {
         const unsigned char *active = s->active + 4 * q;
-        const signed char *clip = s->clip + 4 * q, *hold = s->hold + 4 * q;
+        const signed char *clip = s->dashpot.clip + 4 * q, *hold = s->dashpot.hold + 4 * q;
         const gk_bits clips = {clip[0], clip[1], clip[2], clip[3]}, holds = {hold[0], hold[1], hold[2], hold[3]};
         const gk_bits acts = clips != 2, lasts = acts & (holds == 0), linear = clips == 0;
-        const gk_quad gain = GK_CHOOSE(linear, ((gk_quad *)s->damping)[q], GK_ALL(0.0));
-        const gk_quad pull = GK_CHOOSE(acts, __builtin_convertvector(clips, gk_quad) * ((gk_quad *)s->part)[q],
+        const gk_quad gain = GK_CHOOSE(linear, ((gk_quad *)s->dashpot.coefficient)[q], GK_ALL(0.0));
+        const gk_quad pull = GK_CHOOSE(acts, __builtin_convertvector(clips, gk_quad) * ((gk_quad *)s->dashpot.part)[q],
                                        GK_ALL(0.0));
-        const gk_quad rest = GK_CHOOSE(lasts, ((gk_quad *)s->tail)[q], GK_ALL(0.0));
+        const gk_quad rest = GK_CHOOSE(lasts, ((gk_quad *)s->dashpot.tail)[q], GK_ALL(0.0));
         ((gk_quad *)s->on)[q] = (gk_quad){active[0], active[1], active[2], active[3]};
-        ((gk_quad *)s->gain)[q] = gain;
-        ((gk_quad *)s->pull)[q] = pull;
-        ((gk_quad *)s->late)[q] = GK_CHOOSE(lasts, ((gk_quad *)s->beta)[q], GK_ALL(0.0));
-        ((gk_quad *)s->rest)[q] = rest;
-        ((gk_quad *)s->held)[q] = __builtin_convertvector(holds, gk_quad);
+        ((gk_quad *)s->dashpot.gain)[q] = gain;
+        ((gk_quad *)s->dashpot.pull)[q] = pull;
+        ((gk_quad *)s->dashpot.late)[q] = GK_CHOOSE(lasts, ((gk_quad *)s->dashpot.beta)[q], GK_ALL(0.0));
+        ((gk_quad *)s->dashpot.rest)[q] = rest;
+        ((gk_quad *)s->dashpot.held)[q] = __builtin_convertvector(holds, gk_quad);
         any |= (gain != 0.0) | (pull != 0.0) | (rest != 0.0);
     }
-    s->dashpots = (any[0] | any[1] | any[2] | any[3]) != 0;
+    s->dashpot.any = (any[0] | any[1] | any[2] | any[3]) != 0;
 }
 
 /* films: what they carry is a mean of the step */
@@ -99,7 +96,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
 {
 #define OF(array) ((gk_quad *)s->array)
     for (int q = 0; q < quads; q++) {
-        OF(approach)[q] = OF(linear)[q] + OF(delta)[q];
+        OF(approach)[q] = OF(linear)[q] + OF(local.delta)[q];
         gk_quad force = OF(force)[q];
         if (films) {
             const gk_quad closes = OF(film->closes)[q], sinks = OF(film->sinks)[q];
@@ -107,19 +104,20 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
             OF(film->lift)[q] = GK_CHOOSE(force < closes, sinks, GK_ALL(0.0));
             force += sinks * (carried - OF(force0)[q]);
         }
-        OF(damper)
-        [q] = OF(gain)[q] * (OF(approach)[q] - OF(approach0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
-        OF(end)[q] = OF(late)[q] * OF(damper)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
-        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(damper)[q];
+        OF(dashpot.mean)
+        [q] = OF(dashpot.gain)[q] * (OF(approach)[q] - OF(approach0)[q]) +
+              OF(dashpot.pull)[q] * (OF(force0)[q] + OF(force)[q]);
+        OF(dashpot.end)
+        [q] = OF(dashpot.late)[q] * OF(dashpot.mean)[q] + OF(dashpot.rest)[q] + OF(dashpot.held)[q] * OF(force)[q];
+        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dashpot.mean)[q];
         OF(z)[q] = force + OF(eta)[q] + OF(jump)[q];
     }
 #undef OF
-    for (int i = s->n - s->clutches; i < s->n; i++)
-        s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
-    if (s->dashpots)
-        products(s, s->end, 1, s->lag, s->Dz, s->Al, quads);
+    for (int i = s->n - s->joint.clutches; i < s->n; i++) s->z[i] = s->active[i] ? s->force[i] : s->joint.slip[i];
+    if (s->dashpot.any)
+        products(s, s->dashpot.end, 1, s->dashpot.lag, s->Dz, s->Al, quads);
     else
-        products(s, s->end, 0, s->lag, s->Dz, s->Al, quads);
+        products(s, s->dashpot.end, 0, s->dashpot.lag, s->Dz, s->Al, quads);
 }
 
 /* everything that follows from λ, α and the status of rows and dashpots; the law has been applied */
@@ -142,29 +140,29 @@ void gk_solve_begin(gk_system *s)
     const int quads = s->stride / 4;
     gk_solve_path(s, s->force, s->linear);
     for (int q = 0; q < quads; q++) {
-        ((gk_quad *)s->approach)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->delta)[q];
+        ((gk_quad *)s->approach)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->local.delta)[q];
         ((gk_quad *)s->approach0)[q] = ((gk_quad *)s->approach)[q];
         ((gk_quad *)s->z)[q] = ((gk_quad *)s->force)[q];
-        ((gk_quad *)s->damper)[q] = ((gk_quad *)s->end)[q] = ((gk_quad *)s->lag)[q] = (gk_quad){0};
+        ((gk_quad *)s->dashpot.mean)[q] = ((gk_quad *)s->dashpot.end)[q] = ((gk_quad *)s->dashpot.lag)[q] = (gk_quad){
+            0};
     }
-    for (int i = s->n - s->clutches; i < s->n; i++)
-        s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
-    GK_SIZED(quads, products, s, s->end0, 1, s->lag0, s->Dz, s->Al)
+    for (int i = s->n - s->joint.clutches; i < s->n; i++) s->z[i] = s->active[i] ? s->force[i] : s->joint.slip[i];
+    GK_SIZED(quads, products, s, s->dashpot.end0, 1, s->dashpot.lag0, s->Dz, s->Al)
 }
 
 /* and what is left of these at its end */
 void gk_solve_begin_dashpots(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
-    if (!s->dashpots) return;
-    memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
-    gk_solve_times(s, s->A, s->end, s->lag);
+    if (!s->dashpot.any) return;
+    memcpy(s->dashpot.end, s->dashpot.rest, (size_t)s->stride * sizeof *s->dashpot.end);
+    gk_solve_times(s, s->A, s->dashpot.end, s->dashpot.lag);
 }
 
 static void residual(const gk_system *s, double *r)
 {
-    const gk_quad *outer = (const gk_quad *)s->outer, *beyond = (const gk_quad *)s->beyond;
-    const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->lag,
+    const gk_quad *outer = (const gk_quad *)s->others.gap, *beyond = (const gk_quad *)s->others.deflection;
+    const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->dashpot.lag,
                   *Al = (const gk_quad *)s->Al, *approach = (const gk_quad *)s->approach, *on = (const gk_quad *)s->on;
     for (int q = 0; q < s->stride / 4; q++)
         ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + approach[q] + outer[q] + beyond[q]) * on[q];
@@ -177,8 +175,8 @@ static void residual(const gk_system *s, double *r)
 static int move(gk_system *s, const double *x, double *e, double *change)
 {
     const int quads = s->stride / 4;
-    const gk_quad *by = (const gk_quad *)x, *on = (const gk_quad *)s->on, *slope = (const gk_quad *)s->slope,
-                  *delta = (const gk_quad *)s->delta;
+    const gk_quad *by = (const gk_quad *)x, *on = (const gk_quad *)s->on, *slope = (const gk_quad *)s->local.slope,
+                  *delta = (const gk_quad *)s->local.delta;
     gk_quad most = {0}, size = {0}, *force = (gk_quad *)s->force, *bent = (gk_quad *)e;
     for (int q = 0; q < quads; q++) {
         force[q] += by[q];
@@ -196,8 +194,8 @@ static int move(gk_system *s, const double *x, double *e, double *change)
         deepest = GK_LARGER(deepest, deep);
     }
     *change = gk_largest(&most);
-    if (s->bends > 0.0 && !gk_film_on(s)) return gk_largest(&worst) > s->bends * gk_largest(&deepest);
-    return ((GK_HAS(hertz) && s->curved) || gk_film_on(s)) && *change > SOLVED * gk_largest(&size);
+    if (s->others.bends > 0.0 && !gk_film_on(s)) return gk_largest(&worst) > s->others.bends * gk_largest(&deepest);
+    return ((GK_HAS(hertz) && s->flank.curved) || gk_film_on(s)) && *change > SOLVED * gk_largest(&size);
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */
@@ -207,7 +205,7 @@ static void bend(const gk_system *s, const double *e, double *r)
     const gk_quad *bent = (const gk_quad *)e, *on = (const gk_quad *)s->on;
     for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] = -bent[q];
     for (int j = 0; j < s->contacts; j++)
-        if (s->gain[j] != 0.0) gk_axpy(-s->gain[j] * e[j], s->B + j * s->stride, r, 0, quads);
+        if (s->dashpot.gain[j] != 0.0) gk_axpy(-s->dashpot.gain[j] * e[j], s->B + j * s->stride, r, 0, quads);
     for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] *= on[q];
 }
 
@@ -231,34 +229,24 @@ static void newton(gk_system *s)
         }
         last = change;
     }
-    s->factored = s->coupled && !films && !s->rubs;
+    s->factored = s->others.coupled && !films && !s->rubs;
     gk_solve_settle(s);
 }
 
-/* one row's verdict: does it contradict its status? */
-static int violated(const gk_system *s, int i)
+/* how many rows contradict their status, which, and the last of them */
+static int contradictions(const gk_system *s, unsigned char *wrong, int *last)
 {
-    if (is_contact(s, i))
-        return s->active[i]
-                   ? s->force[i] < 0.0
-                   : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
-    if (!is_clutch(s, i)) return 0;
-    if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
-    return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */
+    int count = 0;
+    memset(wrong, 0, (size_t)s->n);
+    for (int b = 0; b < s->blocks; b++)
+        if (gk_verbs_of(s->block[b].kind)->contradict)
+            gk_verbs_of(s->block[b].kind)->contradict(s, &s->block[b], wrong);
+    for (int i = 0; i < s->n; i++)
+        if (wrong[i]) count++, *last = i;
+    return count;
 }
 
-static void flip(gk_system *s, int i)
-{
-    s->active[i] = !s->active[i];
-    if (is_clutch(s, i)) {
-        if (!s->active[i]) s->slip[i - s->n + s->clutches] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
-        s->force[i] = 0.0;
-    } else if (!s->active[i]) {
-        if (!(s->force0[i] > 0.0)) s->clip[i] = 2; /* closed at neither end */
-        s->hold[i] = s->clip[i] != 2;
-        s->force[i] = 0.0;
-    }
-}
+static void flip(gk_system *s, int i) { gk_verbs_of(s->kind[i])->flip(s, i); }
 
 static int beyond(double x, double limit) { return x > limit ? 1 : x < -limit ? -1 : 0; }
 
@@ -273,7 +261,7 @@ static double deflected_by_these(const gk_system *s, int i)
 {
     const int way = passes(s, i);
     const double *force = way > 0 ? s->force : s->force0;
-    double sum = way > 0 ? s->delta[i] : s->approach0[i];
+    double sum = way > 0 ? s->local.delta[i] : s->approach0[i];
     for (int j = 0; j < s->contacts; j++) {
         const int at = j * s->stride + i;
         if (way < 0) sum -= s->P[at] * force[j];
@@ -287,7 +275,7 @@ static double deflected_by_these(const gk_system *s, int i)
 static double touching(const gk_system *s, int i)
 {
     const double own = deflected_by_these(s, i),
-                 left = passes(s, i) > 0 ? s->apart[i] : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+                 left = passes(s, i) > 0 ? s->dashpot.apart[i] : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     return own > 0.0 ? own / (own + gk_max(0.0, left)) : 1.0;
 }
 
@@ -307,19 +295,22 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2, hold = 0;
         double part = 1.0;
-        if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
-            const double free = s->damping[i] * (s->approach[i] - s->approach0[i]), limit = s->force0[i] + s->force[i];
+        if (s->dashpot.coefficient[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
+            const double free = s->dashpot.coefficient[i] * (s->approach[i] - s->approach0[i]),
+                         limit = s->force0[i] + s->force[i];
             const int turns = passes(s, i) && limit > 0.0;
             if (turns) part = passing(s, i, free);
-            clip = turns ? (free < 0.0 ? -1 : 1) : towards(s->clip[i], beyond(free, limit));
+            clip = turns ? (free < 0.0 ? -1 : 1) : towards(s->dashpot.clip[i], beyond(free, limit));
             const double mean = gk_clamp(free, -part * limit, part * limit);
-            hold = s->active[i] ? towards(s->hold[i], beyond(s->beta[i] * mean + s->tail[i], s->force[i])) : 1;
-            changed |= fabs(part - s->part[i]) > PART_KNOWN;
+            hold = s->active[i] ? towards(s->dashpot.hold[i],
+                                          beyond(s->dashpot.beta[i] * mean + s->dashpot.tail[i], s->force[i]))
+                                : 1;
+            changed |= fabs(part - s->dashpot.part[i]) > PART_KNOWN;
         }
-        changed |= clip != s->clip[i] || hold != s->hold[i];
-        s->part[i] = part;
-        s->clip[i] = clip;
-        s->hold[i] = hold;
+        changed |= clip != s->dashpot.clip[i] || hold != s->dashpot.hold[i];
+        s->dashpot.part[i] = part;
+        s->dashpot.clip[i] = clip;
+        s->dashpot.hold[i] = hold;
     }
     return changed;
 }
@@ -328,16 +319,12 @@ static int limit_dashpots(gk_system *s)
 void gk_solve_contacts(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
-    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = s->dashpots_stand ? 0 : DASHPOT_ROUNDS;
+    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = s->dashpot.stand ? 0 : DASHPOT_ROUNDS;
     s->limit_reached = 0; /* of the solution that is used in the end */
     for (int round = 0; round < ROUND_LIMIT; round++) {
         newton(s);
         unsigned char wrong[MAX_ROWS];
-        int count = 0, last = -1;
-        for (int i = 0; i < s->n; i++) {
-            wrong[i] = (unsigned char)violated(s, i);
-            if (wrong[i]) count++, last = i;
-        }
+        int last = -1, count = contradictions(s, wrong, &last);
         if (count) {
             if (count < fewest)
                 fewest = count, patience = 4;
@@ -374,6 +361,7 @@ double gk_solve_stored(const gk_system *s)
     GK_ASSERT(gk_system_is_sound(s));
     double sum = 0.0;
     for (int i = 0; i < s->n; i++)
-        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->beyond[i] + s->linear[i]) + s->potential[i];
+        if (s->force[i] != 0.0)
+            sum += 0.5 * s->force[i] * (s->Al[i] + s->others.deflection[i] + s->linear[i]) + s->local.potential[i];
     return sum;
 }

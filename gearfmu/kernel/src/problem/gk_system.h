@@ -19,8 +19,12 @@ enum {
     MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4,
     MAX_LOCAL = 7 /* spins that an engagement's rows read */
 };
-/* λ ≥ 0; any λ; given torque; velocity-level friction */
-typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
+/* λ ≥ 0; any λ; λ on either side of a play; given torque; velocity-level friction. Their verbs: gk_row.h */
+typedef enum { ROW_CONTACT, ROW_SPRING, ROW_PLAY, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
+typedef struct gk_row_block { /* rows of one kind, from … end − 1 */
+    gk_row_kind kind;
+    int from, end;
+} gk_row_block;
 
 /* local laws of four contacts side by side */
 typedef struct gk_laws {
@@ -28,65 +32,86 @@ typedef struct gk_laws {
     gk_quad yields, closes[GAPS - 1]; /* of parts: gk_mesh.yields; forces at which further places close */
 } gk_laws;
 
-typedef struct gk_system {
-    int contacts, n, stride, strips, clutches; /* clutches are the last rows */
-    gk_row_kind kind[MAX_ROWS];
-    int port_of[MAX_ROWS], joint_of[MAX_ROWS]; /* −1 for contacts */
+typedef struct gk_flank_rows { /* what only contacts have; 0 in joints */
     int place_of[MAX_CONTACTS];
-    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE], damper0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
-    double damping[MAX_STRIDE];                      /* 2c/h of the row's damper */
-    double bound[MAX_ROWS], slip[MAX_JOINTS];        /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
-    double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
-    double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
-    double curvature[MAX_STRIDE];                    /* of the contacts, 1/m */
+    unsigned char recalled[MAX_ROWS];                /* a contact that was there in the last step */
+    double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of their strips */
+    double curvature[MAX_STRIDE];                    /* 1/m */
     double opens[GAPS - 1][MAX_STRIDE];              /* of parts of lines of contact: gk_point.opens, m */
     double yields;                                   /* gk_mesh.yields; 0: contacts close as a whole */
-    gk_laws law[MAX_STRIDE / 4];                     /* laws of the contacts, per metre */
-    double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
-    double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
-    double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
-                                         factor; what a damper's force does, D + late·A */
-    double inverse[MAX_STRIDE]; /* of the pivots */
-    double force[MAX_STRIDE], damper[MAX_STRIDE], eta[MAX_STRIDE],
-        z[MAX_STRIDE];                /* λ, η_d, η = η_d + α·direction, λ + η */
-    unsigned char active[MAX_STRIDE]; /* in the equations: closed contact, bilateral row, sticking clutch */
+    gk_laws law[MAX_STRIDE / 4];                     /* per metre */
+    int curved;                                      /* the local law is */
+} gk_flank_rows;
+
+typedef struct gk_local { /* law at λ: δ, δ′, ∫ λ dδ, 0 in joints; δ′ in the tangent */
+    double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE], slope[MAX_STRIDE];
+} gk_local;
+
+typedef struct gk_joint_rows { /* what only joints have; −1 in contacts */
+    int port[MAX_ROWS], which[MAX_ROWS];
+    double bound[MAX_ROWS], slip[MAX_ROWS]; /* clutch: |z| ≤ bound; z of a slipping one */
+    int clutches;                           /* the last rows */
+} gk_joint_rows;
+
+typedef struct gk_dashpots { /* η_d in the step, f_d at its end, A f_d; 0: of the last step */
+    double mean[MAX_STRIDE], end[MAX_STRIDE], lag[MAX_STRIDE], mean0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
+    double coefficient[MAX_STRIDE]; /* 2c/h */
     signed char clip[MAX_STRIDE],
-        hold[MAX_STRIDE]; /* damper: 0 linear, ±1 at its limit ±part·(λ0 + λ1), 2 not acting; its force at
-                                                   the end: 0 linear, ±1 at its limit ±λ1 */
-    double beta[MAX_STRIDE],
-        tail[MAX_STRIDE];     /* of a damper that acts: f_d = β η_d + what the last step leaves of it */
-    double apart[MAX_STRIDE]; /* distance left at the start of the step */
-    double part[MAX_STRIDE];  /* of λ0 + λ1 that η_d is where it is limited: 1 where a contact is closed at both ends */
-    double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
-        held[MAX_STRIDE];    /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
-                             η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), pull = ±part;
-                             f_d = late·η_d + rest + held·λ1 */
-    double jump[MAX_STRIDE]; /* of a given torque, at the start of the step; else 0 */
-    int dashpots;            /* any of them */
-    double direction[MAX_STRIDE], alpha;
-    double last[MAX_STRIDE]; /* forces at the end that the next prediction is made with */
-    double end[MAX_STRIDE];  /* f_d */
-    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];                 /* D z, Aλ, A f_d */
-    double linear[MAX_STRIDE], approach[MAX_STRIDE], approach0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
-    double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
-    double slope[MAX_STRIDE];                                           /* δ′ in the tangent */
-    double stored0;            /* energy of the quasi-static part at the start of the step */
-    double held0;              /* energy that the dampers' force holds in Q at the start */
-    double energy_error;       /* defect of energy that the steps before left */
-    double energy_correction;  /* what of it this step should make good */
+        hold[MAX_STRIDE]; /* 0 linear, ±1 at its limit ±part·(λ0 + λ1), 2 not acting; its force at
+                             the end: 0 linear, ±1 at its limit ±λ1 */
+    double beta[MAX_STRIDE], tail[MAX_STRIDE]; /* of one that acts: f_d = β η_d + what the last step leaves of it */
+    double apart[MAX_STRIDE];                  /* distance left at the start of the step */
+    double part[MAX_STRIDE]; /* of λ0 + λ1 that η_d is where it is limited: 1 where a contact is closed at both ends */
+    double gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
+        held[MAX_STRIDE]; /* the same as numbers (gk_solve_status): η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1),
+                             pull = ±part; f_d = late·η_d + rest + held·λ1 */
+    int any, stand;       /* stand: where they are, no search for what limits them */
+} gk_dashpots;
+
+typedef struct gk_account {    /* energy of the quasi-static part */
+    double stored0, held0;     /* at the start of the step; what the dampers' force holds in Q then */
+    double error, correction;  /* defect that the steps before left; what of it this step should make good */
     double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
     double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
-    int coupled, factored;     /* it has neighbours; the tangent's factors are those of its status */
-    int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
-    int dashpots_stand;                          /* where they are: no search for what limits them */
-    double bends; /* in an island: what the law may still bend, of the largest local deflection; 0: moves tell */
-    int films;    /* rows whose gap is open at the start of the step, with oil in it */
+} gk_account;
+
+typedef struct gk_others { /* what other engagements of the island do: to the gaps in the step; as deflection at once */
+    double gap[MAX_STRIDE], deflection[MAX_STRIDE];
+    int coupled;  /* there are any */
+    double bends; /* what the law may still bend, of the largest local deflection; 0: moves tell */
+} gk_others;
+
+typedef struct gk_system {
+    int contacts, n, stride, strips;
+    gk_row_kind kind[MAX_ROWS];
+    gk_row_block block[MAX_JOINTS + 1]; /* the contacts first */
+    int blocks;
+    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE];
+    double weight[MAX_ROWS];             /* slices that a row stands for: η is shared out per slice */
+    double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
+    double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
+    double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
+                          factor; what a damper's force does, D + late·A */
+    double inverse[MAX_STRIDE]; /* of the pivots */
+    int factored;               /* the tangent's factors are those of the status */
+    double force[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE];               /* λ, η = η_d + α·direction, λ + η */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE];                                  /* D z, Aλ */
+    double linear[MAX_STRIDE], approach[MAX_STRIDE], approach0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
+    unsigned char active[MAX_STRIDE]; /* in the equations: closed contact, bilateral row, sticking clutch */
+    double on[MAX_STRIDE];            /* the same as a number, 1 or 0 */
+    double jump[MAX_STRIDE];          /* of a given torque, at the start of the step; else 0 */
+    double last[MAX_STRIDE];          /* forces at the end that the next prediction is made with */
+    double direction[MAX_STRIDE], alpha, along[MAX_STRIDE]; /* along: dλ/dα */
+    gk_flank_rows flank;
+    gk_local local;
+    gk_joint_rows joint;
+    gk_dashpots dashpot;
+    gk_account energy;
+    gk_others others;
+    int iterations, limit_reached;
+    int rubs;             /* there is friction */
+    int films;            /* rows whose gap is open at the start of the step, with oil in it */
     struct gk_film *film; /* with the squeeze film */
-    double outer[MAX_STRIDE],
-        beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
-                                                     deflection at once */
-    double along[MAX_STRIDE];         /* dλ/dα */
-    unsigned char recalled[MAX_ROWS]; /* a contact that was there in the last step */
 } gk_system;
 
 /* engagements that share rotors, solved together */
@@ -120,10 +145,25 @@ typedef struct gk_film {
 static inline int gk_system_is_sound(const gk_system *s)
 {
     return s->contacts >= 0 && s->contacts <= MAX_CONTACTS && s->n >= s->contacts && s->n <= MAX_ROWS &&
-           s->stride % 4 == 0 && s->stride >= s->n && s->stride <= MAX_STRIDE && s->clutches >= 0 &&
-           s->clutches <= s->n - s->contacts;
+           s->stride % 4 == 0 && s->stride >= s->n && s->stride <= MAX_STRIDE && s->joint.clutches >= 0 &&
+           s->joint.clutches <= s->n - s->contacts;
 }
 static inline int gk_is_row(const gk_system *s, int i) { return i >= 0 && i < s->n; }
+
+/* what kinds of rows are: does the row yield at once under its force, or is it one of speeds? */
+static inline int gk_row_yields(const gk_system *s, int i) { return s->kind[i] != ROW_CLUTCH; }
+static inline int gk_row_is_given(const gk_system *s, int i) { return s->kind[i] == ROW_TORQUE; }
+/* does a gap that changes change its force? can it open? */
+static inline int gk_row_is_stiff(const gk_system *s, int i) { return gk_row_yields(s, i) && !gk_row_is_given(s, i); }
+static inline int gk_row_opens(const gk_system *s, int i)
+{
+    return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_PLAY;
+}
+/* is its gap relative to the outer end of a port? */
+static inline int gk_row_has_outer_end(const gk_system *s, int i)
+{
+    return s->joint.which[i] == JOINT_PORT && !gk_row_is_given(s, i);
+}
 
 /* what gk_rows_scatter may scatter: the forces at the end; those of the step */
 static inline const double *gk_step_force(const gk_system *s)
@@ -183,7 +223,7 @@ GK_HOT double gk_solve_stored(const gk_system *s);
 static inline double gk_solve_end_gap(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
-    return s->g[i] + s->Dz[i] + s->lag[i] + s->outer[i];
+    return s->g[i] + s->Dz[i] + s->dashpot.lag[i] + s->others.gap[i];
 }
 static inline double gk_solve_mean(const gk_system *s, int i)
 {
@@ -199,7 +239,7 @@ static inline double gk_solve_static_mean(const gk_system *s, int i)
 static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
-    return s->Al[i] + s->approach[i] + s->beyond[i];
+    return s->Al[i] + s->approach[i] + s->others.deflection[i];
 }
 /* gk_tangent.c */
 GK_HOT void gk_tangent_factorise(gk_system *s);

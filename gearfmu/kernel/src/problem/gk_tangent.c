@@ -9,7 +9,7 @@ static const gk_quad UNIT[4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0,
 /* column j of B: what the dashpot of row j does to all rows */
 GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 {
-    const double late = s->late[j];
+    const double late = s->dashpot.late[j];
     const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads;
     gk_quad *B = (gk_quad *)s->B + j * quads;
     for (int q = 0; q < quads; q++) B[q] = D[q] + late * A[q];
@@ -18,25 +18,25 @@ GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 /* column j: what λ_j does to all rows; `own`: strips that share its path */
 GK_INLINE void form_column(const gk_system *s, int j, double *column, const int quads, const int own)
 {
-    const int first = j < s->contacts ? s->place_of[j] * own : j, last = j < s->contacts ? first + own : j + 1;
+    const int first = j < s->contacts ? s->flank.place_of[j] * own : j, last = j < s->contacts ? first + own : j + 1;
     const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
                   *P = (const gk_quad *)s->P + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)s->on;
     const double *path = s->P + j * 4 * quads;
     gk_quad c[MAX_STRIDE / 4];
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q] + P[q];
-    if (s->pull[j] != 0.0)
-        for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
+    if (s->dashpot.pull[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->dashpot.pull[j] * B[j * quads + q];
     if (gk_film_lift(s, j) != 0.0)
         for (int q = 0; q < quads; q++) c[q] += D[q];
-    if (s->held[j] != 0.0)
-        for (int q = 0; q < quads; q++) c[q] += s->held[j] * A[q];
+    if (s->dashpot.held[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->dashpot.held[j] * A[q];
     for (int e = first; e < last; e++) {
-        const double moves = s->gain[e] * (e == j ? path[e] + s->slope[j] : path[e]);
+        const double moves = s->dashpot.gain[e] * (e == j ? path[e] + s->local.slope[j] : path[e]);
         if (moves == 0.0) continue;
         for (int q = 0; q < quads; q++) c[q] += moves * B[e * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
-    ((gk_quad *)column)[j / 4] += s->slope[j] * UNIT[j % 4];
+    ((gk_quad *)column)[j / 4] += s->local.slope[j] * UNIT[j % 4];
     if (gk_film_on(s)) column[j] += s->film->yields[j];
 }
 
@@ -44,7 +44,7 @@ GK_INLINE void columns(gk_system *s, const int quads)
 {
     const int n = s->n, stride = 4 * quads, strips = GK_STRIPS(s);
     for (int j = 0; j < n; j++)
-        if (s->gain[j] != 0.0 || s->pull[j] != 0.0) form_dashpot(s, j, quads);
+        if (s->dashpot.gain[j] != 0.0 || s->dashpot.pull[j] != 0.0) form_dashpot(s, j, quads);
     for (int j = 0; j < n; j++) {
         double *column = s->J + j * stride;
         if (s->active[j]) {
@@ -94,7 +94,8 @@ void gk_tangent_factorise(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
     GK_ASSERT(s->J && s->L && s->B);
-    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)s->slope)[q] = ((gk_quad *)s->yield)[q] * ((gk_quad *)s->on)[q];
+    for (int q = 0; q < s->stride / 4; q++)
+        ((gk_quad *)s->local.slope)[q] = ((gk_quad *)s->local.yield)[q] * ((gk_quad *)s->on)[q];
     GK_SIZED(s->stride / 4, factorise, s)
     s->iterations++;
 }

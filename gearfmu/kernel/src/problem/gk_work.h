@@ -6,7 +6,7 @@
 #include "force/gk_flank.h"
 #include "force/gk_place.h"
 #include "problem/gk_system.h"
-#include "setup/gk_spread.h"
+#include "setup/gk_room.h"
 
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
 /* phases of a step, for the profile */
@@ -21,14 +21,6 @@ enum {
     PHASE_REMEMBER,
     PHASES
 };
-typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
-    gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
-    double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
-                      motion of the gear, then with the bore angle: in D, in K */
-    double own[2][COMMON][COMMON]; /* the same of these with each other */
-    double share[COMMON];          /* of what they have with each other in h: ½, of the bore angle 1 */
-} gk_step_side;
-
 typedef struct gk_bores { /* at once: moments on ports, and what contacts turn the bores */
     double moment[MAX_PORTS], turned[MAX_PORTS];
 } gk_bores;
@@ -122,14 +114,12 @@ typedef struct gk_engaged { /* an engagement in a step */
     double moved[MOVES][MAX_STRIDE]; /* what its rows read in a pass, of all engagements */
     double *rest;                    /* (n, stride) what is not dynamic of its own compliance, less P */
     gk_kept kept;
-    gk_step_side table[2];
+    const gk_step_side *table; /* of either side: gk_room.table */
     gk_system system;
 } gk_engaged;
 
 struct gk_work {
-    gk_coefficients cache[CACHE];
-    gk_coefficients explicit_rows; /* forces move nothing at once (gk_rk45.c) */
-    uint64_t clock;
+    gk_room room;
     /* of every gear group: predicted state, modal force of the rows, of the ground group the same in double */
     gk_real *qp[MAX_GEARS], *vp[MAX_GEARS], *force[MAX_GEARS], *next[MAX_GEARS];
     double *turned_speed[MAX_GEARS]; /* predicted speeds where Coriolis forces turn them, before they are rounded */
@@ -139,32 +129,26 @@ struct gk_work {
     gk_real *reading[MAX_GEARS]; /* scratch: how far the modes move by the forces of the last step alone */
     const gk_real *y[MAX_GEARS]; /* displacement that the rows read: qp or zero */
     const double *ground_y;
-    gk_real *turned, *turned_next, *scaled,
-        *zero; /* states in the frame of a reference tooth; row times coefficients */
-    double *ground_scaled, *ground_zero;
+    gk_real *turned, *turned_next, *scaled; /* states in the frame of a reference tooth; row times coefficients */
+    double *ground_scaled;
     gk_real *stage[MAX_GEARS][7], *trial[MAX_GEARS]; /* rk45, central: derivatives (v, a) and trial state (q, v) */
     double *ground_stage[7], *ground_trial;
     double stage_spin[7][2 * MAX_SPINS], trial_spin[2 * MAX_SPINS];
     double spin[MAX_SPINS], speed[MAX_SPINS], moved[MAX_SPINS]; /* predicted; moved in the step */
     int another;                                                /* this step is of another h or γ than the last */
     double outer[MAX_PORTS], outer_before[MAX_PORTS], outer_speed[MAX_PORTS],
-        torque[MAX_PORTS];       /* outer ends of the ports at both ends of the step, torque at its end */
-    double table_h, table_gamma; /* step of the tables of D and K; 0: none yet */
-    double run_h, run_gamma;     /* γ of the internal step of the run */
-    gk_engaged *engaged;         /* (engagements) */
-    double *tally;    /* (6, ground oscillators) sums of a communication step and their scratch (gk_tally.c) */
-    double *pushed;   /* forces on all oscillators of the ground group, then of a gear group */
-    double *mode_row; /* (modes) scratch */
+        torque[MAX_PORTS];   /* outer ends of the ports at both ends of the step, torque at its end */
+    double run_h, run_gamma; /* γ of the internal step of the run */
+    gk_engaged *engaged;     /* (engagements) */
+    double *tally;           /* (6, ground oscillators) sums of a communication step and their scratch (gk_tally.c) */
+    double *pushed;          /* forces on all oscillators of the ground group, then of a gear group */
+    double *mode_row;        /* (modes) scratch */
     /* statics (gk_static.c): every oscillator is compliance */
     double *rest_ground;            /* displacement of the ground group */
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;      /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
     double *soft_rows; /* (2, MAX_ROWS, MAX_SOFT) rows of an engagement on the soft modes of its gears */
-    double *columns;   /* room for a node's rows and their products; A of the explicit rows at all LIMIT_POSITIONS */
-    double *spread;    /* room of gk_spread.c, and the compliances that it makes of one gear */
-    gk_real *blocks;
-    gk_compliance compliance;
-    double *island; /* the limit of the step: (2, rows, rows) of all engagements */
+    double *island;    /* the limit of the step: (2, rows, rows) of all engagements */
     /* of an island in a pass: forces pushed, and what these move */
     double push_spin[PUSHES][MAX_SPINS], move_spin[MOVES][MAX_SPINS], yield_spin[MAX_SPINS];
     gk_real *push_ground[PUSHES], *move_ground[MOVES];
@@ -174,29 +158,14 @@ struct gk_work {
     gk_bores push_bores[MOVES];
     gk_far_pair *far_pair;
     int far_pairs, most_far_pairs;
-    gk_real *between[MAX_GEARS][MAX_GEARS]; /* (2, patterns of the second, of the first) in a step with tables */
-    int by_tables;                          /* this step goes by its tables and by patterns */
-    double seen[MAX_GEARS][MOST_PATTERNS];  /* predicted displacement of the patterns */
-    gk_field field[2];                      /* nodal contact: teeth of A and B in hand */
-    uint64_t cycles[PHASES], mark;          /* phase profile, filled by a build with GK_PROFILE */
+    int by_tables;                         /* this step goes by its tables and by patterns */
+    double seen[MAX_GEARS][MOST_PATTERNS]; /* predicted displacement of the patterns */
+    gk_field field[2];                     /* nodal contact: teeth of A and B in hand */
+    uint64_t cycles[PHASES], mark;         /* phase profile, filled by a build with GK_PROFILE */
 };
 
-/* gk_layout.c */
-void gk_layout_plan(const gk_model *model, gk_setup *setup);
-void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
+/* gk_layout_work.c */
 void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work);
-/* gk_push.c */
-typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
-    int gear, flank, tooth, strips;
-    double force[MAX_SLICES], roll[MAX_SLICES], z[MAX_SLICES];
-    gk_strip_weights width;
-} gk_strip_load;
-void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *row,
-                  double *sum);
-void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
-                         double *sum);
-/* gk_moves.c */
-GK_HOT gk_moves_function gk_side_step;
 /* gk_film.c */
 GK_HOT void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);

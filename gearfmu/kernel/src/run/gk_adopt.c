@@ -101,7 +101,7 @@ gk_outcome gk_adopt(const gk_model *model, const gk_setup *from_setup, const gk_
 {
     GK_ASSERT(model && from_setup && from_work && from && setup && data);
     if (!allowed(from_setup, from, setup, data)) return GK_BAD_CALL;
-    const gk_coefficients *k = gk_flow_known(from_work, from->state_h, from->state_gamma);
+    const gk_coefficients *k = gk_flow_known(&from_work->room, from->state_h, from->state_gamma);
     const passage c = {model, from_setup, setup, from_work, from, data, k};
     const size_t oscillators = (size_t)model->ground[from_setup->base.set].n;
     double *const ground = from_work->pushed, *const modes = ground + oscillators;

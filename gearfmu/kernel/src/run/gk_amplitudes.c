@@ -3,6 +3,7 @@
  * diameter 0 and 1 are those of the ground oscillators, turned into the gear's axes; modes of the gear group are its
  * own. What is not dynamic follows the forces at once, −N λ/ω². Left out: the residual beyond all stored modes. */
 #include "run/gk_run.h"
+#include "setup/gk_push.h"
 #include "problem/gk_rows.h"
 
 /* forces on the strips of a tooth of one gear of an engagement: contacts press, so outward they pull */
@@ -53,7 +54,7 @@ void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const 
         for (int i = s->contacts; i < s->n; i++) {
             const double moment = gk_rows_at_bore(setup, s, i) ? gk_reported(s, i) : 0.0;
             for (int k = 0; k < all->n && moment != 0.0; k++)
-                if (setup->base.slot[k] < 0) ground[k] += moment * all->port_rows[s->port_of[i] * all->n + k];
+                if (setup->base.slot[k] < 0) ground[k] += moment * all->port_rows[s->joint.port[i] * all->n + k];
         }
     }
 }
@@ -66,7 +67,7 @@ static void ground_motion(const gk_model *model, const gk_setup *setup, const gk
     const gk_base *base = &setup->base;
     const gk_ground *ground = &model->ground[base->set];
     const double *x = gk_ground_seen(data), *f = x + 2 * base->n;
-    const double *kappa = gk_flow_known(work, data->state_h, data->state_gamma)->ground.kappa;
+    const double *kappa = gk_flow_known(&work->room, data->state_h, data->state_gamma)->ground.kappa;
     for (int k = 0; k < ground->n; k++) {
         const int slot = base->slot[k];
         moved[k] = slot >= 0 ? x[slot] - kappa[slot] * f[slot] : moved[k] / (ground->omega[k] * ground->omega[k]);
@@ -123,7 +124,7 @@ void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *
 {
     GK_ASSERT(data->amplitudes >= 0);
     if (!model->amplitudes) return;
-    const gk_coefficients *k = gk_flow_known(work, data->state_h, data->state_gamma);
+    const gk_coefficients *k = gk_flow_known(&work->room, data->state_h, data->state_gamma);
     for (int g = 0; g < model->gears; g++) {
         const gk_gear *gear = &model->gear[g];
         const gk_observed *o = &gear->observed;

@@ -107,8 +107,8 @@ static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *w
     if (!GK_ON(setup, elastic) || gk_scheme_of(setup->integrator)->is_explicit) return;
     gk_limit_run(model, setup, work, data, h);
     const double gamma = gk_scheme_of(setup->integrator)->corrected ? work->run_gamma : 0.0;
-    if (work->table_h == h && work->table_gamma == gamma) return;
-    setup->moves(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
+    if (work->room.table_h == h && work->room.table_gamma == gamma) return;
+    setup->moves(model, setup, &work->room, gk_flow_for(model, setup, &work->room, h, gamma));
 }
 
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)

@@ -1,5 +1,6 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
 #include "integrate/gk_energy.h"
+#include "problem/gk_row.h"
 #include "run/gk_run.h"
 #include "run/gk_sensors.h"
 
@@ -68,22 +69,21 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
                           const gk_system *s)
 {
     for (int i = s->contacts; i < s->n; i++) {
-        const int port = s->port_of[i], rotor = model->port[port].rotor;
-        const double force = gk_reported(s, i),
-                     deflection = s->force[i] * setup->joint[port][s->joint_of[i]].compliance;
+        const int port = s->joint.port[i], rotor = model->port[port].rotor;
+        const double force = gk_reported(s, i);
         double *v = GK_OF(data, shaft)[port], *angle = &GK_OF(data, rotor)[rotor][V_GEAR_PHI];
-        switch (s->joint_of[i]) {
+        switch (s->joint.which[i]) {
         case JOINT_PORT:
-            if (s->kind[i] == ROW_TORQUE) {
+            if (gk_row_is_given(s, i)) {
                 *angle = GK_OF(data, angle)[port];
             } else {
                 v[V_TAU] = -force;
-                if (!model->port[port].chain) *angle = work->outer[port] - deflection;
+                if (!model->port[port].chain) *angle = work->outer[port] - gk_verbs_of(s->kind[i])->twist(setup, s, i);
             }
             break;
         case JOINT_SHAFT:
             v[V_SHAFT_TAU] = force;
-            *angle = GK_OF(data, x)[gk_disc_of(model, port)] - deflection;
+            *angle = GK_OF(data, x)[gk_disc_of(model, port)] - gk_verbs_of(s->kind[i])->twist(setup, s, i);
             break;
         default: v[V_CLUTCH_TAU] = -0.5 * s->z[i];
         }
@@ -198,11 +198,11 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
     if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
         data->energy.quasi_static = stored(model, work);
         v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
-                                                   : gk_energy_invariant(model, setup, data, &work->explicit_rows);
+                                                   : gk_energy_invariant(model, setup, data, &work->room.explicit_rows);
         return gk_finite(v[V_ENERGY]);
     }
     const double energy = gk_energy_invariant(model, setup, data,
-                                              gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
+                                              gk_flow_for(model, setup, &work->room, data->state_h, data->state_gamma));
     if (first) data->energy.baseline = energy - data->energy.work + data->energy.dissipated;
     v[V_ENERGY] = energy;
     v[V_RESIDUAL] = energy - data->energy.baseline - data->energy.work + data->energy.dissipated;

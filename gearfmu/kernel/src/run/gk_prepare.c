@@ -1,6 +1,9 @@
 /* Level, effects, slices and step → gk_setup with all its tables. */
 #include "run/gk_wide.h"
+#include "force/gk_flank.h"
+#include "model/gk_vars.h"
 #include "setup/gk_choose.h"
+#include "setup/gk_layout.h"
 #include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 #include <stdio.h>
@@ -30,17 +33,31 @@ static void take_twins(const gk_model *model, gk_twins *sides, gk_twins *out)
 }
 
 /* gear by gear, those of one body together: each body's compliances are spread once, each place on it is read once */
-static void fill_sides(const gk_model *model, gk_setup *setup, gk_work *work, gk_fill_function *fill)
+static void fill_sides(const gk_model *model, gk_setup *setup, gk_room *room, gk_fill_function *fill)
 {
     for (int g = 0; g < model->gears; g++) {
         if (gk_spread_leader(model, g) != g) continue;
         gk_twins sides = sides_of(model, g), twins;
-        if (setup->on.residual) gk_spread_compliance(model, setup, work, g);
+        if (setup->on.residual) gk_spread_compliance(model, setup, g, room->spread, room->blocks, &room->compliance);
         while (sides.count) {
             take_twins(model, &sides, &twins);
-            fill(model, setup, work, &twins);
+            fill(model, setup, room, &twins);
         }
     }
+}
+
+gk_outcome gk_defaults(const gk_model *model, gk_data *data)
+{
+    GK_ASSERT(model && data);
+    const size_t size = gk_data_size(model);
+    memset(data, 0, size);
+    gk_data_plan(model, data->at);
+    data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) - data->at[OF_oscillator] -
+                       model->amplitudes; /* until they have their place */
+    data->magic = GK_DATA_MAGIC;
+    data->phase = PHASE_NEW;
+    gk_vars_start(model, data);
+    return GK_OK;
 }
 
 gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
@@ -66,9 +83,13 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     gk_layout_work(model, setup, work);
     setup->step = hot->step[setup->integrator], setup->count = hot->count, setup->moves = hot->moves;
     setup->supports = hot->supports;
-    gk_setup_fill(model, setup, work, data, which);
-    fill_sides(model, setup, work, hot->fill);
-    gk_patterns_find(model, setup, work->columns);
+    gk_setup_fill(model, setup, &work->room, data, which);
+    for (int e = 0; e < model->engagements; e++) {
+        gk_law_bounds(model, setup, &setup->mesh[e]);
+        if (model->engagement[e].kind != MESH_FLAT) gk_flank_clearance(model, setup, &setup->mesh[e]);
+    }
+    fill_sides(model, setup, &work->room, hot->fill);
+    gk_patterns_find(model, setup, work->room.columns);
     outcome = gk_limit_choose(model, setup, work, data, message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;

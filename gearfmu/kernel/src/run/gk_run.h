@@ -20,7 +20,7 @@ struct gk_tally { /* integrals over a communication step */
 static inline double gk_reported(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
-    return s->force[i] + s->end[i];
+    return s->force[i] + s->dashpot.end[i];
 }
 
 /* gk_amplitudes.c */

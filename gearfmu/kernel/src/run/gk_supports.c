@@ -9,7 +9,7 @@ void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_dat
     GK_ASSERT(moved && speed && moved != speed);
     const int n = setup->base.n;
     const gk_quad *x = (const gk_quad *)gk_ground_seen(data), *v = x + n / 4, *f = v + n / 4;
-    const gk_ground_flow *flow = &gk_flow_known(work, data->state_h, data->state_gamma)->ground;
+    const gk_ground_flow *flow = &gk_flow_known(&work->room, data->state_h, data->state_gamma)->ground;
     const gk_quad *kappa = (const gk_quad *)flow->kappa, *unit = (const gk_quad *)flow->unit,
                   *lead = (const gk_quad *)flow->lead, *hold = (const gk_quad *)flow->hold, *rate = f + n / 4;
     for (int q = 0; q < n / 4; q++) {
@@ -58,7 +58,7 @@ static void add_rubbed(const gk_model *model, const gk_engaged *engaged, const g
     const size_t next = (size_t)(side->candidates * strips * supports);
     const double *node = side->along.support + (size_t)at->node * next;
     for (int i = 0; i < engaged->system.contacts; i++) {
-        const gk_place *place = &engaged->place[engaged->system.place_of[i]];
+        const gk_place *place = &engaged->place[engaged->system.flank.place_of[i]];
         const double *low = node + (place->candidate[side->which] * strips + i % strips) * supports;
         for (int s = 0; s < supports; s++)
             out[s] -= engaged->glide->end[i] * (low[s] + at->part * (low[next + (size_t)s] - low[s]));
@@ -80,7 +80,7 @@ void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const 
         for (int i = system->contacts; i < system->n; i++)
             if (gk_rows_at_bore(setup, system, i))
                 for (int s = 0; s < model->supports; s++)
-                    out[s] += force[i] * setup->port_support[system->port_of[i]][s];
+                    out[s] += force[i] * setup->port_support[system->joint.port[i]][s];
     }
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
         for (int i = 0; i < model->supports; i++)

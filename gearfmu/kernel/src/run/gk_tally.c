@@ -11,7 +11,8 @@ void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work,
     memset(tally, 0, sizeof *tally);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = work->tally + i * n;
     memset(tally->moved, 0, 2 * n * sizeof *tally->moved);
-    if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
+    if (data->state_h > 0.0)
+        gk_flow_for(model, setup, &work->room, data->state_h, data->state_gamma); /* a restored state */
     gk_supports_motion(setup, work, data, tally->last_moved, tally->last_speed);
     setup->supports(model, setup, tally->last_moved, tally->last_speed, tally->last);
     gk_sensors_speed(model, setup, tally->last_speed, tally->sensed);
@@ -28,11 +29,11 @@ static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h
     double side[2] = {0, 0};
     int touches = 0;
     for (int i = 0; i < s->contacts; i++) {
-        side[engaged->place[s->place_of[i]].flank] += gk_solve_mean(s, i);
+        side[engaged->place[s->flank.place_of[i]].flank] += gk_solve_mean(s, i);
         touches |= gk_solve_touches(s, i);
     }
     for (int i = s->contacts; i < s->n; i++)
-        if (s->joint_of[i] == JOINT_PORT) tally->port[s->port_of[i]] -= gk_solve_mean(s, i) * h;
+        if (s->joint.which[i] == JOINT_PORT) tally->port[s->joint.port[i]] -= gk_solve_mean(s, i) * h;
     tally->mesh[e] += (side[0] - side[1]) * h;
     tally->highest[e] = gk_max(tally->highest[e], gk_max(side[0], side[1]));
     if (touches) {

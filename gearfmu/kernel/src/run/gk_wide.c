@@ -22,7 +22,7 @@
 #pragma GCC target("avx2")
 #endif
 #define GK_WIDE
-#include "force/gk_law.c"
+#include "problem/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_section.c"
 #include "force/gk_parts.c"
@@ -40,6 +40,10 @@
 #include "problem/gk_exchange.c"
 #include "problem/gk_compliance.c"
 #include "problem/gk_ground.c"
+#include "problem/gk_row_contact.c"
+#include "problem/gk_row_joint.c"
+#include "problem/gk_row_clutch.c"
+#include "problem/gk_row_play.c"
 #include "problem/gk_form.c"
 #include "problem/gk_film.c"
 #include "problem/gk_tangent.c"

@@ -1,6 +1,6 @@
 /* Coefficients of all oscillators and spins for one internal step h and γ (gk_oscillator.c), in the type of their
  * states, and the mesh mode at which they are exact. */
-#include "problem/gk_work.h"
+#include "setup/gk_setup.h"
 #include "setup/gk_oscillator.h"
 
 static const double MESH_STIFFNESS = 0.1125; /* over 2(1 − ν²)/(πE) of both gears: 20 N/(mm µm) for steel */
@@ -202,14 +202,14 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, const gk_p
 }
 
 /* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
-const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_room *room, double h, double gamma)
 {
     GK_ASSERT(h > 0.0); /* γ may be that of a restored state */
-    gk_coefficients *oldest = &work->cache[0];
+    gk_coefficients *oldest = &room->cache[0];
     for (int i = 0; i < CACHE; i++) {
-        gk_coefficients *k = &work->cache[i];
+        gk_coefficients *k = &room->cache[i];
         if (k->age && k->h == h && k->gamma == gamma) {
-            k->age = ++work->clock;
+            k->age = ++room->clock;
             return k;
         }
         if (k->age < oldest->age) oldest = k;
@@ -223,15 +223,15 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->rigid_lead = oldest->rigid_kappa - h * h / 12.0; /* as of an oscillator with ω → 0 */
     for (int g = 0; g < model->gears; g++) fill_gear(setup, &pace, oldest, g);
     fill_ground(model, setup, &pace, oldest);
-    oldest->age = ++work->clock;
+    oldest->age = ++room->clock;
     return oldest;
 }
 
 /* coefficients in use, without making any: those of the explicit forms for h = 0 */
-const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma)
+const gk_coefficients *gk_flow_known(const gk_room *room, double h, double gamma)
 {
-    GK_ASSERT(work);
+    GK_ASSERT(room);
     for (int i = 0; i < CACHE; i++)
-        if (work->cache[i].age && work->cache[i].h == h && work->cache[i].gamma == gamma) return &work->cache[i];
-    return &work->explicit_rows;
+        if (room->cache[i].age && room->cache[i].h == h && room->cache[i].gamma == gamma) return &room->cache[i];
+    return &room->explicit_rows;
 }

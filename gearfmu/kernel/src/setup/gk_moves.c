@@ -1,7 +1,6 @@
 /* What a step makes of the rows in the tables of a side: D and A = C − K between all points, C what is not dynamic.
  * A row between two nodes is linear, so both are quadratic there: tabulated as squares of nodes and products of
  * neighbours, they are exactly the bilinear form of the interpolated rows. */
-#include "problem/gk_work.h"
 #include "setup/gk_patterns.h"
 #include "setup/gk_tables.h"
 
@@ -190,13 +189,13 @@ static void add_residual(const gk_side *side, int at, int points, gk_real *out)
 }
 
 /* D and A by the modes of the gear group */
-static void fill_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, const gk_side *side,
+static void fill_modes(const gk_setup *setup, gk_room *room, const gk_coefficients *k, const gk_side *side,
                        gk_real *moves)
 {
     const int n = GK_LANES(setup, side->gear);
     const size_t points = (size_t)(side->candidates * setup->strips), columns = (size_t)side->columns;
     const gk_real *const by[2] = {k->flow[side->gear].mobility, k->flow[side->gear].kappa};
-    gk_real *scaled = (gk_real *)work->columns, *next_scaled = scaled + points * (size_t)n;
+    gk_real *scaled = (gk_real *)room->columns, *next_scaled = scaled + points * (size_t)n;
     for (int at = 0; at <= side->nodes; at++, moves += points * 4 * columns) {
         const gk_real *rows = side->rows + (size_t)at * points * n, *next = at < side->nodes ? rows + points * n : NULL;
         for (int kind = 0; kind < 2; kind++) {
@@ -217,14 +216,14 @@ static int same_products(const gk_setup *setup, const gk_coefficients *k, const 
 }
 
 /* an earlier side with the same products by the modes, or NULL */
-static const gk_real *known_products(const gk_model *model, const gk_setup *setup, const gk_work *work,
+static const gk_real *known_products(const gk_model *model, const gk_setup *setup, const gk_room *room,
                                      const gk_coefficients *k, const gk_side *side)
 {
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) {
             const gk_side *other = &setup->mesh[e].side[w];
             if (other == side) return NULL;
-            if (same_products(setup, k, other, side)) return work->engaged[e].table[w].moves;
+            if (same_products(setup, k, other, side)) return room->table[e][w].moves;
         }
     return NULL;
 }
@@ -235,29 +234,29 @@ static size_t moves_size(const gk_setup *setup, const gk_side *side)
     return ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns;
 }
 
-void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k)
+void gk_side_step(const gk_model *model, const gk_setup *setup, gk_room *room, const gk_coefficients *k)
 {
     GK_ASSERT(k && k->h > 0.0);
     GK_ASSERT(k->gamma >= 0.0 && k->gamma <= 1.0);
     for (int side = 0; side < 2 * model->engagements; side++) {
         const gk_side *of = &setup->mesh[side / 2].side[side % 2];
-        gk_real *moves = work->engaged[side / 2].table[side % 2].moves;
-        const gk_real *known = known_products(model, setup, work, k, of);
+        gk_real *moves = room->table[side / 2][side % 2].moves;
+        const gk_real *known = known_products(model, setup, room, k, of);
         if (known)
             memcpy(moves, known, moves_size(setup, of) * sizeof *moves);
         else
-            fill_modes(setup, work, k, of, moves);
+            fill_modes(setup, room, k, of, moves);
     }
     for (int side = 0; side < 2 * model->engagements; side++) {
         const gk_side *of = &setup->mesh[side / 2].side[side % 2];
-        gk_step_side *table = &work->engaged[side / 2].table[side % 2];
+        gk_step_side *table = &room->table[side / 2][side % 2];
         const size_t points = (size_t)(of->candidates * setup->strips);
-        ground_part part = part_of(model, setup, k, of, work->columns);
+        ground_part part = part_of(model, setup, k, of, room->columns);
         add_ground_products(setup, &part, table);
         for (int at = 0; at <= of->nodes; at++)
             add_residual(of, at, (int)points, table->moves + (size_t)at * points * 4 * (size_t)of->columns);
     }
-    gk_patterns_between(model, setup, k, work->between);
-    work->table_h = k->h;
-    work->table_gamma = k->gamma;
+    gk_patterns_between(model, setup, k, room->between);
+    room->table_h = k->h;
+    room->table_gamma = k->gamma;
 }

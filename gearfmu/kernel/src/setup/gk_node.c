@@ -327,12 +327,12 @@ void gk_node_take(gk_node *n, int e, const gk_side *side)
     n->flank = &n->setup->flank[side->gear];
 }
 
-gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side)
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_room *of, int e, const gk_side *side)
 {
-    GK_ASSERT(work->columns && gk_is_engagement(model, e));
-    gk_node n = {.model = model, .setup = setup, .compliance = &work->compliance};
+    GK_ASSERT(of->columns && gk_is_engagement(model, e));
+    gk_node n = {.model = model, .setup = setup, .compliance = &of->compliance};
     gk_node_take(&n, e, side);
-    double *room = work->columns;
+    double *room = of->columns;
     const size_t most = points_of(model), modes = (size_t)n.gear->modes, motions = (size_t)gk_node_motions(n.gear);
     n.points = side->candidates * setup->strips;
     n.rows = room, room += most * modes;

@@ -3,7 +3,8 @@
 #define GK_NODE_H
 #include "base/gk_check.h"
 #include "base/gk_lanes.h"
-#include "problem/gk_work.h"
+#include "setup/gk_room.h"
+#include "setup/gk_setup.h"
 #include "setup/gk_grid.h"
 #include "setup/gk_spread.h"
 
@@ -58,7 +59,7 @@ static inline int gk_node_offset(const gk_side *side, int candidate)
     const int flank = candidate >= side->count[0];
     return side->first[flank] + side->step * (flank ? candidate - side->count[0] : candidate);
 }
-GK_HOT gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e,
+GK_HOT gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_room *of, int e,
                              const gk_side *side);
 /* goes on to another side whose points lie at the same places of a gear of the same body */
 GK_HOT void gk_node_take(gk_node *n, int e, const gk_side *side);

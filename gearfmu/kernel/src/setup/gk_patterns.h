@@ -4,6 +4,7 @@
 #include "base/gk_lanes.h"
 #include "gk.h"
 #include "model/gk_model.h"
+#include "setup/gk_room.h"
 #include "setup/gk_setup.h"
 
 /* room: doubles as in gk_side_scratch */

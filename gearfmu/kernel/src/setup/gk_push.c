@@ -1,6 +1,7 @@
 /* Forces on the strips of a tooth at given lengths of roll: what they are to the modes of its gear group and to the
  * ground oscillators. */
 #include "setup/gk_node.h"
+#include "setup/gk_push.h"
 
 /* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
 static void add_rows(const gk_node *n, const gk_spot *p, int first, double weight[4][MAX_FUNCTIONS], double *sum)

@@ -1,5 +1,5 @@
 /* The choice of level, effects and oscillators → gk_setup, but for the tables of the sides of engagements. */
-#include "problem/gk_work.h"
+#include "setup/gk_setup.h"
 #include "setup/gk_kinematics.h"
 
 /* ---- modes and ground group -------------------------------------------------------------------------------------- */
@@ -323,24 +323,22 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     gk_mesh *mesh = &setup->mesh[e];
     const gk_engagement *engagement = &model->engagement[e];
     const double *a = engagement->position[0], *b = engagement->position[1];
-    const double distance = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
+    mesh->distance = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
     fill_spins(model, mesh);
     fill_parts(model, &setup->base, mesh);
     mesh->damping = GK_OF(data, mesh)[e][V_DAMPING];
     if (engagement->kind != MESH_FLAT)
         mesh->allowance = (GK_OF(data, mesh)[e][V_BACKLASH] - engagement->nominal_backlash) *
-                          gk_base_reach(model, engagement) / distance;
+                          gk_base_reach(model, engagement) / mesh->distance;
     gk_strips_fill(model, setup, mesh);
-    gk_law_bounds(model, setup, mesh);
-    if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
     if (GK_ON(setup, friction) || GK_ON(setup, film)) gk_lubrication_fill(model, data, mesh);
     if (setup->nodal) gk_nodal_fill(model, setup, data, mesh);
 }
 
 /* coefficients of problems in which no time passes: C′ is the quasi-static part alone */
-static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work *work)
+static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_room *room)
 {
-    gk_coefficients *k = &work->explicit_rows;
+    gk_coefficients *k = &room->explicit_rows;
     const size_t ground = (size_t)setup->base.n * sizeof(double);
     k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_lead = k->rigid_mobility = 0.0;
     k->timeless = 1;
@@ -351,7 +349,7 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
         for (int i = 0; i < setup->modal[g].n; i++) k->flow[g].inverse_s2[i] = k->flow[g].unit[i] = 1;
         memset(k->flow[g].lead, 0, size);
         memset(k->flow[g].hold, 0, size);
-        memset(work->zero, 0, size);
+        memset(room->zero, 0, size);
         k->flow[g].yields = k->flow[g].softest = 0;
     }
     memset(k->ground.mobility, 0, ground);
@@ -359,12 +357,12 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
     memset(k->ground.lead, 0, ground);
     memset(k->ground.hold, 0, ground);
     for (int i = 0; i < setup->base.n; i++) k->ground.inverse_s2[i] = k->ground.unit[i] = 1.0;
-    memset(work->ground_zero, 0, ground);
+    memset(room->ground_zero, 0, ground);
 }
 
-void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data, const int32_t *which)
+void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_room *room, const gk_data *data, const int32_t *which)
 {
-    GK_ASSERT(model && setup && work && data && which);
+    GK_ASSERT(model && setup && room && data && which);
     int coasts[MAX_ENGAGEMENTS];
     for (int g = 0; g < model->gears; g++) {
         fill_modal(&model->gear[g], &setup->modal[g]);
@@ -380,5 +378,5 @@ void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const 
     for (int g = 0; g < model->gears; g++) gk_spread_rows(model, setup, g);
     for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int g = 0; g < model->gears; g++) gk_far_fill(model, setup, g);
-    fill_explicit(model, setup, work);
+    fill_explicit(model, setup, room);
 }

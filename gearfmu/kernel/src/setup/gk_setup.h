@@ -7,20 +7,19 @@
 #include "model/gk_data.h"
 #include "model/gk_effects.h"
 #include "setup/gk_grid.h"
+#include "setup/gk_room.h"
 #include "setup/gk_spread.h"
 
 enum {
     NODES = 88,           /* of a side's table in one pitch */
-    CACHE = 4,            /* coefficient sets kept */
     OSCILLATOR_STATE = 4, /* q, v, f, f_rate */
     GAMMAS = 25,          /* γ is known at h·2^(−i/4) */
     MAX_CANDIDATES = 24,  /* tooth pairs that can be near contact at any position, both flanks */
     GAPS = 4,             /* places along a part of a line of contact at which its gap is known */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
-    FIRST_PATTERN = 8,  /* of a gear's patterns on the ground group: rigid motions and ports come before */
-    MOST_PATTERNS = 40, /* those in front included */
-    FAR = 12,           /* patterns by which engagements of one gear feel each other */
-    MAX_SOFT = 64       /* modes of a gear with several engagements that statics take as unknowns */
+    FIRST_PATTERN = 8, /* of a gear's patterns on the ground group: rigid motions and ports come before */
+    FAR = 12,          /* patterns by which engagements of one gear feel each other */
+    MAX_SOFT = 64      /* modes of a gear with several engagements that statics take as unknowns */
 };
 
 #define GK_LANES(setup, g) (GK_HAS(modes) && GK_HAS(elastic) ? (setup)->modal[g].n : 0)
@@ -183,44 +182,6 @@ typedef struct gk_joint {
     double compliance, damping; /* 1/k, c */
 } gk_joint;
 
-typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
-    gk_real *d11, *a12, *a21, *d22, *b0q, *b0v, *bq,
-        *bv;           /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at
-                                                             the start and at the end of the step */
-    gk_real *mobility; /* what a force at the end does to a gap */
-    gk_real *kappa, *inverse_s2;
-    gk_real *unit, *lead, *hold; /* v = unit ẋ + lead ḟ + hold f */
-    int yields, softest;         /* the first lanes of each half: κ ≠ 0; padded, and as they are */
-} gk_flow;
-
-/* Turning pairs and dashpots of the crowd as matrices, in whole halves: rows by oscillators, what these do to speeds,
- * and to the rows. Rows x of all pairs stand before their rows y. */
-enum { LEAST_CROWD = 16, MOST_CROWD = 128 };
-typedef struct gk_crowd_flow {
-    gk_real *turns, *turned, *turning;       /* (width, 2 pairs), (2 pairs, width), (2 pairs, 2 pairs) */
-    gk_real *damps, *holds, *pulls, *pulled; /* (width, dashpots) twice, (dashpots, width), (dashpots, dashpots) */
-} gk_crowd_flow;
-
-typedef struct gk_ground_flow { /* the same of the ground group */
-    double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *kappa, *inverse_s2;
-    double *unit, *lead, *hold;
-    double *press;          /* half a step's kick by a load that at rest displaces by load/ω² */
-    double *pulls, *holds;  /* (supports, n) s²e/n of a dashpot; e times `hold` */
-    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
-    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
-    gk_crowd_flow crowd;
-    double decay[MAX_SUPPORTS];                    /* 1 − e^(−dh/2) */
-    double loss[MAX_SUPPORTS], gain[MAX_SUPPORTS]; /* what that takes per u² and per u (e·hold f), u = e·(v − hold f) */
-} gk_ground_flow;
-
-typedef struct gk_coefficients {
-    double h, gamma, rigid_mobility, rigid_kappa, rigid_lead; /* of a free mass, whose b0q = bq = mobility */
-    int timeless;                                             /* forces move nothing in the step: D = 0 */
-    gk_flow flow[MAX_GEARS];
-    gk_ground_flow ground;
-    uint64_t age;
-} gk_coefficients;
-
 /* what an integrator is: the one place where they differ in more than their own file */
 typedef struct gk_scheme {
     int is_explicit; /* forces follow from positions; limited by stability; no account of work; knows no clutch */
@@ -239,7 +200,7 @@ typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, con
                                double h, gk_tally *tally);
 typedef void gk_supports_function(const gk_model *model, const gk_setup *setup, const double *moved,
                                   const double *speed, double *out);
-typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
+typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_room *room, const gk_coefficients *k);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
 
@@ -328,14 +289,10 @@ static inline int gk_disc_of(const gk_model *model, int port)
 }
 
 /* gk_setup.c; which: the dynamic ground oscillators */
-void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data, const int32_t *which);
+void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_room *room, const gk_data *data, const int32_t *which);
 /* gk_far_fill.c */
 int gk_far_known(const gk_model *model, const gk_setup *setup, int g);
 void gk_far_fill(const gk_model *model, gk_setup *setup, int g);
-/* gk_flow.c */
-GK_HOT const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h,
-                                          double gamma);
-GK_HOT const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
 /* gk_nodal_setup.c */
 void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g);
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh);
@@ -371,8 +328,7 @@ static inline int gk_padded(int n)
     return (n + 3) / 4 * 4;
 }
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
-/* motions of a gear and the angle of its bore, padded to quads; those of them that a model knows */
-enum { COMMON = 8 };
+/* motions of a gear and the angle of its bore that a model knows */
 static inline int gk_common(const gk_setup *setup) { return setup->spatial ? COMMON : COMMON / 2; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)

@@ -205,16 +205,16 @@ static const float *spread_across(const spreader *s, const float *from, gk_real 
     return s->gear->mirrored ? spread_half(s, from, 1, out) : spread_whole(s, from, out);
 }
 
-void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, int g)
+void gk_spread_compliance(const gk_model *model, const gk_setup *setup, int g, double *scratch, gk_real *blocks,
+                          gk_compliance *to)
 {
-    GK_ASSERT(gk_is_gear(model, g) && work->blocks);
+    GK_ASSERT(gk_is_gear(model, g) && blocks);
     const gk_gear *gear = &model->gear[g];
     const int flanks = gear->mirrored ? 1 : 2, along = GK_ON(setup, friction) && gear->along_rows;
     const size_t n = places_of(model, gear);
-    double *between = work->spread + n * n;
-    const spreader s = {model, gear, work->spread, between, between + n * (size_t)(model->rolls * model->functions)};
-    gk_compliance *to = &work->compliance;
-    lay_out(model, gear, along, work->blocks, to);
+    double *between = scratch + n * n;
+    const spreader s = {model, gear, scratch, between, between + n * (size_t)(model->rolls * model->functions)};
+    lay_out(model, gear, along, blocks, to);
     const float *own = gear->residual_own, *next = gear->residual_next, *across = gear->residual_across;
     for (int f = 0; f < flanks; f++) {
         own = spread_half(&s, own, 0, to->own[f]);

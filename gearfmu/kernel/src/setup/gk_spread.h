@@ -27,6 +27,7 @@ int gk_spread_leader(const gk_model *model, int g);
 void gk_spread_rows(const gk_model *model, gk_setup *setup, int g);
 /* scratch of gk_spread_compliance: doubles, and numbers of the blocks that it makes */
 size_t gk_spread_scratch(const gk_model *model, size_t *reals);
-/* compliances of gear g into the work */
-void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, int g);
+/* compliances of gear g, whose blocks lie in `blocks` */
+void gk_spread_compliance(const gk_model *model, const gk_setup *setup, int g, double *scratch, gk_real *blocks,
+                          gk_compliance *to);
 #endif

@@ -107,11 +107,11 @@ typedef struct maker { /* of the tables of twins */
     gk_grounded grounded[2 * MAX_ENGAGEMENTS];
 } maker;
 
-static void begin(maker *m, const gk_model *model, gk_setup *setup, const gk_work *work, const gk_twins *twins)
+static void begin(maker *m, const gk_model *model, gk_setup *setup, const gk_room *of, const gk_twins *twins)
 {
     m->twins = twins;
     for (int i = 0; i < twins->count; i++) m->side[i] = &setup->mesh[twins->engagement[i]].side[twins->which[i]];
-    m->n = gk_node_begin(model, setup, work, twins->engagement[0], m->side[0]);
+    m->n = gk_node_begin(model, setup, of, twins->engagement[0], m->side[0]);
     double *room = gk_node_room(&m->n);
     room = gk_residual_begin(&m->r, &m->n, room);
     m->moved = room, room += (size_t)m->n.points * (size_t)gk_padded(model->supports + 1);
@@ -198,11 +198,11 @@ static void clear_absent(const gk_model *model, const gk_setup *setup, const gk_
 }
 
 /* tables of sides that are twins */
-void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, const gk_twins *twins)
+void gk_side_fill(const gk_model *model, gk_setup *setup, gk_room *room, const gk_twins *twins)
 {
     GK_ASSERT(twins->count > 0 && twins->count <= 2 * MAX_ENGAGEMENTS);
     maker m;
-    begin(&m, model, setup, work, twins);
+    begin(&m, model, setup, room, twins);
     for (int at = 0; at <= m.side[0]->nodes; at++) fill_node(&m, at);
     for (int at = 0; at < m.side[0]->nodes && setup->on.residual; at++) fill_halfway(&m, at);
     for (int i = 0; i < twins->count; i++) {

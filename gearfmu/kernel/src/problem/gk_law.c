@@ -51,8 +51,8 @@ static void set_closing(const gk_system *s, int i, gk_laws *law)
 {
     gk_quad sum = GK_ALL(0.0);
     for (int j = 1; j < GAPS; j++) {
-        const gk_quad next = *(const gk_quad *)(s->opens[j - 1] + i);
-        law->closes[j - 1] = (j * next - sum) / (GAPS * s->yields);
+        const gk_quad next = *(const gk_quad *)(s->flank.opens[j - 1] + i);
+        law->closes[j - 1] = (j * next - sum) / (GAPS * s->flank.yields);
         sum += next;
     }
 }
@@ -61,15 +61,15 @@ static void set_closing(const gk_system *s, int i, gk_laws *law)
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
 {
     GK_ASSERT(s->contacts >= 0 && s->contacts <= MAX_CONTACTS);
-    s->yields = mesh->yields;
+    s->flank.yields = mesh->yields;
     for (int i = s->contacts; i % 4; i++) {
-        s->curvature[i] = s->curvature[0];
-        for (int k = 0; k < GAPS - 1; k++) s->opens[k][i] = 0.0;
+        s->flank.curvature[i] = s->flank.curvature[0];
+        for (int k = 0; k < GAPS - 1; k++) s->flank.opens[k][i] = 0.0;
     }
     for (int i = 0; i < s->contacts; i += 4) {
-        set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
-        s->law[i / 4].yields = GK_ALL(s->yields);
-        if (s->yields > 0.0) set_closing(s, i, &s->law[i / 4]);
+        set_four(model, setup, mesh, s->flank.curvature + i, &s->flank.law[i / 4]);
+        s->flank.law[i / 4].yields = GK_ALL(s->flank.yields);
+        if (s->flank.yields > 0.0) set_closing(s, i, &s->flank.law[i / 4]);
     }
 }
 
@@ -148,8 +148,8 @@ double gk_law_slope(const gk_system *s, int i, double force)
     const int first = i / 4 * 4;
     const gk_quad forces = GK_ALL(force);
     double delta[4], yield[4], potential[4];
-    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, delta, yield,
-                potential);
+    law_of_four(&s->flank.law[i / 4], (const double *)&forces, s->flank.width + first, s->flank.per_width + first,
+                delta, yield, potential);
     return yield[i % 4];
 }
 
@@ -158,6 +158,6 @@ void gk_law_apply(gk_system *s)
 {
     GK_ASSERT(gk_system_is_sound(s));
     for (int i = 0; i < s->contacts; i += 4)
-        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
-                    s->potential + i);
+        law_of_four(&s->flank.law[i / 4], s->force + i, s->flank.width + i, s->flank.per_width + i, s->local.delta + i,
+                    s->local.yield + i, s->local.potential + i);
 }

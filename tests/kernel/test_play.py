@@ -1,0 +1,112 @@
+"""A port spring with play (gk_row_play.c): exact motion of a body that bounces between its sides, order of the step,
+energy, and a loaded side, which is a spring without play."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_model import TEETH, pair_blob
+
+from evidence.study.flat import FlatBody, FlatContact, flat_blob
+from gearfmu.kernel import Kernel
+from gearfmu.stage.build.blob import read_blob, write_blob
+
+DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
+MASS, K, PLAY, SPEED = 2.0, 8e6, 4e-4, 0.5  # kg, N/m, m, m/s: a flat stage's spins are translations
+PERIOD = 2 * PLAY / SPEED + 2 * math.pi * math.sqrt(MASS / K)  # there and back: two flights, two half periods
+
+
+def plate(play: float, h: float, c: float = 0.0, **parameters: float) -> Kernel:
+    """A rigid body on a spring with play, another that it never meets."""
+    none = np.zeros(0)
+    body = FlatBody(MASS, none, none, np.zeros((1, 0)), np.array([[0.0]]))
+    sections = dict(read_blob(flat_blob("plates", [body, body], FlatContact(gap=1.0))))
+    sections["port_kinds"] = np.array([[0, 0, 0], [1, 1, 0]], np.int32)
+    sections["ports"] = np.array([[K, c, 1.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 1.0, 0.0]])
+    if play:
+        sections["port_play"] = np.array([play, 0.0])
+    return Kernel(write_blob(sections), {"h": h, "level": 3.0, **parameters})
+
+
+def bounced(h: float, end: float, c: float = 0.0, play: float = PLAY, **parameters: float) -> np.ndarray:
+    """Place (m) and speed (m/s) of the body after every step, (n, 2): thrown from the middle, its outer end held."""
+    kernel = plate(play, h, c, **parameters)
+    kernel.set("left.w", SPEED)
+    kernel.initialize()
+    kernel.set("left.w", 0.0)
+    found = []
+    for i in range(round(end / h)):
+        kernel.step(i * h, h)
+        found.append((kernel.get("left.gear.phi"), kernel.get("left.gear.w")))
+    return np.array(found)
+
+
+def exact(time: np.ndarray) -> np.ndarray:
+    """Place (m) of the body at `time`, by flights and half sines."""
+    flight, half = PLAY / SPEED, math.pi * math.sqrt(MASS / K)
+    phase = (np.asarray(time) + 0.5 * flight) % (2 * (flight + half))
+    way, sign = phase % (flight + half), np.where(phase < flight + half, 1.0, -1.0)
+    deep = SPEED * half / math.pi * np.sin(math.pi * np.clip(way - flight, 0.0, half) / half)
+    return sign * (np.minimum(SPEED * way, PLAY) - 0.5 * PLAY + deep)
+
+
+@pytest.mark.parametrize("integrator", [DG4, EM, RK45])
+def test_a_body_bounces_between_the_sides_as_flights_and_half_sines(integrator: float) -> None:
+    h, end = 5e-6, 3 * PERIOD
+    found = bounced(h, end, integrator=integrator)
+    time = h * np.arange(1, len(found) + 1)
+    assert np.abs(found[:, 0] - exact(time)).max() < 5e-3 * PLAY
+    assert np.abs(found[:, 1]).max() == pytest.approx(SPEED, rel=1e-3)
+
+
+def test_bouncing_is_of_second_order_and_keeps_its_energy() -> None:
+    errors = []
+    for h in (10e-6, 5e-6, 2.5e-6):
+        found = bounced(h, 3 * PERIOD)
+        time = h * np.arange(1, len(found) + 1)
+        errors.append(np.abs(found[:, 0] - exact(time)).max())
+        flying = np.abs(found[:, 0]) < 0.4 * PLAY
+        assert np.abs(found[flying, 1]) == pytest.approx(SPEED, rel=1e-12), "no energy is lost or won at a side"
+    assert math.log(errors[0] / errors[-1], 4) > 1.8
+
+
+def test_a_damper_takes_energy_only_while_a_side_is_closed() -> None:
+    """Logarithmic decrement of half a period: exp(−π ζ/√(1 − ζ²)) at every bounce, to the first order in ζ."""
+    zeta, h = 0.02, 2e-6
+    found = bounced(h, 2.2 * PERIOD, c=2 * zeta * math.sqrt(K * MASS))
+    flying = np.abs(found[:, 0]) < 0.4 * PLAY
+    speeds = np.unique(np.round(np.abs(found[flying, 1]), 6))[::-1]
+    assert speeds[0] == pytest.approx(SPEED, rel=1e-6) and len(speeds) == 5
+    assert speeds[1:] / speeds[:-1] == pytest.approx(math.exp(-math.pi * zeta), rel=3e-3)
+
+
+def twisted(play: float, angle: float) -> np.ndarray:
+    """Torque of the pinion's port and mesh force at rest and over 40 steps, its outer end at `angle` (rad) beyond the
+    side that drives, (41, 2)."""
+    sections = dict(read_blob(pair_blob(("spring", "spring"))))
+    if play:
+        sections["port_play"] = np.array([play, 0.5 * play])
+    kernel = Kernel(write_blob(sections), {"h": 5e-6, "level": 1.0})
+    kernel.set("pinion.phi", angle + 0.5 * play + 0.25 * play * TEETH[1] / TEETH[0])
+    kernel.initialize()
+    found = [(kernel.get("pinion.tau"), kernel.get("mesh.force"))]
+    for i in range(40):
+        kernel.set("pinion.phi", angle + 0.5 * play + 0.25 * play * TEETH[1] / TEETH[0] + 2e-4 * (i + 1) / 40)
+        kernel.step(i * 5e-6, 5e-6)
+        found.append((kernel.get("pinion.tau"), kernel.get("mesh.force")))
+    return np.array(found)
+
+
+def test_a_side_that_stays_loaded_is_a_spring_without_play() -> None:
+    plain, free = twisted(0.0, 0.02), twisted(1e-3, 0.02)
+    assert plain[0, 0] < -50.0
+    assert free == pytest.approx(plain, rel=2e-3)
+
+
+def test_an_outer_end_within_the_play_carries_no_torque() -> None:
+    kernel = plate(PLAY, 5e-6)
+    kernel.set("left.phi", 0.4 * PLAY)
+    kernel.initialize()
+    assert kernel.get("left.tau") == 0.0 and abs(kernel.get("left.gear.phi") - 0.4 * PLAY) <= 0.5 * PLAY
