@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -223,24 +222,6 @@ def test_a_free_rigid_housing_yields_by_its_mass() -> None:
         assemble(free, [*gears(), body])
 
 
-def test_gears_read_the_oscillators_of_their_rotors() -> None:
-    """Beside a housing: what it leaves out would move the transmission error by 1e-7, forces and sensors by less than
-    the step errs."""
-    group = mount_sets(drawn_layout(drawn()))[0]
-    counts = [int(group.reads(gear).sum()) for gear in range(4)]
-    assert max(counts) < 0.9 * group.omega.size and counts[1] == counts[2]
-    assert not np.any(~np.any([group.reads(gear) for gear in range(4)], axis=0) & (group.rigid_share > 0.5))
-    with patch("gearfmu.stage.build.groups.HEARD", 0.0):
-        whole = assemble(stage(), [*gears(), replace(drawn())])
-    at_rest = [statics_of(model, level=1.0).transmission(0.0, TORQUE).te for model in (housed(), whole)]
-    assert at_rest[0] == pytest.approx(at_rest[1], rel=1e-6)
-    few, all_of_them = run(housed()), run(whole)
-    for family in ("sensor.", "mount.", "bearing.", "stage1.force"):
-        names = [name for name in few.channels if name.startswith(family)]
-        most = max(np.abs(all_of_them[name]).max() for name in names)
-        print(family, max(np.abs(few[name] - all_of_them[name]).max() for name in names) / most)
-
-
 def test_without_its_housing_it_is_the_stage_on_the_ground_bit_for_bit() -> None:
     """And with the bearings held; sensors and mounts then read nothing."""
     for effect in ("effect__housing", "effect__bearings"):
@@ -284,17 +265,18 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
         assert np.abs(long[name][1:] - mean).max() <= 1e-3 * np.abs(mean).max()
 
 
-@pytest.mark.parametrize(("damped", "most"), [(False, 1e-4), (True, 5e-3)])
-def test_the_order_of_supports_changes_nothing(damped: bool, most: float) -> None:
-    """But that a step takes the dashpots one after the other: a difference that is half as large at half the step.
-    Margin: without dashpots 1.7e-5 of a sensor after 1 ms, with them 2.3e-3, of forces 3e-6; at the start 1e-9."""
+@pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
+def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
+    """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
+    Margin: at the start 1e-9; after 1 ms without dashpots 1.7e-5 of a sensor and 6e-8 of the forces, with them 2.3e-3
+    and 4e-6; at half the step half as much."""
     chosen = stage() if damped else undamped(stage())
     turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
     own, other = (run(assemble(order, [*gears(), drawn()])) for order in (chosen, turned))
     for name in own.channels:
         differ = np.abs(own[name] - other[name]).max()
         if name.startswith("sensor."):
-            assert differ <= most * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
+            assert differ <= sensors * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
         elif name.endswith((".fx", ".fy", ".fz", ".force")):
             assert differ <= 1e-5 * np.abs(own["stage1.force"]).max(), name
             assert abs(own[name][0] - other[name][0]) <= 1e-9 * np.abs(own["stage1.force"]).max(), name

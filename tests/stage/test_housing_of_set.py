@@ -112,4 +112,6 @@ def test_the_feet_carry_the_torque_of_the_ring(housed: Stage) -> None:
     assert np.ptp(trace["mount.left.fy"]) > 0.0
     ground, own = housed.on_rigid_ground(), load_stage("planetary54").by_name(shipped())
     off, bare = run(of, effect__housing=0.0), run(assemble(ground, [own[name] for name in ground.files]))
-    assert [name for name in bare.channels if not np.array_equal(bare[name], off[name])] == []
+    common = bare.channels.keys() & off.channels.keys()  # where the ring is held on the ground it tells of its motion
+    assert "sun_planet1.te" in common and "bearing.ring_seat.mz" in common
+    assert [name for name in sorted(common) if not np.array_equal(bare[name], off[name])] == []
