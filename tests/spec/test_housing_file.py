@@ -91,6 +91,9 @@ radial = "1e8 N/m"
 """  # noqa: E501
 
 
+MESH = 'import = { file = "box.inp", length = "1 m", seats = { a = "A" } }'
+
+
 @pytest.mark.parametrize(
     ("old", "new", "field", "words"),
     [
@@ -98,9 +101,14 @@ radial = "1e8 N/m"
         ('node = "ring"', 'node = "rim"', "supports.ring_seat.node", "its seats are ring"),
         ('name = "left"\nbody = "housing"', 'name = "left"\nbody = "sun"', "supports.left.body", "feet of a housing"),
         ('mass = "box.inp", ', "", "bodies.housing.reduced", "stiffness and mass come together"),
-        ("seats = { ring = 1 }, ", 'seats = { ring = 1 }, recovery = "box.inp", ', "bodies.housing.reduced", "recovered"),
+        (
+            "seats = { ring = 1 }, ",
+            'seats = { ring = 1 }, recovery = "box.inp", ',
+            "bodies.housing.reduced",
+            "recovered",
+        ),
         ('kind = "housing"\nreduced', 'kind = "housing"\nmethod = "rubin"\nreduced', "bodies.housing", "leave method"),
-        ("\nreduced = {", "\nother = {", "bodies.housing", "give the table import, or the table reduced"),
+        ("\nreduced = {", f"\n{MESH}\nreduced = {{", "bodies.housing", "give the table import, or the table reduced"),
     ],
 )
 def test_a_set_on_a_superelement_that_cannot_be(tmp_path: Path, old: str, new: str, field: str, words: str) -> None:

@@ -104,9 +104,7 @@ def test_the_feet_carry_the_torque_of_the_ring(housed: Stage) -> None:
     of = model(housed, 20.0)
     trace = run(of)
     start = {name: channel.values[0] for name, channel in trace.channels.items()}
-    about = sum(
-        x * start[f"mount.{name}.fy"] - y * start[f"mount.{name}.fx"] for name, (x, y, _) in FEET.items()
-    )
+    about = sum(x * start[f"mount.{name}.fy"] - y * start[f"mount.{name}.fx"] for name, (x, y, _) in FEET.items())
     assert abs(about) == pytest.approx(abs(start["bearing.ring_seat.mz"]), rel=1e-4)
     assert abs(about) == pytest.approx(600.0 * 54 / 72, rel=2e-3)
     assert np.ptp(trace["mount.left.fy"]) > 0.0

@@ -215,8 +215,10 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     const int local = engaged->local;
     if (!local) return;
     const int afresh = fills(base, mesh), alone = !engaged->by_patterns[0] && !engaged->by_patterns[1];
-    if (!afresh && alone) clear_beside(base, mesh, engaged);
-    if (!afresh && !alone) memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
+    if (!afresh && alone)
+        clear_beside(base, mesh, engaged);
+    else if (!afresh)
+        memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &mesh->side[w];
         const int at = engaged->by_patterns[0] && w ? engaged->wide[0] : mesh->at[w];
