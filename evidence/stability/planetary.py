@@ -19,8 +19,8 @@ from gearfmu.body import Body, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.forms.planetary import RingSpec
+from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.spec.tables.ports import PortSpec
@@ -134,7 +134,7 @@ def thin_ring() -> tuple[RingSpec, Body]:
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
     body = spec.written.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
     ring = spec.written.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
-    return ring, reduced_gear(member_of(rewritten(spec, ring=ring), "ring"), "0" * 64)
+    return ring, reduced_gear(rewritten(spec, ring=ring).by_file["ring"])
 
 
 @lru_cache(maxsize=2)
@@ -168,7 +168,7 @@ def set_spec(variant: PlanetSet) -> Stage:
 def base_radius() -> float:
     """Base radius of the sun, m."""
     spec = load_stage(SET)
-    return member_of(spec, "sun").geometry.r_b
+    return gear_shape(spec.by_file["sun"]).r_b
 
 
 def sun_torque(record: Record, since: float) -> float:

@@ -21,8 +21,9 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
 from gearfmu.reduction.transfer import LINES
 from gearfmu.reduction.transfer import Judging as Lines
-from gearfmu.spec.forms.general import RingBody, Stage
-from gearfmu.spec.forms.members import carrier_of, members
+from gearfmu.spec.forms.general import GearBody, Stage
+from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.tables.housing import HousingBody
 
 PAPER = ("modal", "craig_bampton", "rubin", "krylov")  # the methods of the paper
 SIZE, DAMPING = 120, 0.01
@@ -72,21 +73,19 @@ def _entry(text: str, size: int, band: tuple[float, float]) -> tuple[str, Size]:
 def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     """The finite elements of a body, gear, ring or carrier."""
     factor: dict[str, Any] = {} if scale is None else {"scale": scale}
-    toothed, names = members(spec), spec.files
-    if body not in names:
-        remedy = f"no body '{body}'; the stage has {', '.join(names)}"
+    if (table := spec.by_file.get(body)) is None:
+        remedy = f"no body '{body}'; the stage has {', '.join(spec.files)}"
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
-    housings = {housing.name: housing for housing in spec.housings}
-    part = toothed[body].gear if body in toothed else housings[body] if body in housings else carrier_of(spec).part
-    imported = body in housings or part.imported is not None
-    if imported and scale is not None:
+    mine = isinstance(table, HousingBody) or table.imported is not None
+    if mine and scale is not None:
         remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
         raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
-    if body in housings:
-        return housing_order(housings[body]).full
-    if body not in toothed:
-        return carrier_full_order(carrier_of(spec), **factor)
-    if imported:
-        return imported_full_order(toothed[body])
-    full_order = ring_full_order if isinstance(toothed[body].gear, RingBody) else gear_full_order
-    return full_order(toothed[body], **factor)
+    if isinstance(table, HousingBody):
+        return housing_order(table).full
+    if isinstance(table, CarrierBody):
+        return carrier_full_order(table, **factor)
+    if isinstance(table, GearBody):
+        return gear_full_order(table, **factor) if table.imported is None else imported_full_order(table)
+    if table.imported is not None:
+        return imported_full_order(table, spec.mounts)
+    return ring_full_order(table, spec.mounts, **factor)

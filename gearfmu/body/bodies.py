@@ -1,35 +1,34 @@
-"""The reduced bodies of a stage of any kind: their fingerprints and files, made where they are missing or stale."""
+"""The reduced bodies of a stage of any kind: their files, made where they are missing or stale."""
 
 from __future__ import annotations
 
 import os
 import shutil
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
 from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
 from gearfmu.body.housing import reduced_housing
-from gearfmu.body.layout import ALGORITHM_VERSION
+from gearfmu.body.layout import FORMAT_VERSION
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.body.whole import reduced_carrier
 from gearfmu.errors import BodyError, MeshError
+from gearfmu.hdf5 import format_of
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
-from gearfmu.spec.forms.body import body_hash, body_inputs
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import carrier_of, members
+from gearfmu.spec.forms.body import ALGORITHMS, expected_hash
+from gearfmu.spec.forms.former import former_hash
+from gearfmu.spec.forms.general import Reduced, Stage, ToothedBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.tables.housing import HousingBody
 
 Folder: TypeAlias = "str | os.PathLike[str] | None"
 Progress = Callable[[str, float], None]
-
-
-def expected_hash(stage: Stage, name: str) -> str:
-    """Fingerprint that the body `name` must carry: of its inputs and the version of the algorithms."""
-    return body_hash({**body_inputs(stage, name), "algorithm_version": ALGORITHM_VERSION})
 
 
 def body_hashes(stage: Stage) -> tuple[str, ...]:
@@ -64,11 +63,15 @@ def reduce_bodies(
     """Reduce what is missing or stale and store it: two large gears at the same time where processors and memory are
     there, the carrier last, which takes the most memory. Shafts need no file. Returns what `assemble` takes.
 
-    folder : of the .h5 files, that of the stage file when None. force : reduce in any case. progress : called with
-    (what is being done, share done of it). Raises MeshError and BodyError.
+    folder : of the .h5 files, that of the stage file when None; those of gearfmu 0.2 and 0.3 that fit are written anew
+    in the format of today. force : reduce in any case. progress : called with (what is being done, share done of it).
+    Raises MeshError and BodyError.
     """
     names = stage.files
     stored = {} if force else {name: _current(stage, name, folder) for name in names}
+    for name, body in stored.items():
+        if body is not None and format_of(path := body_path(stage, name, folder))[1] != FORMAT_VERSION:
+            save_body(body, path)
     wanted = [name for name in names if stored.get(name) is None]
     works, paths = _works(stage, wanted), {name: body_path(stage, name, folder) for name in wanted}
     if apart := side_by_side([(works.get(name), (stage, name, paths[name])) for name in wanted]):
@@ -98,32 +101,33 @@ def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = N
 
 
 def reduce_body(stage: Stage, name: str, progress: Progress | None = None) -> Body:
-    """One body from the numbers of its stage. Raises MeshError with the place of the body in the stage file."""
-    toothed, wanted = members(stage), expected_hash(stage, name)
-    housings = {housing.name: housing for housing in stage.housings}
+    """One body of a stage. Raises MeshError with the place of the body in the stage file."""
     try:
-        if name in toothed:
-            return reduced_gear(toothed[name], wanted, progress)
-        if name in housings:
-            return reduced_housing(housings[name], wanted, progress)
-        return reduced_carrier(carrier_of(stage), wanted, progress)
+        return make(stage.by_file[name], progress)
     except MeshError as error:
-        place = toothed[name].place if name in toothed else stage.table_of(name)
-        raise MeshError(f"{stage.source}: {place}: {error}") from error
+        raise MeshError(f"{stage.source}: {stage.table_of(name)}: {error}") from error
+
+
+def make(table: Reduced, progress: Progress | None = None) -> Body:
+    """A body from its table, whatever stage it stands in. Raises MeshError and BodyError."""
+    if isinstance(table, CarrierBody):
+        return reduced_carrier(table, progress)
+    return reduced_housing(table, progress) if isinstance(table, HousingBody) else reduced_gear(table, progress)
 
 
 def body_needs(stage: Stage) -> dict[str, Need]:
     """Memory that the reduction of every body takes, estimated from its mesh; bodies meshed elsewhere are not among
     them. Raises MeshError."""
-    needs = {name: work.need for name, work in _works(stage, stage.files).items()}
-    own = [body.name for body in stage.carriers if body.imported is None]
-    return needs | {name: carrier_need(carrier_of(stage)) for name in own}
+    own = {name: table for name, table in stage.by_file.items() if table.imported is None}
+    carriers = {name: carrier_need(table) for name, table in own.items() if isinstance(table, CarrierBody)}
+    return {name: work.need for name, work in _works(stage, stage.files).items()} | carriers
 
 
 def _works(stage: Stage, names: Sequence[str]) -> dict[str, Work]:
     """What the reduction of those gears takes that are meshed here."""
-    chosen = {name: member for name, member in members(stage).items() if name in names}
-    return {name: work for name, member in chosen.items() if (work := gear_work(member)) is not None}
+    chosen = {name: stage.by_file[name] for name in names}
+    works = {name: gear_work(table) for name, table in chosen.items() if isinstance(table, ToothedBody)}
+    return {name: work for name, work in works.items() if work is not None}
 
 
 def _current(stage: Stage, name: str, folder: Folder) -> Body | None:
@@ -135,20 +139,17 @@ def _current(stage: Stage, name: str, folder: Folder) -> Body | None:
 
 
 def _load_current(stage: Stage, name: str, folder: Folder) -> Body:
-    """The stored body. Raises BodyError when it is missing, damaged or stale."""
+    """The stored body; one that gearfmu 0.2 or 0.3 made from these numbers gets its hash of today. Raises BodyError
+    when it is missing, damaged or stale: it says whether the program or the numbers are others."""
     path = body_path(stage, name, folder)
-    body = load_body(path)
-    _refuse_stale(path, body, expected_hash(stage, name), stage.source)
-    return body
-
-
-def _refuse_stale(path: Path, body: Body, wanted_hash: str, source: Path) -> None:
-    """BodyError when the body of this file has another fingerprint than the stage file asks for: it says whether the
-    program or the numbers are others."""
-    if body.how.hash == wanted_hash:
-        return
-    if body.how.algorithm != ALGORITHM_VERSION:
-        why = f"made by version {body.how.algorithm} of the reduction, this program has version {ALGORITHM_VERSION}"
+    body, wanted = load_body(path), expected_hash(stage, name)
+    if body.how.hash == wanted:
+        return body
+    algorithm = ALGORITHMS[stage.by_file[name].kind]
+    if body.how.hash == former_hash(stage, name):
+        return replace(body, how=replace(body.how, hash=wanted, algorithm=algorithm))
+    if body.how.algorithm != algorithm:
+        why = f"made by version {body.how.algorithm} of the reduction, this program has version {algorithm}"
     else:
-        why = f"made from other numbers than {source} asks for now"
+        why = f"made from other numbers than {stage.source} asks for now"
     raise BodyError(f"{path}: stale: {why}; make it again with 'gearfmu reduce STAGE'")

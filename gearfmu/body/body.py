@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearfmu.body.layout import ALGORITHM_VERSION, Entry, entries_of, value_of
+from gearfmu.body.layout import Entry, entries_of, value_of
 from gearfmu.errors import BodyError
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
 from gearfmu.reduction.display import Picture
 from gearfmu.reduction.full_order import COMPONENTS
+from gearfmu.spec.forms.body import ALGORITHMS, body_hash
+from gearfmu.spec.forms.general import Reduced
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 _FORMER = {  # names of earlier versions, told by the AttributeError
@@ -36,15 +38,21 @@ _FORMER = {  # names of earlier versions, told by the AttributeError
 
 @dataclass(frozen=True)
 class How:
-    """What a body was made from. hash: SHA-256 of its inputs and of the algorithm's version, 64 hex digits; method: of
-    reduction; material: SI; mesh: plain facts; provenance: program versions, time and memory."""
+    """What a body was made from. hash: `spec.forms.body.body_hash`, 64 hex digits; method: of reduction; material: SI;
+    mesh: plain facts; provenance: program versions, time and memory; algorithm: its version, 0 where none made it."""
 
     hash: str
     method: str
     material: dict[str, Any] = field(default_factory=dict)
     mesh: dict[str, Any] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
-    algorithm: int = ALGORITHM_VERSION
+    algorithm: int = 0
+
+    @classmethod
+    def of(cls, table: Reduced, method: str, mesh: dict[str, Any]) -> How:
+        """How a body is made from its table today."""
+        material = {} if table.material is None else table.material.model_dump()
+        return cls(body_hash(table), method, material, mesh, {}, ALGORITHMS[table.kind])
 
 
 @dataclass(frozen=True)

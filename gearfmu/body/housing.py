@@ -19,7 +19,7 @@ Progress = Callable[[str, float], None]
 LINES = 60  # at which the error is measured
 
 
-def reduced_housing(housing: HousingBody, input_hash: str, progress: Progress | None = None) -> Body:
+def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> Body:
     """The housing of a stage, reduced as its file says. Raises MeshError and BodyError."""
     started, tell = time.process_time(), progress or (lambda what, share: None)
     tell(f"{housing.name}: mesh and finite elements", 0.0)
@@ -28,8 +28,7 @@ def reduced_housing(housing: HousingBody, input_hash: str, progress: Progress | 
     tell(f"{housing.name}: {method}, {found.full.size} unknowns", 0.1)
     surface = found.surface
     mesh = found.facts | ({} if surface is None else {"holes_of_the_skin": surface.holes})
-    material = {} if housing.material is None else housing.material.model_dump()
-    how = How(input_hash, method, material, mesh)
+    how = How.of(housing, method, mesh)
     read = Read(found.sensors) if surface is None else Read(found.sensors, surface.points, surface.faces, found.skin)
     judging = Judging.over(lines=LINES, damping_ratio=housing.modal_damping)
     body = whole_body(found.full, how, Size(housing.modes), judging, read)

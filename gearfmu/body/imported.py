@@ -39,62 +39,63 @@ from gearfmu.reduction.imported.gear import (
 from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.imported.whole import Held, imported_gear_order
-from gearfmu.spec.forms.general import RingBody
-from gearfmu.spec.forms.members import CarrierMember, Member
+from gearfmu.spec.forms.general import RingBody, ToothedBody
+from gearfmu.spec.forms.planetary import CarrierBody, MountsSpec
+from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
 
 
-def check_gear(member: Member) -> CheckedGear:
+def check_gear(gear: ToothedBody) -> CheckedGear:
     """The imported finite elements of a gear, read, checked and placed. Raises MeshError."""
-    files = _files(member)
-    if member.gear.helix_angle:
+    files = _files(gear)
+    if gear.helix_angle:
         raise MeshError(f"{files.file}: finite elements made elsewhere are read for spur gears only")
-    return checked_gear(files, _wanted(member))
+    return checked_gear(files, _wanted(gear))
 
 
-def _files(member: Member) -> ImportSpec | RingImportSpec:
-    assert member.gear.imported is not None
-    return member.gear.imported
+def _files(gear: ToothedBody) -> ImportSpec | RingImportSpec:
+    assert gear.imported is not None
+    return gear.imported
 
 
-def _wanted(member: Member) -> Wanted:
-    gear, geometry = member.gear, member.geometry
+def _wanted(gear: ToothedBody) -> Wanted:
+    geometry = gear_shape(gear)
     internal = isinstance(geometry, InternalGearGeometry)
     flank, points = tooth_flank(geometry, gear, internal)
     held = gear.rim_diameter if isinstance(gear, RingBody) else gear.bore_diameter
     return Wanted(geometry.z, flank, points, 0.5 * held, gear.material, gear.body.modes)
 
 
-def imported_full_order(member: Member) -> FullOrder:
+def imported_full_order(gear: ToothedBody, mounts: MountsSpec | None = None) -> FullOrder:
     """The whole imported gear or ring before reduction, for every method: interfaces tooth0 … and bore, or on its
     mounts. Raises MeshError."""
-    found, wanted, files = check_gear(member), _wanted(member), _files(member)
-    held = Held(member.name, member.geometry.r, files.bore_coupling, member.mounts)
+    found, wanted, files = check_gear(gear), _wanted(gear), _files(gear)
+    held = Held(gear.name, gear_shape(gear).r, files.bore_coupling, mounts)
     try:
         return imported_gear_order(found, wanted, held)
     except MeshError as error:
         raise MeshError(f"{files.file}: {error}") from error
 
 
-def imported_sector_mesh(member: Member) -> FeMesh:
+def imported_sector_mesh(gear: ToothedBody) -> FeMesh:
     """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean
     tooth, tetrahedra, ready-made matrices."""
-    found = check_gear(member)
+    found = check_gear(gear)
     cut = found.cut
     if cut is None or set(cut.elements) != {"hexahedron20"} or found.matrices is not None:
         raise BodyError(
-            f"{_files(member).file}: this needs hexahedra, our own matrices and a mesh that repeats itself "
+            f"{_files(gear).file}: this needs hexahedra, our own matrices and a mesh that repeats itself "
             "from tooth to tooth; "
             "use the pictures of your own finite-element program"
         )
     bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
-    sets = {"rim" if isinstance(member.gear, RingBody) else BORE: bore}
-    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, member.geometry.z, cut.cut_minus, cut.cut_plus)
+    sets = {"rim" if isinstance(gear, RingBody) else BORE: bore}
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, gear.teeth, cut.cut_minus, cut.cut_plus)
 
 
-def imported_carrier_order(carrier: CarrierMember) -> tuple[FullOrder, dict[str, Any]]:
+def imported_carrier_order(carrier: CarrierBody) -> tuple[FullOrder, dict[str, Any]]:
     """The imported carrier of a planetary set before reduction, known to be one solid, and plain facts. MeshError."""
-    found, source = imported_carrier(carrier), carrier.part.imported
+    found, source = imported_carrier(carrier), carrier.imported
     assert source is not None
     problem, space = None, elastic(found.full)
     try:
@@ -106,15 +107,15 @@ def imported_carrier_order(carrier: CarrierMember) -> tuple[FullOrder, dict[str,
     return found.full, found.facts
 
 
-def imported_parts(member: Member, cut: float, report: Progress) -> Parts:
+def imported_parts(gear: ToothedBody, cut: float, report: Progress) -> Parts:
     """Modes, static tables, error and pictures of an imported gear. cut : Hz, of the stored error. Raises MeshError."""
-    gear, geometry, files = member.gear, member.geometry, _files(member)
-    found = imported_gear(files, _wanted(member))
+    geometry, files = gear_shape(gear), _files(gear)
+    found = imported_gear(files, _wanted(gear))
     case = FrfCase(gear.modal_damping, cut, geometry.r)
     drawn = sector_mesh(geometry, gear.face_width, DRAWN)
     try:
         if isinstance(found.body, ImportedSector):
-            return _by_sector(found, member, case, (drawn, report))
+            return _by_sector(found, gear, case, (drawn, report))
         return _by_mean_tooth(found, gear.body.modes, case, (drawn, report))
     except (FactorError, ModesError) as error:
         raise MeshError(
@@ -124,11 +125,11 @@ def imported_parts(member: Member, cut: float, report: Progress) -> Parts:
         ) from error
 
 
-def _by_sector(found: ImportedGear, member: Member, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
+def _by_sector(found: ImportedGear, gear: ToothedBody, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     body, (drawn, report) = found.body, drawing
     assert isinstance(body, ImportedSector)
     surface = outline(drawn, body.mesh.nodes)
-    modes = elastic_modes(body, member.gear.body.modes, report, surface.sample)
+    modes = elastic_modes(body, gear.body.modes, report, surface.sample)
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)

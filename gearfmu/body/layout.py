@@ -7,7 +7,6 @@ from typing import Any
 
 FORMAT = "gearfmu-body"
 FORMAT_VERSION = 4
-ALGORITHM_VERSION = 2  # raise it when the numbers of a body change: every stored body is then stale
 
 
 @dataclass(frozen=True)

@@ -35,37 +35,36 @@ from gearfmu.reduction.display import outline
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.spec.forms.general import ToothedBody
-from gearfmu.spec.forms.members import Member
+from gearfmu.spec.forms.shapes import GearShape, gear_shape
 
 ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 Progress = Callable[[str, float], None]
 
 
-def gear_work(member: Member) -> Work | None:
+def gear_work(gear: ToothedBody) -> Work | None:
     """What the reduction of a gear meshed here takes; None of one meshed elsewhere. Raises MeshError."""
-    gear, geometry = member.gear, member.geometry
     if gear.imported is not None:
         return None
+    geometry = gear_shape(gear)
     return Work(gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
 
 
-def reduced_gear(member: Member, input_hash: str, progress: Progress | None = None) -> Body:
+def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     """The reduced body of an external or internal gear, by cyclic symmetry. Raises MeshError."""
-    gear, geometry = member.gear, member.geometry
+    geometry = gear_shape(gear)
     report = _named(progress, gear.name)
     started = time.process_time()
     report("mesh and finite elements", 0.0)
     flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
     if gear.imported is not None:
-        made = imported_parts(member, FRF_CUT, report)
+        made = imported_parts(gear, FRF_CUT, report)
     else:
-        made = _made_here(member, (flank, points), report)
+        made = _made_here(gear, geometry, (flank, points), report)
     node = Node("rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging", COMPONENTS, ORIGIN)
-    spent = provenance(time.process_time() - started)
     return Body(
         name=gear.name,
-        how=How(input_hash, GEAR_METHOD, gear.material.model_dump(), made.facts, spent),
+        how=replace(How.of(gear, GEAR_METHOD, made.facts), provenance=provenance(time.process_time() - started)),
         mass=symmetric_mass(made.inertia),
         frequency=made.modes.frequency,
         damping_ratio=np.full(len(made.modes.frequency), gear.modal_damping),
@@ -109,9 +108,11 @@ def _flank(teeth: int, made: Parts, flank: ToothFlank, points: Points) -> Flank:
     )
 
 
-def _made_here(member: Member, load_points: tuple[ToothFlank, Points], report: Progress) -> Parts:
+def _made_here(
+    gear: ToothedBody, geometry: GearShape, load_points: tuple[ToothFlank, Points], report: Progress
+) -> Parts:
     """A gear meshed here, reduced by cyclic symmetry."""
-    gear, geometry, (flank, points) = member.gear, member.geometry, load_points
+    flank, points = load_points
     sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
     need = gear_need(sector, gear.body)
     require_memory(need, lower_counts(gear.body.mesh, "body.mesh"))

@@ -25,18 +25,19 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import static_response
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
-from gearfmu.spec.forms.members import CarrierMember
+from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.forms.shapes import carrier_geometry
 
 Progress = Callable[[str, float], None]
 
 
-def reduced_carrier(carrier: CarrierMember, input_hash: str, progress: Progress | None = None) -> Body:
+def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> Body:
     """The carrier of a set, reduced as its file says. Raises MeshError."""
-    part, started = carrier.part, time.process_time()
+    started = time.process_time()
     _tell(progress, "carrier: mesh and finite elements", 0.0)
-    if part.imported is None:
+    if carrier.imported is None:
         need = carrier_need(carrier)
-        require_memory(need, lower_counts(part.mesh, "carrier.mesh"))
+        require_memory(need, lower_counts(carrier.mesh, "carrier.mesh"))
         _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
         facts = _carrier_facts(carrier)
         _tell(progress, "carrier: finite elements", 0.3)
@@ -44,9 +45,9 @@ def reduced_carrier(carrier: CarrierMember, input_hash: str, progress: Progress 
         mesh = {**facts, "dof_body": full.size}
     else:
         full, mesh = imported_carrier_order(carrier)
-    _tell(progress, f"carrier: {part.method}", 0.5)
-    how = How(input_hash, part.method, part.material.model_dump(), mesh)
-    body = whole_body(full, how, Size(part.modes), Judging.over(damping_ratio=part.modal_damping))
+    _tell(progress, f"carrier: {carrier.method}", 0.5)
+    how = How.of(carrier, carrier.method, mesh)
+    body = whole_body(full, how, Size(carrier.modes), Judging.over(damping_ratio=carrier.modal_damping))
     return replace(body, how=replace(how, provenance=provenance(time.process_time() - started)))
 
 
@@ -101,10 +102,10 @@ def _skin(read: Read, full: FullOrder, shapes: np.ndarray) -> Skin | None:
     return Skin(read.points.astype("f4"), read.faces, moved.reshape(-1, len(read.points), 3).astype("f4"))
 
 
-def _carrier_facts(carrier: CarrierMember) -> dict[str, Any]:
+def _carrier_facts(carrier: CarrierBody) -> dict[str, Any]:
     """Plain facts about our own mesh of a carrier, its error measured on a finer one."""
-    facts = mesh_report(carrier_sector(carrier.geometry, carrier.part.mesh))
-    counts, error = carrier.part.mesh.model_dump(), carrier_mesh_error(carrier)
+    facts = mesh_report(carrier_sector(carrier_geometry(carrier), carrier.mesh))
+    counts, error = carrier.mesh.model_dump(), carrier_mesh_error(carrier)
     return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
 
 

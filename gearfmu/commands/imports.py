@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,31 +41,28 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if gear is None or gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
-    place = next(spec.table_of(body) for body in spec.bodies if spec.file_of(body) == gear)
-    click.echo("\n" + section(file, place, options))
+    click.echo("\n" + section(file, spec.table_of(gear), options))
 
 
 def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported.carrier import imported_carrier
-    from gearfmu.spec.forms.general import RingBody
-    from gearfmu.spec.forms.members import carrier_of, member_of
+    from gearfmu.spec.forms.general import GearBody, RingBody
+    from gearfmu.spec.forms.planetary import CarrierBody
     from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
-    if name == "carrier":
-        carrier = carrier_of(spec)
-        if not options["bore"] or len(options["bolts"]) != (planets := carrier.geometry.planets):
+    table = spec.by_file[name]
+    if isinstance(table, CarrierBody):
+        if not options["bore"] or len(options["bolts"]) != (planets := len(table.bolts)):
             raise click.UsageError(f"a carrier needs --bore and {planets} times --bolt, each a node set")
-        part = carrier.part.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
-        return imported_carrier(replace(carrier, part=part)).facts
-    if name in {housing.name for housing in spec.housings}:
+        return imported_carrier(table.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})).facts
+    if not isinstance(table, GearBody | RingBody):
         raise click.UsageError(f"{name} is a housing: write its node sets into the stage file, then gearfmu reduce")
-    member = member_of(spec, name)
-    ring = isinstance(member.gear, RingBody)
+    ring = isinstance(table, RingBody)
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}
     source = (RingImportSpec if ring else ImportSpec)(file=file, **chosen)
-    return check_gear(replace(member, gear=member.gear.model_copy(update={"imported": source}))).facts
+    return check_gear(table.model_copy(update={"imported": source})).facts
 
 
 def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) -> dict[str, Any]:

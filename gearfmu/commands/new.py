@@ -90,14 +90,13 @@ def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: A
 
 def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
     """The stage file of teeth, module and width, and the shape that it proposes."""
-    from gearfmu.spec.forms.members import members
     from gearfmu.spec.forms.shapes import centre_distance
     from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
     from gearfmu.spec.stage import load_stage
 
     path = new_from_numbers(name, wish_of(given))
     stage = load_stage(path)
-    mesh, gears = stage.engagements[0], [member.gear for member in members(stage).values()]
+    mesh, gears = stage.engagements[0], stage.gears
     (torque, _), (speed, _) = stage.limits
     assert torque is not None and speed is not None
     shape = {

@@ -30,22 +30,21 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
-    from gearfmu.spec.forms.members import carrier_of, members
+    from gearfmu.spec.forms.general import GearBody, RingBody
+    from gearfmu.spec.forms.shapes import gear_shape
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    toothed = members(spec)
     for name in _chosen(spec.files, only):
-        sector = body_sector(spec, name, scale)
-        member = toothed.get(name)
-        part = carrier_of(spec).part if member is None else member.gear
-        own = member is not None and part.imported is None
-        flank = (member.geometry.r_b, member.gear.body.strip_half_width) if member and own else ()
+        sector, table = body_sector(spec, name, scale), spec.by_file[name]
+        flank: tuple[float, ...] = ()
+        if isinstance(table, GearBody | RingBody) and table.imported is None:
+            flank = gear_shape(table).r_b, table.body.strip_half_width
         path = out / f"{name}.vtu"
         written = sector.full() if full else sector
         write_vtu(written, path)
         if deck:
-            write_deck(written, path.with_suffix(".inp"), part.material.model_dump())
+            write_deck(written, path.with_suffix(".inp"), table.material.model_dump())
         click.echo(name)
         echo_pairs({**in_units(mesh_report(sector, *flank)), "written": str(path)}, "  ")
 

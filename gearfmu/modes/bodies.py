@@ -14,12 +14,13 @@ from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
-from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.carrier import carrier_full_order, evenly_spaced, scaled_sector
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
 from gearfmu.spec.forms.expand import CARRIER
 from gearfmu.spec.forms.general import RingBody, Stage, ToothedBody
-from gearfmu.spec.forms.members import carrier_of, member_of
-from gearfmu.spec.forms.planetary import CarrierSpec
+from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.forms.shapes import carrier_geometry
+from gearfmu.spec.tables.housing import HousingBody
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 
@@ -31,18 +32,18 @@ def body_modes(stage: Stage, name: str, count: int, progress: Progress | None = 
 
     scale : factor on all element counts.
     """
-    if name in {housing.name for housing in stage.housings}:
+    table = stage.by_file[name]
+    if isinstance(table, HousingBody):
         why = "shapes are drawn of gears, rings and carriers: `gearfmu inspect` shows a housing's frequencies"
         raise BodyError(f"{stage.source}: {name} is a housing: {why}")
-    part: CarrierSpec | ToothedBody = carrier_of(stage).part if name == CARRIER else member_of(stage, name).gear
-    if isinstance(part, CarrierSpec) and part.imported is None:
-        found = _carrier(stage, count, progress, scale)
+    if isinstance(table, CarrierBody) and table.imported is None:
+        found = _carrier(table, count, progress, scale)
     else:
         mesh, rigid = body_sector(stage, name, scale), None
-        if isinstance(part, ToothedBody) and part.rigid_bore:
-            rigid = mesh.sets["rim" if isinstance(part, RingBody) else "bore"]
-        found = cyclic_modes(name, mesh, part.material, count, progress, rigid)
-    return _damped(found, part.modal_damping)
+        if isinstance(table, ToothedBody) and table.rigid_bore:
+            rigid = mesh.sets["rim" if isinstance(table, RingBody) else "bore"]
+        found = cyclic_modes(name, mesh, table.material, count, progress, rigid)
+    return _damped(found, table.modal_damping)
 
 
 def gear_modes(stage: Stage, stored: Body, count: int, progress: Progress | None = None) -> BodyModes:
@@ -77,15 +78,14 @@ def uncoupled_carrier_modes(
 
     BodyError for an imported carrier and for planets at uneven angles, which have no sector that repeats.
     """
-    carrier = carrier_of(stage)
-    part, angles = carrier.part, carrier.geometry.angles
-    even = 2 * np.pi * np.arange(len(angles)) / len(angles)
-    if part.imported is not None or not np.allclose(angles, even, atol=1e-9):
+    carrier = stage.by_file[CARRIER]
+    assert isinstance(carrier, CarrierBody)
+    if carrier.imported is not None or not evenly_spaced(carrier):
         why = "only a carrier meshed here, of evenly spaced planets, is taken without couplings"
         raise BodyError(f"{stage.source}: {why}")
     sector = body_sector(stage, "carrier", scale)
-    found = cyclic_modes("carrier_uncoupled", sector, part.material, count, progress)
-    return _damped(found, part.modal_damping)
+    found = cyclic_modes("carrier_uncoupled", sector, carrier.material, count, progress)
+    return _damped(found, carrier.modal_damping)
 
 
 def mounted_ring_modes(
@@ -95,25 +95,27 @@ def mounted_ring_modes(
 
     scale : factor on all element counts; at 1 a whole ring is too much. BodyError for a ring without mounts.
     """
-    member = member_of(stage, "ring")
-    if member.mounts is None:
+    ring = stage.by_file["ring"]
+    assert isinstance(ring, RingBody)
+    if stage.mounts is None:
         raise BodyError(f"{stage.source}: the ring has no mounts: leave --mounted away, or add [ring.mounts]")
     if progress:
         progress("finite elements", 0.1)
     mesh = body_sector(stage, "ring", scale).full()
-    full = ring_full_order(member, scale) if member.gear.imported is None else imported_full_order(member)
-    found = whole_modes(full, mesh, {}, member.gear.material, count)
-    return _damped(replace(found, name="ring_on_mounts"), member.gear.modal_damping)
+    own = ring.imported is None
+    full = ring_full_order(ring, stage.mounts, scale) if own else imported_full_order(ring, stage.mounts)
+    found = whole_modes(full, mesh, {}, ring.material, count)
+    return _damped(replace(found, name="ring_on_mounts"), ring.modal_damping)
 
 
-def _carrier(stage: Stage, count: int, progress: Progress | None, scale: float) -> BodyModes:
+def _carrier(carrier: CarrierBody, count: int, progress: Progress | None, scale: float) -> BodyModes:
     if progress:
         progress("finite elements", 0.1)
-    carrier, sector = carrier_of(stage), body_sector(stage, CARRIER, scale)
-    mesh = whole_carrier(carrier.geometry, sector)
+    sector = scaled_sector(carrier, scale)
+    mesh = whole_carrier(carrier_geometry(carrier), sector)
     slaves = {f"bolt{k}": sector.sector_nodes(k)[sector.sets["bolt"]] for k in range(sector.teeth)}
     full, slaves = carrier_full_order(carrier, scale), slaves | {"bore": mesh.sets["bore"]}
-    return whole_modes(full, mesh, slaves, carrier.part.material, count)
+    return whole_modes(full, mesh, slaves, carrier.material, count)
 
 
 def _damped(found: BodyModes, damping_ratio: float) -> BodyModes:

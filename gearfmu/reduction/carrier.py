@@ -14,37 +14,38 @@ from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_orde
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
-from gearfmu.spec.forms.members import CarrierMember
+from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.forms.shapes import carrier_geometry
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 _COARSER = 0.75  # … of the mesh from which that one's frequencies are extrapolated where it is large
 _LARGE = 1e9  # bytes
 
 
-def carrier_full_order(carrier: CarrierMember, scale: float = 1.0) -> FullOrder:
+def carrier_full_order(carrier: CarrierBody, scale: float = 1.0) -> FullOrder:
     """A carrier with interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
 
     scale : factor on all element counts (1: about 150 000 unknowns); an imported carrier has none and is taken as it
     is. Rotations count with the bolt circle's radius. Raises MeshError.
     """
-    if carrier.part.imported is not None:
+    if carrier.imported is not None:
         return imported_carrier(carrier).full
     sector = scaled_sector(carrier, scale)
-    full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.geometry.a))
+    full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.circle))
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full
 
 
-def carrier_need(carrier: CarrierMember) -> Need:
+def carrier_need(carrier: CarrierBody) -> Need:
     """Memory that the reduction of a carrier meshed here takes, from its counts, the mesh beside it by which its error
     is known among it (`compared_scale`)."""
     own, bolts = _sector_size(scaled_sector(carrier, 1.0))
-    size, vectors, cyclic = own * bolts, 3 * carrier.part.modes, cyclic_carrier(carrier)
+    size, vectors, cyclic = own * bolts, 3 * carrier.modes, cyclic_carrier(carrier)
     need = parts_need(size, bolts, vectors) if cyclic else whole_need(size, vectors, CARRIER_FACTORS)
     scale = max(1.0, compared_scale(carrier))
     return Need(size, max(need.memory, _modes_memory(own * scale**3, 1 if cyclic else bolts)), True)
 
 
-def compared_scale(carrier: CarrierMember) -> float:
+def compared_scale(carrier: CarrierBody) -> float:
     """Factor on all element counts of the mesh that the error of a carrier is known by: finer where that is no large
     one, else coarser."""
     own, bolts = _sector_size(scaled_sector(carrier, 1.0))
@@ -64,35 +65,39 @@ def _modes_memory(sector_size: float, together: int) -> float:
     return whole_need(round(sector_size * together), 0, 1).memory
 
 
-def cyclic_carrier(carrier: CarrierMember) -> bool:
+def cyclic_carrier(carrier: CarrierBody) -> bool:
     """Are the bolts of a carrier evenly spaced and coupled alike, and enough for cuts?"""
-    geometry = carrier.geometry
-    kinds = {carrier.part.coupling_of(f"bolt{k}") for k in range(geometry.planets)}
-    even = np.allclose(geometry.angles, 2 * np.pi * np.arange(geometry.planets) / geometry.planets, atol=1e-9)
-    return even and len(kinds) == 1 and geometry.planets >= 3
+    count = len(carrier.bolts)
+    kinds = {carrier.coupling_of(f"bolt{k}") for k in range(count)}
+    return evenly_spaced(carrier) and len(kinds) == 1 and count >= 3
 
 
-def scaled_sector(carrier: CarrierMember, scale: float) -> FeMesh:
+def evenly_spaced(carrier: CarrierBody) -> bool:
+    """Are the bolts of a carrier evenly spaced?"""
+    return np.allclose(carrier.bolts, np.arange(len(carrier.bolts)) / len(carrier.bolts), atol=1e-9)
+
+
+def scaled_sector(carrier: CarrierBody, scale: float) -> FeMesh:
     """One bolt's sector of a carrier meshed here. scale : factor on all element counts."""
-    counts = carrier.part.mesh
-    return carrier_sector(carrier.geometry, counts.model_copy(update={"scale": counts.scale * scale}))
+    counts = carrier.mesh
+    return carrier_sector(carrier_geometry(carrier), counts.model_copy(update={"scale": counts.scale * scale}))
 
 
-def carrier_elements(carrier: CarrierMember, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
+def carrier_elements(carrier: CarrierBody, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
     """Finite elements of a carrier of these sectors, and the couplings of its bolts and bore."""
-    geometry = carrier.geometry
+    geometry = carrier_geometry(carrier)
     whole = whole_carrier(geometry, sector)
-    body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, carrier.part.material))
+    body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, carrier.material))
     couplings = [
         Coupling(
             f"bolt{k}",
-            carrier.part.coupling_of(f"bolt{k}"),
+            carrier.coupling_of(f"bolt{k}"),
             sector.sector_nodes(k)[sector.sets["bolt"]],
             geometry.bolt_axis(k),
         )
         for k in range(geometry.planets)
     ]
-    couplings.append(Coupling("bore", carrier.part.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
+    couplings.append(Coupling("bore", carrier.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
     return body, couplings
 
 

@@ -17,13 +17,13 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.carrier import FINER, carrier_full_order, compared_scale, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.spec.forms.members import CarrierMember
+from gearfmu.spec.forms.planetary import CarrierBody
 
 COMPARED = 20  # lowest elastic modes
 _POWER = 3  # of the element's length
 
 
-def carrier_mesh_error(carrier: CarrierMember) -> dict[str, Any]:
+def carrier_mesh_error(carrier: CarrierBody) -> dict[str, Any]:
     """How far the lowest free frequencies of a carrier, coupled as the file says, lie above those
     of a finer mesh: plain facts, largest of the relative errors. `compared`: scale of the mesh that was made beside its
     own. Raises MeshError."""
@@ -42,7 +42,7 @@ def extrapolated(coarser: np.ndarray, ratio: float) -> np.ndarray:
     return coarser * (1 - FINER**-_POWER) / (ratio**_POWER - 1)
 
 
-def free_frequencies(carrier: CarrierMember, scale: float, count: int) -> np.ndarray:
+def free_frequencies(carrier: CarrierBody, scale: float, count: int) -> np.ndarray:
     """The `count` lowest elastic frequencies (Hz) of the free carrier; `scale`: factor on all element counts.
 
     By one sector where bolts are evenly spaced and coupled alike, by the whole body else. Raises MeshError.
@@ -59,12 +59,12 @@ def free_frequencies(carrier: CarrierMember, scale: float, count: int) -> np.nda
     return np.sqrt(np.sort(np.concatenate(families))[:count]) / (2 * np.pi)
 
 
-def _space(carrier: CarrierMember, scale: float) -> SectorSpace:
+def _space(carrier: CarrierBody, scale: float) -> SectorSpace:
     """The fields of one bolt's sector."""
-    part, mesh = carrier.part, scaled_sector(carrier, scale)
-    matrices = hex20.assemble(mesh.nodes, mesh.elements, part.material)
-    bore = mesh.sets["bore"] if part.coupling_of("bore") == "rigid" else None
-    bolt = mesh.sets["bolt"] if part.coupling_of("bolt0") == "rigid" else None
+    mesh = scaled_sector(carrier, scale)
+    matrices = hex20.assemble(mesh.nodes, mesh.elements, carrier.material)
+    bore = mesh.sets["bore"] if carrier.coupling_of("bore") == "rigid" else None
+    bolt = mesh.sets["bolt"] if carrier.coupling_of("bolt0") == "rigid" else None
     (space,) = sector_spaces(
         Sector(mesh.nodes, mesh.elements, *matrices, mesh.teeth, mesh.cut_minus, mesh.cut_plus, True, bore, bolt)
     )

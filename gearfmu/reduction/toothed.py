@@ -5,8 +5,6 @@ The method through cyclic symmetry (`sector`) takes far finer meshes; this one s
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -14,48 +12,48 @@ from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.spec.forms.members import Member
+from gearfmu.spec.forms.general import GearBody, RingBody
+from gearfmu.spec.forms.planetary import MountsSpec
+from gearfmu.spec.forms.shapes import gear_geometry, ring_geometry
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5
 
 
-def ring_full_order(member: Member, scale: float = RING_SCALE, mounted: bool = True) -> FullOrder:
+def ring_full_order(
+    ring: RingBody, mounts: MountsSpec | None = None, scale: float = RING_SCALE, mounted: bool = True
+) -> FullOrder:
     """A ring with its input nodes tooth0 …, three displacements each.
 
-    mounted : its springs are in the stiffness, and nothing else holds it. Otherwise the body is free, and the mounts
-    (averaging nodes mount0 …) are interfaces and the ground when it is judged.
+    mounted : the springs of its mounts are in the stiffness, and nothing else holds it. Otherwise the body is free, and
+    the mounts (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
-    geometry, gear, counts = member.geometry, member.gear, member.gear.body.mesh
-    assert isinstance(geometry, InternalGearGeometry)
-    sector = ring_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
-    body = _whole(sector, gear.material)
-    couplings, mounts = _teeth(sector, body), ring_mounts(sector, body, member.mounts)
-    if mounted and member.mounts is not None:
-        springs = mount_springs(body, mounts, member.mounts.stiffness)
-        return full_order(member.name, body, couplings, Judgement((), geometry.r), springs)
-    ground = tuple(mount.name for mount in mounts)
-    return full_order(member.name, body, [*couplings, *mounts], Judgement(ground, geometry.r))
+    geometry, counts = ring_geometry(ring, ring, 1), ring.body.mesh
+    sector = ring_sector(geometry, ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
+    body = _whole(sector, ring.material)
+    couplings, patches = _teeth(sector, body), ring_mounts(sector, body, mounts)
+    if mounted and mounts is not None:
+        springs = mount_springs(body, patches, mounts.stiffness)
+        return full_order(ring.name, body, couplings, Judgement((), geometry.r), springs)
+    ground = tuple(patch.name for patch in patches)
+    return full_order(ring.name, body, [*couplings, *patches], Judgement(ground, geometry.r))
 
 
-def gear_full_order(member: Member, scale: float = GEAR_SCALE) -> FullOrder:
+def gear_full_order(gear: GearBody, scale: float = GEAR_SCALE) -> FullOrder:
     """An external gear with one input node a tooth and the node of its bore (averaging, or rigid
     where the gear says so), which is the ground when it is judged."""
-    gear, geometry, counts = member.gear, member.geometry, member.gear.body.mesh
-    assert isinstance(geometry, GearGeometry)
+    geometry, counts = gear_geometry(gear, gear, 1), gear.body.mesh
     sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, gear.material)
     kind = "rigid" if gear.rigid_bore else "averaging"
     bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
-    return full_order(member.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
+    return full_order(gear.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
 
 
-def ring_mounts(sector: FeMesh, body: Elements, mounts: Any) -> list[Coupling]:
+def ring_mounts(sector: FeMesh, body: Elements, mounts: MountsSpec | None) -> list[Coupling]:
     """The mounts mount0 … of a whole ring: averaging nodes, each of the rim of one sector; none when `mounts` is None.
 
     Mount k holds the sector of its tooth space (`mount_spaces`); its point is the middle of that patch.

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.spec.forms.general import CarrierBody, ShaftBody, Stage
+from gearfmu.spec.forms.general import ShaftBody, Stage
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.housing import HousingBody
 
 AROUND = 40  # sectors of a surface of revolution

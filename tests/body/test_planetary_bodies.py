@@ -64,7 +64,7 @@ def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands(
 
 
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
-    ring, carrier = ring_geometry(SPEC.written.ring, SPEC.written.set), carrier_geometry(SPEC.written)
+    ring, carrier = ring_geometry(SPEC.written.ring, SPEC.written.set), carrier_geometry(SPEC.bodies["carrier"])
     (area, moment), (middle, about) = section(ring), carrier_moments(carrier)
     volume = ring.z * area * SPEC.written.ring.face_width
     assert shipped["ring"].total_mass == pytest.approx(7850 * volume, rel=1e-5)

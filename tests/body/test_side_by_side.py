@@ -15,7 +15,6 @@ from gearfmu.femesh import sector_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need, gear_need, whole_need
-from gearfmu.spec.forms.members import carrier_of
 from gearfmu.spec.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -95,7 +94,7 @@ def test_a_finer_mesh_needs_more(spec: object) -> None:
 def test_the_estimate_of_carriers_is_near_what_was_measured() -> None:
     """Peaks of processes that reduced the carrier of planetary54 alone."""
     for scale, measured in ((1.0, 2.1e9), (0.5, 0.55e9), (0.3, 0.228e9)):
-        need = carrier_need(carrier_of(load_stage("planetary54", {"carrier.mesh.scale": scale})))
+        need = carrier_need(load_stage("planetary54", {"carrier.mesh.scale": scale}).by_file["carrier"])
         assert need.memory == pytest.approx(measured, rel=0.25) and need.whole
 
 

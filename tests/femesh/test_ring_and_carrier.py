@@ -26,7 +26,7 @@ from gearfmu.spec.tables.gear import MeshSpec
 
 SPEC = load_stage("planetary54")
 RING, WIDTH = ring_geometry(SPEC.written.ring, SPEC.written.set), SPEC.written.ring.face_width
-CARRIER = carrier_geometry(SPEC.written)
+CARRIER = carrier_geometry(SPEC.bodies["carrier"])
 UNIT = SimpleNamespace(youngs_modulus=1.0, poisson_ratio=0.3, density=1.0)
 COUNTS = MeshSpec(flank=6, thickness=2, root=3, rim=2, width=2)
 

@@ -99,7 +99,7 @@ def test_tips_collide_when_the_ring_has_few_teeth_more_than_the_planet():
 
 
 def test_carrier_volume_is_a_sum_of_cylinders():
-    g = carrier_geometry(SPEC.written)
+    g = carrier_geometry(SPEC.bodies["carrier"])
     plate, bolt = math.pi * (60e-3**2 - 20e-3**2) * 12e-3, math.pi * 8e-3**2 * 22e-3
     assert g.volume == pytest.approx(plate + 4 * bolt)
     assert g.bolt_axis(1) == pytest.approx([0, 45e-3, 0], abs=1e-15)

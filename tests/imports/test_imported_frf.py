@@ -16,7 +16,6 @@ from gearfmu.body.imported import imported_full_order
 from gearfmu.fem import solids
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
-from gearfmu.spec.forms.members import member_of
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
@@ -24,7 +23,7 @@ READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
 
 def imported(folder: Path, section: str = SECTION) -> FullOrder:
     spec = stage(folder, section)
-    return imported_full_order(member_of(spec, spec.gears[0].name))
+    return imported_full_order(spec.by_file[spec.gears[0].name])
 
 
 def store_matrices(folder: Path, whole: bool) -> None:
@@ -36,7 +35,7 @@ def store_matrices(folder: Path, whole: bool) -> None:
 
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
-    return gear_full_order(member_of(stage(tmp_path_factory.mktemp("native")), "pinion"), 1.0)
+    return gear_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], 1.0)
 
 
 def places(body: FullOrder) -> np.ndarray:

@@ -12,10 +12,10 @@ from decks import write_deck
 from gears import hex20_deck, pinion, stage, tetrahedra
 
 from gearfmu.body import Body, reduce_bodies, reduce_body
-from gearfmu.body.bodies import expected_hash
 from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
+from gearfmu.spec.forms.body import expected_hash
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'

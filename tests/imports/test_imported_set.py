@@ -15,7 +15,6 @@ from decks import write_deck
 
 from gearfmu import cli
 from gearfmu.body import reduce_body
-from gearfmu.body.bodies import expected_hash
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
@@ -26,8 +25,8 @@ from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import carrier_of, member_of
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
@@ -52,7 +51,7 @@ def stage(folder: Path, section: str = "") -> Stage:
 def carrier_parts() -> tuple[FeMesh, dict[str, np.ndarray]]:
     spec = load_stage("planetary54")
     sector = carrier_sector(
-        carrier_geometry(spec.written), spec.written.carrier.mesh.model_copy(update={"scale": 0.35})
+        carrier_geometry(spec.bodies["carrier"]), spec.written.carrier.mesh.model_copy(update={"scale": 0.35})
     )
     mesh = sector.full()
     sets = {name: sector.sector_nodes(k)[sector.sets["bolt"]] for k, name in enumerate(BOLTS)}
@@ -78,7 +77,7 @@ def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready
         ):
             sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
         section += 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
-    body, native = carrier_full_order(carrier_of(stage(tmp_path, section))), carrier_full_order(carrier_of(own))
+    body, native = (carrier_full_order(spec.by_file["carrier"]) for spec in (stage(tmp_path, section), own))
     assert [(i.name, i.kind) for i in body.interfaces] == [(i.name, i.kind) for i in native.interfaces]
     assert body.ground == native.ground and body.length == native.length
     for one, other in zip(body.interfaces, native.interfaces, strict=True):
@@ -165,7 +164,8 @@ def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
     own = stage(tmp_path / "own")
     ring_deck(tmp_path, body_sector(own, "ring"))
     spec = stage(tmp_path, RING)
-    body, native = imported_full_order(member_of(spec, "ring")), ring_full_order(member_of(own, "ring"), 1.0)
+    body = imported_full_order(spec.by_file["ring"], spec.mounts)
+    native = ring_full_order(own.by_file["ring"], own.mounts, 1.0)
     assert body.rigid.size == 0 and body.ground == () and body.length == native.length
     assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
     for name in ("stiffness", "mass"):
@@ -210,7 +210,7 @@ def turned(angle: float) -> np.ndarray:
 def test_a_carrier_that_lies_elsewhere_is_refused(tmp_path: Path, nodes, message: str) -> None:
     carrier_deck(tmp_path, nodes())
     with pytest.raises(MeshError, match=message) as caught:
-        carrier_full_order(carrier_of(stage(tmp_path, CARRIER)))
+        carrier_full_order(stage(tmp_path, CARRIER).by_file["carrier"])
     assert str(tmp_path / "carrier.inp") in str(caught.value) and "\n" not in str(caught.value)
 
 

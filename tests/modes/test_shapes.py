@@ -19,7 +19,6 @@ from gearfmu.modes.shapes import energy_shares
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.members import member_of
 from gearfmu.spec.stage import load_stage
 
 
@@ -115,7 +114,7 @@ def test_a_ring_by_sectors_and_as_a_whole() -> None:
     mesh, material = set_body("ring", 0.2)
     sectors = cyclic_modes("ring", mesh, material, 8)
     whole = whole_modes(
-        ring_full_order(member_of(load_stage("planetary54"), "ring"), 0.2, mounted=False), mesh.full(), {}, material, 8
+        ring_full_order(load_stage("planetary54").by_file["ring"], None, 0.2), mesh.full(), {}, material, 8
     )
     assert np.allclose(frequencies(sectors)[:8], frequencies(whole)[:8], rtol=1e-7)
     assert [m.nodal_diameter for m in whole.modes] == [m.nodal_diameter for m in sectors.modes]

@@ -91,7 +91,7 @@ def test_a_carrier_without_couplings_is_that_of_its_finite_elements() -> None:
     spec, scale = load_stage("planetary54"), 0.25
     found = uncoupled_carrier_modes(spec, 5, scale=scale)
     own = np.concatenate([[mode.frequency] * len(mode.numbers) for mode in found.modes])
-    mesh = whole_carrier(carrier_geometry(spec.written), body_sector(spec, "carrier", scale))
+    mesh = whole_carrier(carrier_geometry(spec.bodies["carrier"]), body_sector(spec, "carrier", scale))
     k, m = solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, spec.written.carrier.material)
     values = eigsh(k.tocsc(), 6 + len(own), m.tocsc(), sigma=-((2 * np.pi * 300) ** 2), return_eigenvectors=False)
     whole = np.sort(np.sqrt(np.abs(values)))[6:] / (2 * np.pi)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,7 +19,6 @@ from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
-from gearfmu.spec.forms.members import carrier_of, member_of
 from gearfmu.spec.forms.shapes import carrier_geometry
 from gearfmu.spec.stage import load_stage
 
@@ -30,13 +28,12 @@ STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 
 
 def with_couplings(**kinds: str):
-    own = carrier_of(SPEC)
-    return replace(own, part=own.part.model_copy(update={"coupling": kinds}))
+    return SPEC.by_file["carrier"].model_copy(update={"coupling": kinds})
 
 
 @pytest.fixture(scope="module")
 def carrier() -> FullOrder:
-    return carrier_full_order(carrier_of(SPEC), SCALE)
+    return carrier_full_order(SPEC.by_file["carrier"], SCALE)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +44,7 @@ def averaged() -> FullOrder:
 @pytest.fixture(scope="module")
 def elements() -> Elements:
     mesh = carrier_sector(
-        carrier_geometry(SPEC.written), SPEC.written.carrier.mesh.model_copy(update={"scale": SCALE})
+        carrier_geometry(SPEC.bodies["carrier"]), SPEC.written.carrier.mesh.model_copy(update={"scale": SCALE})
     ).full()
     return Elements(
         mesh.nodes, mesh.elements, *hex20.assemble(mesh.nodes, mesh.elements, SPEC.written.carrier.material)
@@ -76,7 +73,7 @@ def test_rigid_motion_costs_nothing_and_every_node_follows_it(name, request):
 
 
 def test_mass_and_inertia_are_the_analytic_ones(carrier):
-    geometry, mass = carrier_geometry(SPEC.written), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
+    geometry, mass = carrier_geometry(SPEC.bodies["carrier"]), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
     centre, polar = carrier_moments(geometry)
     assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=2e-3)
     assert mass[5, 5] == pytest.approx(7850 * polar, rel=2e-3)
@@ -150,14 +147,14 @@ def test_two_rigid_couplings_cannot_share_a_node(elements):
 
 
 def test_a_whole_gear_has_one_node_a_tooth_and_its_bore():
-    body = gear_full_order(member_of(SPEC, "sun"), 0.25)
+    body = gear_full_order(SPEC.by_file["sun"], 0.25)
     assert [i.name for i in body.interfaces] == [*(f"tooth{k}" for k in range(18)), "bore"]
     assert body.ground == ("bore",) and body.length == pytest.approx(22.5e-3)
-    pair = gear_full_order(member_of(load_stage("fzg_c"), "pinion"), 0.2)
+    pair = gear_full_order(load_stage("fzg_c").by_file["pinion"], 0.2)
     assert len(pair.interfaces) == 17
 
 
 def _seat(elements: Elements, bolt: int) -> np.ndarray:
-    axis = carrier_geometry(SPEC.written).bolt_axis(bolt)
+    axis = carrier_geometry(SPEC.bodies["carrier"]).bolt_axis(bolt)
     distance = np.hypot(elements.nodes[:, 0] - axis[0], elements.nodes[:, 1] - axis[1])
     return np.flatnonzero((np.abs(distance - 8e-3) < 1e-9) & (elements.nodes[:, 2] > -10e-3 - 1e-9))

@@ -10,7 +10,6 @@ import pytest
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.spec.forms.members import carrier_of
 from gearfmu.spec.stage import load_stage
 
 SCALE = 0.3
@@ -19,9 +18,8 @@ SOFT = {name: "averaging" for name in ("bolt0", "bolt1", "bolt2", "bolt3", "bore
 
 
 def carrier(stage: str, coupling: dict[str, str]) -> FullOrder:
-    spec = load_stage(stage)
-    coupled = spec.written.carrier.model_copy(update={"coupling": coupling or spec.written.carrier.coupling})
-    return carrier_full_order(replace(carrier_of(spec), part=coupled), SCALE)
+    own = load_stage(stage).by_file["carrier"]
+    return carrier_full_order(own.model_copy(update={"coupling": coupling or own.coupling}), SCALE)
 
 
 @pytest.fixture(params=[("planetary54", {}), ("helical_set", {}), ("planetary54", SOFT)], scope="module")

@@ -3,8 +3,6 @@ shipped carriers lie within 0.3 % of a mesh 1.6 times finer, which a coarser mes
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -19,18 +17,18 @@ from gearfmu.reduction.mesh_error import (
     extrapolated,
     free_frequencies,
 )
-from gearfmu.spec.forms.members import CarrierMember, carrier_of
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.stage import load_stage
 
 ALLOWED = {"planetary54": 3.2e-3, "helical_set": 4.3e-3}  # reached; 3e-3 were wished
 COARSE = 0.35
 
 
-def coarse(stage: str, **coupling: str) -> CarrierMember:
+def coarse(stage: str, **coupling: str) -> CarrierBody:
     """The carrier of a set on a coarse mesh, some of its interfaces coupled otherwise."""
-    own = carrier_of(load_stage(stage))
-    mesh = own.part.mesh.model_copy(update={"scale": COARSE})
-    return replace(own, part=own.part.model_copy(update={"mesh": mesh, "coupling": own.part.coupling | coupling}))
+    own = load_stage(stage).by_file["carrier"]
+    mesh = own.mesh.model_copy(update={"scale": COARSE})
+    return own.model_copy(update={"mesh": mesh, "coupling": own.coupling | coupling})
 
 
 SOFT_BOLTS = {f"bolt{k}": "averaging" for k in range(4)}
@@ -77,7 +75,7 @@ def test_frequencies_that_converge_with_the_third_power_are_extrapolated_exactly
 
 def test_only_a_small_carrier_is_judged_by_a_finer_mesh() -> None:
     assert compared_scale(coarse("planetary54")) == FINER
-    assert compared_scale(carrier_of(load_stage("planetary54"))) < 1
+    assert compared_scale(load_stage("planetary54").by_file["carrier"]) < 1
 
 
 @pytest.mark.full
@@ -86,7 +84,7 @@ def test_a_coarser_mesh_tells_the_distance_to_the_finer_one_that_shipped_carrier
     stage: str,
 ) -> None:
     """Never less, a fifth more at most."""
-    found = carrier_mesh_error(carrier_of(load_stage(stage)))
+    found = carrier_mesh_error(load_stage(stage).by_file["carrier"])
     print(stage, found)
     measured = load_bodies(load_stage(stage))[-1].how.mesh["frequency_error"]
     assert found["compared"] < 1 and found["to_Hz"] == pytest.approx(measured["to_Hz"], rel=1e-6)

@@ -21,7 +21,6 @@ from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.spec.forms.members import member_of
 
 Z, POINTS = GEOMETRY.z, 2 * 4 * 3
 
@@ -91,17 +90,17 @@ def test_inertia_is_the_analytic_one():
 
 
 def test_full_order_of_the_mounted_ring_has_the_same_frequencies():
-    full = ring_full_order(member_of(set_spec(), "ring"), scale=1.0)
+    full = ring_full_order(set_spec().by_file["ring"], set_spec().mounts, scale=1.0)
     assert full.size == 3 * len(whole().elements.nodes) and full.rigid.shape[1] == 0 and len(full.interfaces) == Z
     difference = abs(full.stiffness - mounted_stiffness()).max() / abs(full.stiffness).max()
     assert difference < 1e-14
-    free = ring_full_order(member_of(set_spec(), "ring"), scale=1.0, mounted=False)
+    free = ring_full_order(set_spec().by_file["ring"], set_spec().mounts, scale=1.0, mounted=False)
     assert free.ground == tuple(f"mount{k}" for k in range(6)) and free.rigid.shape[1] == 6
     assert abs(free.stiffness @ free.rigid).max() < 1e-9 * abs(free.stiffness).max()
 
 
 def test_input_nodes_lie_in_the_middle_of_their_flanks():
-    full = ring_full_order(member_of(set_spec(), "ring"), scale=1.0)
+    full = ring_full_order(set_spec().by_file["ring"], set_spec().mounts, scale=1.0)
     points = np.array([i.point for i in full.interfaces])
     radius, angle = np.hypot(points[:, 0], points[:, 1]), np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
     assert np.ptp(radius) < 1e-12 and np.diff(angle) == pytest.approx(2 * np.pi / Z) and np.all(points[:, 2] == 0)

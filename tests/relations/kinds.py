@@ -18,7 +18,6 @@ import numpy as np
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
@@ -229,7 +228,7 @@ def _stage(file: str) -> Stage:
 def bodies_of(file: str) -> dict[str, Any]:
     """Reduced bodies of a stage file by the names of its general form."""
     if file == "internal":
-        return {name: reduced_gear(member, "0" * 64) for name, member in members(_stage(file)).items()}
+        return {gear.name: reduced_gear(gear) for gear in _stage(file).gears}
     spec = load_stage(file)
     return spec.by_name(load_bodies(spec))
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from kinds import HOUSED, KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
 
-from gearfmu.spec.forms.general import CarrierBody
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.supports import SupportSpec
 from gearfmu.stage import assemble

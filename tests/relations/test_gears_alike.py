@@ -12,7 +12,6 @@ from inner import Inner
 from kinds import COARSE, KINDS, assembled
 
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.tables.supports import SupportSpec
 from gearfmu.stage.run.set_te import stage_te
 
@@ -58,7 +57,7 @@ def transmission_error(teeth: int = 24, helix: float = 0.0, held: bool = False) 
     other = stage.model_copy(
         update={"bodies": changed, "rotors": rotors, "supports": tuple(map(support, stage.supports))}
     )
-    bodies = {name: reduced_gear(member, "0" * 64) for name, member in members(other).items()}
+    bodies = {gear.name: reduced_gear(gear) for gear in other.gears}
     return stage_te(assembled(other, bodies), [TORQUE], POSITIONS).te[0]
 
 

@@ -22,7 +22,6 @@ from scipy.optimize import brentq
 
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, Wobble
 from gearfmu.spec.tables.lead import LeadSpec, Misalignment
@@ -184,7 +183,7 @@ def coarse(file: str, gear: str, hand: int) -> Any:
     body = stage.bodies[gear]
     assert isinstance(body, ToothedBody)
     body = body.model_copy(update={"body": COARSE, "helix_angle": hand * body.helix_angle})
-    return reduced_gear(members(stage.model_copy(update={"bodies": {**stage.bodies, gear: body}}))[gear], "0" * 64)
+    return reduced_gear(body)
 
 
 def bodies(kind: Kind, hand: int) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from kinds import COARSE, KINDS, assembled, bodies_of, level_number
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
@@ -126,7 +125,7 @@ def _refined(**finer: Any) -> StageModel:
     body = COARSE.model_copy(update=finer)
     bodies = {name: own.model_copy(update={"body": body}) for name, own in stage.bodies.items()}
     finer_stage = stage.model_copy(update={"bodies": bodies})
-    made = {name: reduced_gear(member, "0" * 64) for name, member in members(finer_stage).items()}
+    made = {gear.name: reduced_gear(gear) for gear in finer_stage.gears}
     return assembled(finer_stage, made)
 
 

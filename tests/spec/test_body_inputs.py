@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from gearfmu.spec.forms.body import body_hash, body_inputs
+from gearfmu.spec.forms.body import body_inputs, expected_hash, hash_of
 from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.stage import load_stage
@@ -39,7 +39,7 @@ def with_field(field: str, value: Any, stage: StageSpec = STAGE) -> StageSpec:
 def fingerprint(form: StageSpec, index: int = 0) -> str:
     names = [gear.name for gear in form.gears]
     ports = dict(zip(names, form.ports.values(), strict=True))
-    return body_hash(body_inputs(expand(form.model_copy(update={"ports": ports})), names[index]))
+    return expected_hash(expand(form.model_copy(update={"ports": ports})), names[index])
 
 
 SHAPING = [
@@ -114,7 +114,7 @@ def test_every_field_of_a_gear_is_in_one_of_the_two_lists() -> None:
 def test_the_hand_of_a_gear_is_part_of_its_body() -> None:
     """Pinion and wheel of one pair are of opposite hand, and turning the pair's hand round changes both bodies."""
     right, left = with_field("pair.helix_angle", 0.2), with_field("pair.helix_angle", -0.2)
-    assert [body_inputs(expand(right), gear.name)["helix_angle"] for gear in right.gears] == [0.2, -0.2]
+    assert [body_inputs(gear)["helix_angle"] for gear in expand(right).gears] == [0.2, -0.2]
     assert all(fingerprint(right, k) != fingerprint(left, k) for k in (0, 1))
 
 
@@ -131,7 +131,7 @@ def test_default_counts_are_those_of_the_shipped_bodies() -> None:
 
 
 def test_hash_is_of_the_values_not_of_their_spelling() -> None:
-    inputs = body_inputs(expand(STAGE), "pinion")
-    assert body_hash(json.loads(json.dumps(inputs))) == body_hash(dict(reversed(inputs.items())))
-    assert body_hash(inputs | {"profile_shift": -0.0}) == body_hash(inputs | {"profile_shift": 0.0})
-    assert body_hash({"a": 0.1}) == "9e3d5635fc1c09ff15c19f1089a0bfe03fbd8329cca722f9a2227060ac77dcaa"  # {"a":0.1}
+    inputs = body_inputs(expand(STAGE).by_file["pinion"])
+    assert hash_of(json.loads(json.dumps(inputs))) == hash_of(dict(reversed(inputs.items())))
+    assert hash_of(inputs | {"profile_shift": -0.0}) == hash_of(inputs | {"profile_shift": 0.0})
+    assert hash_of({"a": 0.1}) == "9e3d5635fc1c09ff15c19f1089a0bfe03fbd8329cca722f9a2227060ac77dcaa"  # {"a":0.1}

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from refused import refused
 
-from gearfmu.body.bodies import expected_hash
 from gearfmu.errors import SpecError
+from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 

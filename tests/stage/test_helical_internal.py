@@ -15,7 +15,6 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
@@ -49,7 +48,7 @@ def stage_at(beta: float) -> Stage:
 
 @lru_cache(maxsize=4)
 def bodies_at(beta: float) -> tuple[Body, ...]:
-    return tuple(reduced_gear(member, "0" * 64) for member in members(stage_at(beta)).values())
+    return tuple(reduced_gear(gear) for gear in stage_at(beta).gears)
 
 
 def model_at(beta: float) -> StageModel:

@@ -20,7 +20,6 @@ from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
 from gearfmu.geometry.planetary import RingMesh
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import members
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
@@ -59,7 +58,7 @@ def mesh(stage: Stage) -> RingMesh:
 
 @pytest.fixture(scope="module")
 def bodies(stage: Stage) -> list[Body]:
-    return [reduced_gear(member, "0" * 64) for member in members(stage).values()]
+    return [reduced_gear(gear) for gear in stage.gears]
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.members import member_of
-from gearfmu.spec.forms.shapes import set_geometry
+from gearfmu.spec.forms.shapes import gear_shape, set_geometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import StageModel, assemble
@@ -121,9 +120,10 @@ def set_bodies(set_spec: Stage) -> list[Any]:
 @pytest.fixture(scope="module")
 def statics(set_spec: Stage) -> Statics:
     """Of the finite elements of the ring."""
-    ring = member_of(set_spec, "ring")
-    mesh = sector_mesh(ring.geometry, ring.gear.face_width, MESH)
-    return static_tables(SectorBody(mesh, ring.gear.material, *tooth_flank(ring.geometry, ring.gear, True)), [])
+    ring = set_spec.by_file["ring"]
+    geometry = gear_shape(ring)
+    mesh = sector_mesh(geometry, ring.face_width, MESH)
+    return static_tables(SectorBody(mesh, ring.material, *tooth_flank(geometry, ring, True)), [])
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ import pytest
 
 from gearfmu import cli
 from gearfmu.body import load_bodies
-from gearfmu.body.bodies import expected_hash
 from gearfmu.errors import BodyError, SpecError
+from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.forms.expand import with_bores
 from gearfmu.spec.stage import load_stage
 

@@ -25,7 +25,6 @@ from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
-from gearfmu.spec.forms.members import carrier_of
 from gearfmu.spec.forms.shapes import set_geometry
 from gearfmu.spec.stage import load_stage
 
@@ -130,7 +129,7 @@ def _ramp(time: float) -> float:
 
 
 def _carrier(spec: Any, meshes: Meshes) -> Solid:
-    carrier = carrier_of(spec)
+    carrier = spec.by_file["carrier"]
     elements, couplings = carrier_elements(carrier, scaled_sector(carrier, meshes.carrier))
     full = full_order("carrier", elements, couplings, Judgement(("bore",), spec.written.set.center_distance))
     return Solid(np.zeros(3), elements, tuple(couplings), full)

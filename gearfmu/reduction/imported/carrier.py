@@ -21,7 +21,8 @@ from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
-from gearfmu.spec.forms.members import CarrierMember
+from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.forms.shapes import carrier_geometry
 
 _OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
 
@@ -34,14 +35,13 @@ class ImportedCarrier:
     facts: dict[str, Any]
 
 
-def imported_carrier(member: CarrierMember) -> ImportedCarrier:
+def imported_carrier(carrier: CarrierBody) -> ImportedCarrier:
     """The imported carrier of a planetary set: interfaces bolt0 … and bore, each coupled as the file says.
 
     Masters lie on the bolts' axes at z = 0 and on the set's axis in the middle of the bore. MeshError lists every node
     set that does not lie where the set has it, and says what is wrong with mesh or matrices.
     """
-    geometry, carrier = member.geometry, member.part
-    source = carrier.imported
+    geometry, source = carrier_geometry(carrier), carrier.imported
     assert source is not None
     mesh = sound_mesh(source)
     with naming(Path(source.file)):

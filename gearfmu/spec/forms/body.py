@@ -1,125 +1,66 @@
-"""What a reduced body depends on, and its fingerprint."""
+"""The hash of a body: of its table and of the files that it names, whatever stage it stands in."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from pathlib import Path
 from typing import Any
 
-from gearfmu.geometry.planetary import HANDS
-from gearfmu.spec.forms.general import GearBody, RingBody, Stage
-from gearfmu.spec.forms.members import Member, member_of
-from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.forms.general import Reduced, Stage
+from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.flanks import TOOTHING
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import import_inputs
 
+ALGORITHMS = {"gear": 3, "ring": 3, "carrier": 3, "housing": 3}  # raised when the numbers of such bodies change
+NOT_OF_BODY = {  # fields that shape no body: names, flanks, what holds it, what of it is dynamic
+    "gear": {"name", "bearing"} | TOOTHING,
+    "ring": {"name", "mounts"} | TOOTHING,
+    "carrier": {"name", "bearing"},
+    "housing": {"name", "dynamic_to"},
+}
 
-def body_inputs(stage: Stage, name: str) -> dict[str, Any]:
-    """Everything that shapes the body `name` of a stage, in SI, and nothing else.
 
-    Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names, torques and
-    bearings do not. The helix angle is the gear's own, positive for a right-handed one. The same gear has the same
-    inputs in a pair and in a general stage.
+def body_inputs(table: Reduced) -> dict[str, Any]:
+    """Everything that shapes a body, in SI: every field of its table but `NOT_OF_BODY`, so that a new field counts.
 
-    The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
-    contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
+    The addendum of a gear's rack is left out: the tip diameter says where the tooth ends. With finite elements made
+    elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
     """
-    if name in {housing.name for housing in stage.housings}:
-        return _housing_inputs(stage, name)
-    if isinstance(stage.written, PlanetarySpec):
-        return _set_inputs(stage.written, name)
-    member = member_of(stage, name)
-    inputs = _ring_inputs(member.gear) if isinstance(member.gear, RingBody) else _gear_inputs(member.gear)
-    return inputs | _imported_inputs(member, inputs["body"], stage.source)
+    inputs = table.model_dump(exclude={*NOT_OF_BODY[table.kind], "imported", "reduced"}, exclude_none=True)
+    if "rack" in inputs:
+        inputs["rack"].pop("addendum")
+    if isinstance(table, CarrierBody):
+        nodes = ("bore", *(f"bolt{k}" for k in range(len(table.bolts))))
+        inputs["coupling"] = {node: table.coupling_of(node) for node in nodes}
+    if table.imported is not None:
+        inputs.get("body", inputs).pop("mesh", None)
+        inputs["import"] = import_inputs(table.imported)
+    if isinstance(table, HousingBody) and table.reduced is not None:
+        inputs["reduced"] = import_inputs(table.reduced)
+    return inputs
 
 
-def _gear_inputs(gear: GearBody) -> dict[str, Any]:
-    inputs: dict[str, Any] = {
-        "kind": "external_pair",
-        "teeth": gear.teeth,
-        "normal_module": gear.normal_module,
-        "pressure_angle": gear.pressure_angle,
-        "helix_angle": gear.helix_angle,
-        "profile_shift": gear.profile_shift,
-        "tip_diameter": gear.tip_diameter,
-        "tip_edge_radius": gear.tip_edge_radius,
-        "face_width": gear.face_width,
-        "bore_diameter": gear.bore_diameter,
-        "rack": {"dedendum": gear.rack.dedendum, "fillet_radius": gear.rack.fillet_radius},
-        "material": gear.material.model_dump(),
-        "modal_damping": gear.modal_damping,
-        "body": gear.body.model_dump(),
-    }
-    return inputs | ({"bore_coupling": gear.bore_coupling} if gear.rigid_bore else {})
+def body_hash(table: Reduced) -> str:
+    """SHA-256 (64 hex digits) of `body_inputs` and the version of the algorithm that makes such bodies."""
+    return hash_of(body_inputs(table) | {"algorithm": ALGORITHMS[table.kind]})
 
 
-def _ring_inputs(ring: RingBody) -> dict[str, Any]:
-    others = {"name", "kind", "mounts", "imported", "rim_coupling"} | TOOTHING
-    inputs = {"kind": "ring"} | ring.model_dump(exclude=others)
-    if not inputs["helix_angle"]:
-        inputs.pop("helix_angle")  # files of spur rings are older than helical ones
-    return inputs | ({"rim_coupling": ring.rim_coupling} if ring.rigid_bore else {})
+def expected_hash(stage: Stage, name: str) -> str:
+    """`body_hash` of the body whose file is `name`. SpecError names the field in the stage file."""
+    table = stage.by_file[name]
+    try:
+        return body_hash(table)
+    except SpecError as error:
+        key = table.table if isinstance(table, HousingBody) else "import"
+        place, file = f"{stage.table_of(name)}.{key}", str(stage.source)
+        found = [Problem(file, f"{place}.{p.field}", p.value, p.remedy) for p in error.problems]
+        raise SpecError(found) from error
 
 
-def _housing_inputs(stage: Stage, name: str) -> dict[str, object]:
-    """Everything that shapes a housing: not its name, nor what of it is dynamic."""
-    housing = next(own for own in stage.housings if own.name == name)
-    tables = housing.model_dump(exclude={"name", "imported", "reduced", "dynamic_to"})
-    own = housing.table
-    return tables | {own: import_inputs(housing.made_of, stage.source, f"bodies.{name}.{own}")}
-
-
-def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
-    """Everything that shapes the body `name` of a set, in SI, and nothing else: not torque, backlash, load sharing,
-    bearings, what is said of the flanks (`flanks.Toothing`), contact, ports, levels.
-
-    An imported body depends on the contents of its files, not on our element counts; SpecError when a file is missing.
-    """
-    s, hand = spec.set, HANDS.get(name, 1)
-    common = {"kind": spec.kind, "body": name}
-    tooth = {
-        "normal_module": s.normal_module,
-        "pressure_angle": s.pressure_angle,
-        "helix_angle": hand * s.helix_angle,
-    }
-    if name == "carrier":
-        place: dict[str, Any] = {
-            "planets": s.planets,
-            "center_distance": s.center_distance,
-            "seat": spec.planet.face_width,
-        }
-        if s.positions is not None:
-            place["positions"] = [k / (spec.sun.teeth + spec.ring.teeth) for k in s.positions]
-        couplings = ["bore", *(f"bolt{k}" for k in range(s.planets))]
-        carrier = spec.carrier.model_dump(exclude={"coupling", "imported", "bearing"})
-        if spec.carrier.imported is not None:
-            carrier.pop("mesh")
-            carrier["import"] = import_inputs(spec.carrier.imported, spec.source, "carrier.import")
-        return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
-    parts: dict[str, SetGearSpec | RingSpec] = dict(zip(HANDS, spec.gears, strict=True))
-    part = parts[name]
-    gear = part.model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
-    if gear.get("mounts"):
-        gear["mounts"] = {key: gear["mounts"][key] for key in ("points", "stiffness")}
-    if name != "ring":
-        gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
-    if part.imported is not None:
-        gear["body"].pop("mesh")
-        gear["import"] = import_inputs(part.imported, spec.source, f"{name}.import")
-    return common | tooth | gear
-
-
-def _imported_inputs(member: Member, body: dict[str, Any], source: Path) -> dict[str, Any]:
-    """What finite elements made elsewhere add; the counts of our own mesh leave `body`."""
-    if member.gear.imported is None:
-        return {}
-    body.pop("mesh")
-    return {"import": import_inputs(member.gear.imported, source, f"{member.place}.import")}
-
-
-def body_hash(inputs: dict[str, Any]) -> str:
-    """SHA-256 (64 hex digits) of the inputs as JSON: sorted keys, floats in their shortest exact form, −0 as 0."""
+def hash_of(inputs: dict[str, Any]) -> str:
+    """SHA-256 (64 hex digits) of inputs as JSON: sorted keys, floats in their shortest exact form, −0 as 0."""
     text = json.dumps(_plain(inputs), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -13,7 +13,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque, ring_half_width
-from gearfmu.spec.forms.shapes import carrier_geometry, mesh_shape, set_geometry
+from gearfmu.spec.forms.shapes import carrier_geometry, mesh_shape, set_carrier, set_geometry
 
 
 def derived(stage: Stage) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
     """What follows from the numbers of a planetary set."""
     g = set_geometry(spec)
     shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
-    carrier = carrier_geometry(spec)
+    carrier = carrier_geometry(set_carrier(spec))
     return {
         "speed_ratio_sun_to_carrier": g.ratio,
         "working_pressure_angle_deg": {

@@ -10,7 +10,6 @@ from typing import Any
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.forms.general import (
-    CarrierBody,
     EngagementSpec,
     Form,
     GearBody,
@@ -22,9 +21,9 @@ from gearfmu.spec.forms.general import (
 )
 from gearfmu.spec.forms.general_checks import with_relief_rolls
 from gearfmu.spec.forms.pair import StageSpec
-from gearfmu.spec.forms.planetary import CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.spec.forms.planetary_checks import mesh_torque
-from gearfmu.spec.forms.shapes import planet_angles
+from gearfmu.spec.forms.shapes import planet_angles, set_carrier
 from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.tables.bearings import Bearing, RollingMount
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
@@ -100,7 +99,7 @@ def expand_pair(spec: StageSpec) -> Stage:
         ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
-    stage._origin = Origin(spec, {g.name: f"gears.{g.name}" for g in spec.gears}, {}, spec.limits)
+    stage._origin = Origin(spec, {g.name: f"gears.{g.name}" for g in spec.gears}, limits=spec.limits)
     return stage
 
 
@@ -123,7 +122,7 @@ def expand_set(spec: PlanetarySpec) -> Stage:
         **_fields(RingSpec, spec.ring) | {"mounts": None}, kind="ring", **_angles(spec.set, HANDS["ring"])
     )
     bodies |= spec.bodies
-    bodies[CARRIER] = CarrierBody(**_fields(CarrierSpec, spec.carrier), name=CARRIER, kind="carrier")
+    bodies[CARRIER] = set_carrier(spec)
     own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
         name=spec.name,
@@ -141,8 +140,9 @@ def expand_set(spec: PlanetarySpec) -> Stage:
         **own,
     )
     stage, shared = with_relief_rolls(stage), dict.fromkeys(planets, "planet")
-    places = {name: name for name in bodies} | shared
-    stage._origin = Origin(spec, places, shared, spec.limits, spec.set.load_sharing, missing)
+    places = {name: name for name in (*bodies, "planet")} | shared
+    mounts, limits = spec.ring.mounts, spec.limits
+    stage._origin = Origin(spec, places, shared, mounts, limits, spec.set.load_sharing, missing)
     return stage
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.spec.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables, refuse
 from gearfmu.spec.tables.bearings import Bearings, LaterFields, OperatingSpec
 from gearfmu.spec.tables.gear import (
@@ -137,12 +137,7 @@ class ShaftBody(Spec):
         return sum(section.length for section in self.sections)
 
 
-class CarrierBody(CarrierSpec):
-    """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
-    planetary_set."""
-
-    name: Name = Field(description="name of the carrier")
-    kind: Literal["carrier"] = Field(description="kind of body")
+Reduced: TypeAlias = ToothedBody | CarrierBody | HousingBody  # bodies that have a file
 
 
 class RotorSpec(Spec):
@@ -196,11 +191,13 @@ class Origin:
     """The file of a pair or of a set, which a stage was expanded from; of a general stage nothing.
 
     form: the file's own tables; places: of bodies, their tables there; files: of bodies that share one reduced body,
-    its name; limits, load_sharing: of the stage as a whole; missing: fields that it needs to move."""
+    its name; mounts: of the ring of a set; limits, load_sharing: of the stage as a whole; missing: fields that it needs
+    to move."""
 
     form: Form | None = None
     places: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
+    mounts: MountsSpec | None = None
     limits: Limits = ()
     load_sharing: float = 1.0
     missing: tuple[Problem, ...] = ()
@@ -272,6 +269,11 @@ class Stage(LaterFields):
         return self._origin.limits
 
     @property
+    def mounts(self) -> MountsSpec | None:
+        """What holds the ring of a planetary set, patch by patch of its rim."""
+        return self._origin.mounts
+
+    @property
     def load_sharing(self) -> float:
         """Torque that every mesh is made for, over its mean at the limit; 1 but for a set."""
         return self._origin.load_sharing
@@ -305,7 +307,16 @@ class Stage(LaterFields):
     @property
     def files(self) -> tuple[str, ...]:
         """Names of the reduced bodies: toothed ones, carriers, the housing. Shafts need no reduction."""
-        return tuple(dict.fromkeys(self.file_of(body.name) for body in self.reduced))
+        return tuple(self.by_file)
+
+    @property
+    def by_file(self) -> dict[str, Reduced]:
+        """The table of every reduced body, under the name of its file: of planets that share one, the first's."""
+        found: dict[str, Reduced] = {}
+        for body in self.reduced:
+            name = self.file_of(body.name)
+            found.setdefault(name, body if body.name == name else body.model_copy(update={"name": name}))
+        return found
 
     def by_name(self, bodies: Sequence[Of]) -> dict[str, Of]:
         """One of `bodies` (or of what stands for them, such as their hashes), in the order of `files`, for every
@@ -314,7 +325,7 @@ class Stage(LaterFields):
         return {body.name: own[self.file_of(body.name)] for body in self.reduced}
 
     @property
-    def reduced(self) -> tuple[ToothedBody | CarrierBody | HousingBody, ...]:
+    def reduced(self) -> tuple[Reduced, ...]:
         """Bodies that have a file: toothed ones, carriers, the housing."""
         return (*self.gears, *self.carriers, *self.housings)
 

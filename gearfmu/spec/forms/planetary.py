@@ -199,6 +199,17 @@ class CarrierSpec(Spec):
         return self.coupling.get(interface, "rigid")
 
 
+class CarrierBody(CarrierSpec):
+    """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
+    planetary_set, with the places of its bolts."""
+
+    name: Name = Field(description="name of the carrier")
+    kind: Literal["carrier"] = Field(description="kind of body")
+    circle: Annotated[float, Quantity("center_distance")] = Field(default=0.0, description="radius of the bolt circle")
+    seat_length: FaceWidth = Field(default=0.0, description="length of the planets' seats")
+    bolts: tuple[float, ...] = Field(default=(), description="places of the bolts, in turns from +x")
+
+
 class PlanetarySpec(LaterFields):
     """A planetary set as its file gives it; SI floats. `source` is that file."""
 

@@ -31,7 +31,14 @@ from gearfmu.spec.forms.pair_checks import (
     rounded_up,
 )
 from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.forms.shapes import carrier_geometry, gear_geometry, planet_angles, ring_geometry, set_geometries
+from gearfmu.spec.forms.shapes import (
+    carrier_geometry,
+    gear_geometry,
+    planet_angles,
+    ring_geometry,
+    set_carrier,
+    set_geometries,
+)
 from gearfmu.spec.tables.gear import PairSpec
 
 _THINNEST_RIM = 0.5  # of the tooth height: thinner rims are outside the rim thickness factor of ISO 6336-3
@@ -249,7 +256,7 @@ def _mounts(spec: PlanetarySpec) -> Found:
 
 
 def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
-    g, carrier = carrier_geometry(spec), spec.carrier
+    g, carrier = carrier_geometry(set_carrier(spec)), spec.carrier
     if 2 * g.r_bolt >= spec.planet.bore_diameter:
         largest = millimetres(spec.planet.bore_diameter)
         yield "carrier.bolt_diameter", carrier.bolt_diameter, f"does not fit the planet's bore: less than {largest}"

@@ -13,7 +13,7 @@ from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import HANDS, PlanetaryGeometry, RingMesh
 from gearfmu.spec.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
-from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.spec.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 
 GearShape = GearGeometry | InternalGearGeometry
@@ -71,13 +71,23 @@ def planet_angles(spec: PlanetarySpec) -> tuple[float, ...]:
     return tuple(2 * math.pi * place / (spec.sun.teeth + spec.ring.teeth) for place in spec.set.positions)
 
 
-def carrier_geometry(spec: PlanetarySpec) -> CarrierGeometry:
-    """The carrier of a set."""
-    carrier = spec.carrier
+def set_carrier(spec: PlanetarySpec) -> CarrierBody:
+    """The carrier of a set with the places of its bolts, as fractions of a turn: equal on every machine, as cosines are
+    not."""
+    steps, count = spec.set.positions, spec.sun.teeth + spec.ring.teeth
+    if steps is None:
+        steps, count = tuple(range(spec.set.planets)), spec.set.planets
+    own = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
+    bolts, circle, seat = tuple(step / count for step in steps), spec.set.center_distance, spec.planet.face_width
+    return CarrierBody(**own, circle=circle, seat_length=seat, bolts=bolts, name="carrier", kind="carrier")
+
+
+def carrier_geometry(carrier: CarrierBody) -> CarrierGeometry:
+    """The geometry of a carrier."""
     return CarrierGeometry(
-        angles=planet_angles(spec), a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
+        angles=tuple(2 * math.pi * bolt for bolt in carrier.bolts), a=carrier.circle, r_bore=carrier.bore_diameter / 2,
         r_o=carrier.outer_diameter / 2, r_bolt=carrier.bolt_diameter / 2, thickness=carrier.thickness,
-        gap=carrier.gap, seat=spec.planet.face_width,
+        gap=carrier.gap, seat=carrier.seat_length,
     )  # fmt: skip
 
 

@@ -135,13 +135,12 @@ def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {place: section for place, section in found.items() if isinstance(section, dict)}
 
 
-def import_inputs(spec: SourceSpec, source: Path, section: str) -> dict[str, Any]:
-    """What the import contributes to the body's fingerprint: its fields, with the SHA-256 of each file for its name.
+def import_inputs(spec: SourceSpec) -> dict[str, Any]:
+    """What the import contributes to the hash of a body: its fields, with the SHA-256 of each file for its name.
 
-    spec : its files as they can be opened (`located`). source, section ("gears.pinion.import") : for the message.
-    SpecError for every file that is not there.
+    spec : its files as they can be opened (`located`). SpecError for every file that is not there, by its field alone.
     """
-    values, problems = spec.model_dump(), []
+    values, problems = spec.model_dump(exclude_none=True), []
     for field in FILES:
         if not getattr(spec, field, ""):
             continue
@@ -149,9 +148,8 @@ def import_inputs(spec: SourceSpec, source: Path, section: str) -> dict[str, Any
         try:
             values[field] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
-            place = f"{section}.{field}"
             remedy = f"{path} cannot be read ({error.strerror}): write the path relative to the stage file"
-            problems.append(Problem(str(source), place, path.name, remedy))
+            problems.append(Problem("", field, path.name, remedy))
     if problems:
         raise SpecError(problems)
     return values
