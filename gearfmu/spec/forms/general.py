@@ -6,7 +6,7 @@ beginning.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
@@ -280,21 +280,11 @@ class Stage(LaterFields):
 
     def require_motion(self) -> None:
         """SpecError with everything that a set needs to move and does not say, and for a housing that nothing holds."""
-        if problems := [*self._origin.missing, *self._free_housings()]:
+        held, file = {support.body for support in self.supports}, str(self.source)
+        free = [own for own in self.housings if own.name not in held]
+        loose = [Problem(file, f"bodies.{own.name}", "no feet", own.hanging) for own in free]
+        if problems := [*self._origin.missing, *loose]:
             raise SpecError(problems)
-
-    def _free_housings(self) -> Iterator[Problem]:
-        """A load leaves its reaction torque on a housing: without feet it has no equilibrium."""
-        held = {support.body for support in self.supports}
-        for own in self.housings:
-            feet = ", ".join(own.made_of.feet) or f"none in its {own.table}: name them in feet = {{…}}"
-            remedy = (
-                "under load it has no equilibrium, shafts leave their reaction torque on it: write [[supports]] with "
-                f'body = "{own.name}" and node one of its feet ({feet}), soft ones where it hangs, radial = "1e6 N/m"; '
-                "or put it freely under a finished run with `gearfmu house`"
-            )
-            if own.name not in held:
-                yield Problem(str(self.source), f"bodies.{own.name}", "no feet", remedy)
 
     def file_of(self, body: str) -> str:
         """Name of the reduced body of a toothed body or carrier: planets of a set share one."""

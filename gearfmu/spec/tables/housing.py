@@ -132,3 +132,13 @@ class HousingBody(LaterFields):
     def table(self) -> str:
         """Name of that table in the stage file."""
         return "import" if self.imported is not None else "reduced"
+
+    @property
+    def hanging(self) -> str:
+        """What to do about a housing that nothing holds."""
+        feet = ", ".join(self.made_of.feet) or f"none in its {self.table}: name them in feet = {{…}}"
+        return (
+            "under load it has no equilibrium, shafts leave their reaction torque on it: write [[supports]] with "
+            f'body = "{self.name}" and node one of its feet ({feet}), soft ones where it hangs, radial = "1e6 N/m"; '
+            "or put it freely under a finished run with `gearfmu house`"
+        )
