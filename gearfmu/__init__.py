@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
-    from gearfmu.api.sound import house, sound_power
+    from gearfmu.api.sound import house, sound_power, transfer_paths
     from gearfmu.api.stages import bearings, effects, efficiency, new
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
@@ -71,6 +71,7 @@ __all__ = [
     "sound_power",
     "sweep",
     "te",
+    "transfer_paths",
     "validate",
     "wound_up",
     "write_report",
@@ -82,7 +83,7 @@ _HOMES = {
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.settings": ("Settings",),
-    "api.sound": ("house", "sound_power"),
+    "api.sound": ("house", "sound_power", "transfer_paths"),
     "api.stages": ("bearings", "effects", "efficiency", "new"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),

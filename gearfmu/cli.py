@@ -52,6 +52,7 @@ VERBS = {
     "simulate": ("gearfmu.commands.runs:simulate", "Run a stage alone, without FMU and drivetrain."),
     "house": ("gearfmu.commands.sound:house", "Put a housing under a finished run: sensors, mounts."),
     "sound": ("gearfmu.commands.sound:sound", "Sound power of a housing: third octaves, dB, dB(A)."),
+    "paths": ("gearfmu.commands.sound:paths", "Share of every bearing direction at a sensor of a housing."),
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "compare": ("gearfmu.commands.runs:compare", "Compare two or more traces in one page."),
     "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),

@@ -1,22 +1,26 @@
-"""A housing under a finished run, and the sound power of a housing's skin."""
+"""A housing under a finished run, transfer paths to its sensors, and the sound power of its skin."""
 
 from __future__ import annotations
 
 import math
 import os
+from pathlib import Path
 
 import numpy as np
 
-from gearfmu.api.models import PathLike, assemble, load, reduce
+from gearfmu.api.models import PathLike, assemble, changed_folder, load, reduce
 from gearfmu.api.results import stage_and_bodies, trace_file
 from gearfmu.api.settings import Quantity, checked
+from gearfmu.body import Body, body_path
+from gearfmu.body.sound import kept_radiation, make_radiation, sound_path
 from gearfmu.modes.housed import Housed, housed
 from gearfmu.modes.housing import Placed, placed_housing
+from gearfmu.modes.paths import TransferPaths, paths_of
 from gearfmu.modes.rings import stage_rings
-from gearfmu.sound import SoundError, SoundPower
+from gearfmu.sound import Radiation, SoundError, SoundPower
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.observed import MODE, MOTION
-from gearfmu.stage.run.sound import MOTIONS, Sounding, radiated_power
+from gearfmu.stage.run.sound import MOTIONS, Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Channel, Trace
 
 HIGHEST = 10e3  # Hz, of the housing's motion; less where the run's step does not resolve it
@@ -53,7 +57,7 @@ def sound_power(
     trace: Trace | PathLike,
     housing: PathLike | Stage | None = None,
     matrix: PathLike | None = None,
-    patches: int = 1000,
+    patches: int | None = None,
     speed: str | None = None,
     start: Quantity = 0.0,
 ) -> SoundPower:
@@ -61,17 +65,46 @@ def sound_power(
     power (ERP). `total()`, `total_a()`, `third_octaves()` give levels and bands.
 
     trace : a run of a housed stage, or a trace of `house`. housing : its stage, that which the trace names when None.
-    matrix : file of the radiation matrix, made when it is not there and kept, and made anew for another housing.
-    patches : of the boundary elements; their edge is to be a sixth of a wave's length, above that power is ERP.
+    matrix : file of the radiation matrix; when None that beside the body, which the reduction makes. Made anew and kept
+    where it is missing, of another housing or of other patches.
+    patches : boundary elements, 1000 when made; where their edge is over a sixth of a wave's length, power is ERP.
     speed : name of a channel for a waterfall, as "input.gear.w": one spectrum a segment; their mean when None.
     start : time from which sound counts; what the housing did before it is known still.
 
     Raises SoundError for a stage without a skin and a record without equal steps.
     """
     run = _trace(trace)
+    stage, bodies = _housed(run, housing)
+    sound = _radiation(stage, housing_body(stage, bodies), matrix, patches)
+    return radiated_power(run, stage, bodies, sound, Heard(speed, checked("start", start, "time")))
+
+
+def transfer_paths(
+    trace: Trace | PathLike, sensor: str, housing: PathLike | Stage | None = None, start: Quantity = 0.0
+) -> TransferPaths:
+    """What every direction of a bearing contributes to the acceleration of a sensor: `share()`, `rms()`, of a third
+    octave or of all; the shares of a third octave sum to 1.
+
+    trace, housing : as in `sound_power`. sensor : a direction of a sensor, "top.ay". start : time from which it counts.
+
+    Raises SoundError for an unknown sensor and a record without equal steps.
+    """
+    run = _trace(trace)
+    return paths_of(run, *_housed(run, housing), sensor, checked("start", start, "time"))
+
+
+def _housed(run: Trace, housing: PathLike | Stage | None) -> tuple[Stage, list[Body]]:
+    """The stage of a housing, that which the trace names when None, and its bodies."""
     stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing or stage_and_bodies(run.meta)[0]
-    how = Sounding(matrix, patches, speed, checked("start", start, "time"))
-    return radiated_power(run, stage, reduce(stage), how)
+    return stage, reduce(stage)
+
+
+def _radiation(stage: Stage, body: Body, matrix: PathLike | None, patches: int | None) -> Radiation:
+    """The radiation matrix of a housing, made and kept where there is none of so many patches."""
+    own = sound_path(body_path(stage, body.name, changed_folder(stage)))
+    path = own if matrix is None else Path(matrix)
+    found = kept_radiation(body, path, patches)
+    return found or make_radiation(body, path if os.access(path.parent, os.W_OK) else None, patches)
 
 
 def _trace(trace: Trace | PathLike) -> Trace:

@@ -13,6 +13,7 @@ from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
 from gearfmu.body.housing import reduced_housing
 from gearfmu.body.layout import FORMAT_VERSION
+from gearfmu.body.sound import make_radiation, sound_path
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.body.whole import reduced_carrier
@@ -96,8 +97,14 @@ def reduce_apart(
 
 
 def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = None) -> None:
-    """Reduce one body and store it at `path`. Raises MeshError and BodyError."""
-    save_body(reduce_body(stage, name, progress), path)
+    """Reduce one body and store it at `path`, the radiation matrix of its skin beside it. Raises MeshError, BodyError
+    and SoundError."""
+    body = reduce_body(stage, name, progress)
+    save_body(body, path)
+    if body.skin is not None:
+        if progress is not None:
+            progress(f"{name}: radiation matrix of the skin", 0.9)
+        make_radiation(body, sound_path(path))
 
 
 def reduce_body(stage: Stage, name: str, progress: Progress | None = None) -> Body:

@@ -1,9 +1,9 @@
-"""Verbs of housings and sound: house, sound."""
+"""Verbs of housings and sound: house, paths, sound."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -38,24 +38,57 @@ def house(run: Path, housing: str, out: Path | None, torque: float | None) -> No
 @click.command()
 @click.argument("run", type=click.Path(exists=True, path_type=Path))
 @click.option("--housing", help="STAGE of the housing; that of the run when not given.")
-@click.option("--matrix", type=FILE, help="File of the radiation matrix: made where it is missing, and kept.")
-@click.option("--patches", type=click.IntRange(50, 6000), default=1000, show_default=True, help="Boundary elements.")
+@click.option(
+    "--matrix", type=FILE, help="File of the radiation matrix; that beside the housing's body when not given."
+)
+@click.option("--patches", type=click.IntRange(50, 6000), help="Boundary elements; those of the matrix when not given.")
+@click.option("--start", type=Quantity("time"), default=0.0, help="Time from which sound counts.")
 @click.option("--erp", is_flag=True, help="Print equivalent radiated power beside the sound power.")
 @click.option("--speed", help="Channel of a waterfall, input.gear.w: one row a segment of time in the CSV file.")
 @click.option("--csv", "table", type=FILE, help="Write third octaves as CSV file.")
-def sound(run: Path, housing: str | None, matrix: Path | None, patches: int, erp: bool, **how: object) -> None:
+def sound(run: Path, housing: str | None, patches: int | None, erp: bool, start: float, **how: Any) -> None:
     """Sound power that the housing of RUN radiates into free air: third octaves (IEC 61260), level in dB and dB(A) re
     1 pW. RUN is the trace or folder of a housed run, or a trace of `gearfmu house`."""
     from gearfmu.api.sound import sound_power
 
-    speed, table = how["speed"], how["table"]
-    found = sound_power(run, housing, matrix, patches, None if speed is None else str(speed))
+    found = sound_power(run, housing, how["matrix"], patches, how["speed"], start)
     for line in _lines(found, erp):
         click.echo(line)
-    if isinstance(table, Path):
+    _write(how["table"], _columns(found))
+
+
+@click.command()
+@click.argument("run", type=click.Path(exists=True, path_type=Path))
+@click.argument("sensor")
+@click.option("--housing", help="STAGE of the housing; that of the run when not given.")
+@click.option(
+    "--band", type=Quantity("frequency"), help="Nominal frequency of a third octave; all of them when not given."
+)
+@click.option("--start", type=Quantity("time"), default=0.0, help="Time from which the run counts.")
+@click.option("--csv", "table", type=FILE, help="Write every path in third octaves as CSV file.")
+def paths(run: Path, sensor: str, housing: str | None, band: float | None, **how: Any) -> None:
+    """Transfer paths: share of every bearing direction in the acceleration of SENSOR (top.ay). RUN is the trace or
+    folder of a housed run, or a trace of `gearfmu house`. Shares sum to 100 %; one below 0 makes the sensor quieter."""
+    from gearfmu.api.sound import transfer_paths
+    from gearfmu.report.metrics import level
+
+    found = transfer_paths(run, sensor, housing, how["start"])
+    share, rms = found.share(band), found.rms(band)
+    counted = "63 Hz to 8 kHz" if band is None else f"third octave {band:g} Hz"
+    click.echo(f"{f'{found.sensor}, {counted}':32}    share    alone")
+    for i in np.argsort(-np.abs(share)):
+        click.echo(f"{found.names[i]:32} {100 * share[i]:8.1f} %  {rms[i]:.3g} m/s2 rms")
+    alone, joint = found.octaves()
+    columns = {"third_octave_[Hz]": found.bands, "together_[dB]": level(np.sqrt(joint.sum(axis=0)), 1e-6)}
+    _write(how["table"], columns | {f"{n}_[dB]": level(np.sqrt(alone[i]), 1e-6) for i, n in enumerate(found.names)})
+
+
+def _write(table: Path | None, columns: dict[str, np.ndarray]) -> None:
+    """Columns as CSV file, where one is wanted."""
+    if table is not None:
         from gearfmu.stage.run.trace import write_columns
 
-        write_columns(table, _columns(found))
+        write_columns(table, columns)
         click.echo(f"wrote {table}")
 
 

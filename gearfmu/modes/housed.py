@@ -11,7 +11,6 @@ AIAA J. 46 (2008) 1169 (substructuring by frequency response; blocked forces).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,7 +140,8 @@ def _faded(values: np.ndarray) -> np.ndarray:
     return values * window[:, None]
 
 
-def paths(housing: Housing, omega: float, force: Sequence[complex] | np.ndarray, sensor: int) -> np.ndarray:
-    """(s,): acceleration at one sensor row by each seat direction under its force (s,) at ω; their complex sum is that
-    of the sensor."""
-    return -(omega**2) * housing.answers(np.array([omega])).sensors[0, sensor] * np.asarray(force)
+def paths(housing: Housing, omega: np.ndarray, force: np.ndarray, sensor: int) -> np.ndarray:
+    """(…, L, s): acceleration at one sensor row by each seat direction under its force (…, L, s) at ω (L,) > 0 rad/s;
+    their complex sum is that of the sensor."""
+    found = [housing.answers(omega[begin : begin + CHUNK]).sensors[:, sensor] for begin in range(0, len(omega), CHUNK)]
+    return -(omega[:, None] ** 2) * np.concatenate(found) * force

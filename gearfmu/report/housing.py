@@ -1,27 +1,34 @@
-"""The chapter of a housing: accelerations of its sensors, forces of its mounts, sound power of its skin."""
+"""The chapter of a housing: accelerations of its sensors and paths to them, forces of its mounts, its sound power."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
+from gearfmu.body import Body, body_path
+from gearfmu.body.sound import body_skin, kept_radiation, sound_path
 from gearfmu.errors import GearfmuError
+from gearfmu.modes.paths import paths_of
 from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, level_limits, over_time
 from gearfmu.report.metrics import MetricsError, level, sample_step, undo_mean
-from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR
+from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, heat_of
 from gearfmu.report.run import Run
-from gearfmu.report.signals import Window
-from gearfmu.sound import SoundError, SoundPower, midbands, nominal, segments, third_octaves
+from gearfmu.report.runup import RunUp
+from gearfmu.report.signals import GEAR_SPEED, Window
+from gearfmu.sound import SoundError, SoundPower, midbands, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
-from gearfmu.stage.run.sound import Sounding, radiated_power
+from gearfmu.spec.forms.general import Stage
+from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Trace
 
 NAME = "housing"  # what the names of its figures begin with
 MOUNT = "mount."
-PATCHES = 300  # boundary elements of the sound power: seconds
+PATCHES = 300  # boundary elements where none are stored: seconds
+POWER = "dB re 1 pW"
+SHOWN_DB = 60
 BANDS = (63.0, 8000.0)  # Hz, nominal first and last third octave
 
 
@@ -35,7 +42,8 @@ def figures(run: Run) -> list[Callable[[], Plot | None]]:
         found.append(partial(plots_nvh.spectra, trace, window, run.angles, names, ACCELERATIONS))
         loud = plots_nvh.loudest_sensors(trace)
         found += [partial(plots_nvh.cuts, trace, own, loud, ACCELERATIONS) for own in run.angles.items()]
-    return [*found, partial(mounts, trace), partial(sound, run)]
+    sounding = partial(sound, run) if run.run_up is None else partial(sound_over_speed, run.run_up, run)
+    return [*found, partial(transfer_paths, run), partial(mounts, trace), sounding]
 
 
 def sensors(trace: Trace) -> list[str]:
@@ -80,29 +88,97 @@ def mounts(trace: Trace) -> Plot | None:
 
 def sound(run: Run) -> Plot:
     """Sound power and equivalent radiated power in third octaves; MetricsError says why there is none."""
-    if run.stage is None or run.bodies is None:
-        raise MetricsError("Sound power of the housing: the stage's bodies are not at hand.")
-    try:
-        found = radiated_power(run.trace, run.stage, run.bodies, Sounding(patches=PATCHES, start=run.window.start))
-    except GearfmuError as error:
-        raise MetricsError(f"Sound power of the housing: {error}") from error
+    found, patches = _radiated(run, Heard(start=run.window.start))
     levels = {"sound power": power_level(found.third_octaves()[0])}
     levels["ERP"] = power_level(found.third_octaves(erp=True)[0])
-    panel = _bars(levels, found.bands, "dB re 1 pW", "dB re 1 pW")
+    panel = _bars(levels, found.bands, POWER, POWER)
     columns = {"third_octave_[Hz]": found.bands}
-    columns |= {f"{name.replace(' ', '_').lower()}_[dB re 1 pW]": own for name, own in levels.items()}
+    columns |= {f"{name.replace(' ', '_').lower()}_[{POWER}]": own for name, own in levels.items()}
     chart = Chart((panel,), "third octave in Hz", f"{NAME}_sound")
-    return Plot(f"{NAME}_sound", "Sound power of the housing", _totals(found, run.window), chart, columns)
-
-
-def _totals(found: SoundPower, window: Window) -> str:
-    """Levels in words."""
     (power, power_a), (erp, erp_a) = ((float(found.total(o)[0]), float(found.total_a(o)[0])) for o in (False, True))
-    return (
-        f"Sound power level {power:.1f} dB, {power_a:.1f} dB(A) re 1 pW; equivalent radiated power (ERP) {erp:.1f} dB, "
-        f"{erp_a:.1f} dB(A). Into free air, from {window.start:.3f} s on, by {PATCHES} boundary elements at most; "
-        "gearfmu sound takes more."
+    caption = f"Sound power level {power:.1f} dB, {power_a:.1f} dB(A) re 1 pW; equivalent radiated power (ERP) "
+    caption += f"{erp:.1f} dB, {erp_a:.1f} dB(A). Into free air, from {run.window.start:.3f} s on, by {patches} "
+    caption += "boundary elements."
+    return Plot(f"{NAME}_sound", "Sound power of the housing", caption, chart, columns)
+
+
+def sound_over_speed(up: RunUp, run: Run) -> Plot:
+    """Waterfall of a run-up: level over speed, and lines over frequency and speed; MetricsError says why not."""
+    found, patches = _radiated(run, Heard(f"{up.shaft}{GEAR_SPEED}", run.window.start))
+    assert found.speed is not None, "of a waterfall"
+    speed = np.abs(found.speed) * plots.RPM
+    levels = {"sound power": found.total(), "sound power, A-weighted": found.total_a(), "ERP": found.total(erp=True)}
+    curves = tuple(Curve(speed, own, name, POWER) for name, own in levels.items())
+    kept = (found.frequency > 0) & (found.frequency <= BANDS[1])
+    lines = power_level(found.power[:, kept]).T
+    top = 5 * np.ceil(lines.max() / 5)
+    heat = heat_of(speed, found.frequency[kept] / 1e3, lines, (top - SHOWN_DB, top), f"{POWER} a line")
+    panels = (
+        Panel(POWER, curves, limits=level_limits(curves)),
+        Panel("frequency in kHz", heat=heat, height=300, limits=(0.0, BANDS[1] / 1e3)),
     )
+    caption = f"Sound power into free air by {patches} boundary elements, {speed.size} spectra of lines "
+    caption += f"{found.frequency[1]:.3g} Hz apart. Loudest at {speed[levels['sound power'].argmax()]:.0f} rpm: "
+    caption += f"{levels['sound power'].max():.1f} dB, {found.total_a().max():.1f} dB(A) at most."
+    columns = {f"speed_of_the_{up.shaft}_[rpm]": speed}
+    columns |= {f"{name.replace(', ', '_').replace(' ', '_')}_[{POWER}]": own for name, own in levels.items()}
+    columns |= {f"{f:.0f}_Hz_[{POWER}]": own for f, own in zip(found.frequency[kept], lines, strict=True)}
+    chart = Chart(panels, f"speed of the {up.shaft} in rpm", "speed", x_limits=(float(speed.min()), float(speed.max())))
+    return Plot(f"{NAME}_waterfall", "Sound power over the speed", caption, chart, columns)
+
+
+def transfer_paths(run: Run) -> Plot:
+    """Share of every bearing direction at the loudest sensor, in its loudest third octave and in all."""
+    stage, bodies = _at_hand(run, "Transfer paths")
+    loudest = max(plots_nvh.loudest_sensors(run.trace), key=lambda name: float(np.std(run.trace[name])))
+    try:
+        found = paths_of(run.trace, stage, bodies, loudest, run.window.start)
+    except GearfmuError as error:
+        raise MetricsError(f"Transfer paths of the housing: {error}") from error
+    alone, joint = found.octaves()
+    band = float(nominal(found.bands[[joint.sum(axis=0).argmax()]])[0])
+    shares = {"all third octaves": 100 * found.share(), f"third octave {band:g} Hz": 100 * found.share(band)}
+    caption = (
+        f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one below 0 "
+    )
+    caption += "makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
+    columns = {"third_octave_[Hz]": found.bands} | {
+        f"{name}_[{ACCELERATIONS.label}]": level(np.sqrt(own), ACCELERATIONS.reference)
+        for name, own in zip(found.names, alone, strict=True)
+    }
+    panels = tuple(_by_bearing(f"{words}: share in %", found.names, own) for words, own in shares.items())
+    chart = Chart(panels, "bearing", f"{NAME}_paths")
+    return Plot(f"{NAME}_paths", f"Transfer paths to {found.sensor.removeprefix(SENSOR)}", caption, chart, columns)
+
+
+def _by_bearing(label: str, names: Sequence[str], shares: np.ndarray) -> Panel:
+    """Shares in % of bearing.NAME.fx …: bearings along the axis, a bar for each of their directions."""
+    parts = [name.removeprefix("bearing.").split(".") for name in names]
+    bearings, directions = (list(dict.fromkeys(part[k] for part in parts)) for k in (0, 1))
+    table = np.zeros((len(directions), len(bearings)))
+    for (bearing, direction), share in zip(parts, shares, strict=True):
+        table[directions.index(direction), bearings.index(bearing)] = share
+    at = np.arange(len(bearings), dtype=float)
+    curves = (Curve(at, row, name, "%", "bars") for name, row in zip(directions, table, strict=True))
+    return Panel(label, tuple(curves), ticks=tuple(bearings))
+
+
+def _at_hand(run: Run, what: str) -> tuple[Stage, Sequence[Body]]:
+    if run.stage is None or run.bodies is None:
+        raise MetricsError(f"{what} of the housing: the stage's bodies are not at hand.")
+    return run.stage, run.bodies
+
+
+def _radiated(run: Run, heard: Heard) -> tuple[SoundPower, int]:
+    """Sound power by the matrix beside the body, and its boundary elements; by fewer where there is none."""
+    stage, bodies = _at_hand(run, "Sound power")
+    try:
+        body = housing_body(stage, bodies)
+        sound = kept_radiation(body, sound_path(body_path(stage, body.name)))
+        sound = sound or radiation(body_skin(body), count=PATCHES)
+        return radiated_power(run.trace, stage, bodies, sound, heard), sound.patches
+    except GearfmuError as error:
+        raise MetricsError(f"Sound power of the housing: {error}") from error
 
 
 def _bars(levels: dict[str, np.ndarray], bands: np.ndarray, label: str, unit: str) -> Panel:

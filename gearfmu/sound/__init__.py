@@ -2,11 +2,12 @@
 
 from gearfmu.sound.boundary import memory_needed
 from gearfmu.sound.levels import a_weighting, level, midbands, nominal, third_octaves, weighted
-from gearfmu.sound.power import Segments, SoundPower, power_of, radiated, segments
+from gearfmu.sound.power import WIDTH, Segments, SoundPower, power_of, radiated, segments
 from gearfmu.sound.radiation import Air, Radiation, radiation
 from gearfmu.sound.skin import Skin, SoundError, envelope, refined, skin_of
 
 __all__ = [
+    "WIDTH",
     "Air",
     "Radiation",
     "Segments",

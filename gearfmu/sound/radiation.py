@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class Radiation:
     """frequency (L,) Hz, ascending; resistance (L, N, N) N·s/m, symmetric, not negative; gram (N, N) m²: integral of
     products of normal displacements over the skin, so ρc · gram is the resistance of equivalent radiated power (ERP);
     impedance ρc; reach Hz: lines above it are ERP; balance (L,) dB: power that leaves the skin over that of the far
-    field, mean over coordinates: how well the mesh solves the line, 0 above the reach."""
+    field, mean over coordinates: how well the mesh solves the line, 0 above the reach; patches: asked for."""
 
     frequency: np.ndarray
     resistance: np.ndarray
@@ -41,6 +41,12 @@ class Radiation:
     impedance: float
     reach: float
     balance: np.ndarray
+    patches: int = COUNT
+
+    def of(self, count: int) -> Radiation:
+        """That of the first `count` coordinates alone."""
+        own = self.resistance[:, :count, :count], self.gram[:count, :count]
+        return replace(self, resistance=own[0], gram=own[1])
 
 
 def radiation(
@@ -65,7 +71,8 @@ def radiation(
         own, decibel = (gram, 0.0) if line > reach else _at(surface, 2 * np.pi * line / air.speed, gram)
         found.append(air.impedance * own)
         balance.append(decibel)
-    return Radiation(lines, np.array(found, dtype=np.float32), gram, air.impedance, reach, np.array(balance))
+    resistance = np.array(found, dtype=np.float32)
+    return Radiation(lines, resistance, gram, air.impedance, reach, np.array(balance), count)
 
 
 def _at(surface: Surface, k: float, gram: np.ndarray) -> tuple[np.ndarray, float]:

@@ -74,15 +74,15 @@ def skin_of(points: np.ndarray, faces: Sequence[Sequence[int]] | np.ndarray, sha
     return skin
 
 
-def envelope(points: np.ndarray, shapes: np.ndarray) -> Skin:
-    """The convex envelope of points (P, 3) of a body, where no skin is named; shapes (P, 3, N) as of `skin_of`."""
+def envelope(points: np.ndarray, edge: float) -> Skin:
+    """The convex envelope of points (P, 3) m in triangles of edges up to `edge` (m), without shapes."""
     hull = ConvexHull(points)
     triangles = hull.simplices.copy()
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     inward = np.einsum("tk,tk->t", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
     kept, numbers = np.unique(triangles, return_inverse=True)
-    return skin_of(points[kept], numbers.reshape(triangles.shape), shapes[kept])
+    return refined(skin_of(points[kept], numbers.reshape(triangles.shape), np.zeros((len(kept), 3, 0))), edge)
 
 
 def refined(skin: Skin, edge: float) -> Skin:

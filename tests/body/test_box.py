@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import scipy.sparse as sp
 from blocks import STEEL, box
 from small_body import averaging
 
-from gearfmu.body import Body, load_body
+from gearfmu.body import Body, bodies, load_body, sound
 from gearfmu.body.body import How
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import save_body
@@ -158,3 +159,19 @@ def test_the_ground_group_takes_it_like_a_carrier(body: Body) -> None:
     assert np.abs((whole - body.static) / np.outer(scale, scale)).max() < 2e-7
     assert np.linalg.eigvalsh(part.residual / np.outer(scale, scale)).min() > -1e-6
     assert np.array_equal(np.vstack([node.rigid_rows for node in part.nodes]), body.rigid_rows)
+
+
+def test_the_reduction_keeps_its_radiation_matrix_beside_it(body: Body, tmp_path: Path, monkeypatch: Any) -> None:
+    """In steps of 2⁻¹⁵ of √(Rᵢᵢ Rⱼⱼ): power of drawn velocities within .03 dB; none of others."""
+    monkeypatch.setattr(bodies, "reduce_body", lambda *_: body)
+    monkeypatch.setattr(sound, "PATCHES", 80)
+    bodies.make_body(None, "box", tmp_path / "box.h5")
+    path = sound.sound_path(tmp_path / "box.h5")
+    found, made = sound.kept_radiation(body, path), sound.make_radiation(body, None)
+    assert found is not None and 0 < (made.frequency <= made.reach).sum() < len(made.frequency)
+    assert (found.reach, found.impedance, found.patches) == (made.reach, made.impedance, 80)
+    velocity = np.random.default_rng(2).normal(size=(20, made.gram.shape[0]))
+    power = [np.einsum("ti,lij,tj->lt", velocity, own.resistance.astype(float), velocity) for own in (found, made)]
+    assert np.abs(10 * np.log10(power[0] / power[1])).max() < 0.03
+    assert sound.kept_radiation(body, path, 80) is not None and sound.kept_radiation(body, path, 81) is None
+    assert sound.kept_radiation(replace(body, how=How("2" * 64, "krylov")), path) is None

@@ -9,6 +9,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body import body_path, load_bodies, reduce_bodies
+from gearfmu.body.sound import kept_radiation, sound_path
 from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.reading.library import library_roots, shipped_stages
 from gearfmu.spec.stage import load_stage
@@ -25,6 +26,7 @@ def test_no_shipped_body_is_stale_large_or_incomplete(stage):
         assert body_path(spec, body.name).stat().st_size <= LARGEST
         if body.skin is not None:
             assert body.error.max_error < 0.1 and body.error.trusted_to > 6e3 and body.sensors is not None
+            assert kept_radiation(body, sound_path(body_path(spec, body.name))).reach > 1.6e3
             continue
         assert body.error.max_error < 0.01 or spec.written is spec  # those of a train say how far they reach
         assert body.flank.knows_profile and body.spin is not None

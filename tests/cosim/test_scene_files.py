@@ -20,6 +20,7 @@ def test_shipped_scenes():
         "pair_loaded",
         "pair_runup",
         "train_runup",
+        "train_runup_housed",
     ]
     sets = {name: "planetary54" for name in ("planetary_backfire", "planetary_paper", "planetary_closure")}
     sets |= {"planetary_runup": "planetary54/stage_pin_error", "planetary_shift": "planetary54/stage_ring_port"}

@@ -80,7 +80,7 @@ def test_blocked_forces_give_what_the_whole_matrices_give(seed: int) -> None:
         assert np.abs(answers.coordinates[0] @ found - moved[n:]).max() < 1e-8 * np.abs(moved[n:]).max()
         force = (housing.foot + 1j * w * housing.foot_loss) * (housing.feet @ moved[n:])
         assert np.abs(answers.mounts[0] @ found - force).max() < 1e-8 * np.abs(force).max()
-        shares = paths(housing, float(w), found, 1)
+        shares = paths(housing, np.array([w]), found[None], 1)
         assert shares.sum() == pytest.approx(-(w**2) * housing.sensors[1] @ moved[n:], rel=1e-8)
 
 

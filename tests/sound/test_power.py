@@ -4,8 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from surfaces import box, rigid
 
-from gearfmu.sound import Radiation, SoundError, midbands, power_of, radiated, segments
+from gearfmu.sound import (
+    Radiation,
+    SoundError,
+    level,
+    midbands,
+    power_of,
+    radiated,
+    radiation,
+    segments,
+    skin_of,
+)
 
 STEP = 5e-5
 
@@ -83,3 +94,16 @@ def test_a_run_up_keeps_its_order_at_its_frequency() -> None:
 def test_records_that_have_no_spectrum_are_refused() -> None:
     with pytest.raises(SoundError, match="equal steps"):
         segments(np.array([0.0, 1.0, 3.0] * 8).cumsum(), np.zeros((24, 2)))
+
+
+def test_equivalent_radiated_power_is_that_of_iso_ts_7849() -> None:
+    """L_W = L_v + 10 lg(S/S₀) + 10 lg(ρc/400 Ns/m³), L_v re 50 nm/s, S₀ = 1 m² (ISO/TS 7849-1, efficiency 1). By hand:
+    a box of .3 × .2 × .1 m moves along z with 1 mm/s rms, two sides of .06 m²: 86.02 − 9.21 + .14 = 76.95 dB."""
+    points, faces = box((0.3, 0.2, 0.1), (1, 1, 1))
+    sound = radiation(skin_of(points, faces, rigid(points)), np.array([63.0]), count=60)
+    time = np.arange(0, 1.0, STEP)
+    velocity = np.zeros((len(time), 6))
+    velocity[:, 2] = np.sqrt(2) * 1e-3 * np.sin(2 * np.pi * 500 * time)
+    found = power_of(segments(time, velocity, moved=False), sound)
+    assert found.total(erp=True)[0] == pytest.approx(76.95, abs=0.01)
+    assert level(found.third_octaves(erp=True)[0])[9] == pytest.approx(76.95, abs=0.01)  # 500 Hz

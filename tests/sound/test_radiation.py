@@ -171,3 +171,37 @@ def test_below_the_reach_equivalent_radiated_power_says_too_much_of_weak_radiato
 ) -> None:
     weak = coarse.resistance[line, 8, 8] / (RHO_C * coarse.gram[8, 8])  # twist
     assert weak < (0.001, 0.02, 0.2)[line]
+
+
+def baffled_plate(k: float, sides: tuple[float, float]) -> float:
+    """Radiation efficiency of the first mode of a simply supported plate in a rigid baffle: C. E. Wallace, J. Acoust.
+    Soc. Am. 51 (1972) 946, eq. (8), integrated over a quarter of the half space."""
+    a, b = k * sides[0], k * sides[1]
+    height, weight = np.polynomial.legendre.leggauss(60)
+    polar, turn = 0.25 * np.pi * (height + 1), 0.25 * np.pi * (height[:, None] + 1)
+    x, y = a * np.sin(polar) * np.cos(turn), b * np.sin(polar) * np.sin(turn)
+    shape = np.cos(x / 2) * np.cos(y / 2) / (((x / np.pi) ** 2 - 1) * ((y / np.pi) ** 2 - 1))
+    return float(64 * a * b / np.pi**6 * (np.pi / 4) ** 2 * (weight[:, None] * weight * shape**2 * np.sin(polar)).sum())
+
+
+def test_a_plate_in_a_baffle_radiates_as_wallace_says() -> None:
+    """Two plates back to back have their middle plane as a rigid baffle. The error falls with their distance in
+    proportion (4.5 % at 20 mm and k a = 2), so two distances give that of none. Measured .4 % at most."""
+    sides, ka = (0.3, 0.2), np.array([0.3, 1.0, 2.0, 4.0])
+    printed = (
+        32 * 0.3 * 0.2 / np.pi**5 * (1 - 0.06 / 12 * (1 - 8 / np.pi**2) * (3 / 2 + 2 / 3))
+    )  # his eq. (22), k a = .3
+    assert baffled_plate(1.0, sides) == pytest.approx(printed, rel=1e-3)
+    ratio = []
+    for thickness in (0.02, 0.01):
+        points, quads = box((*sides, thickness), (15, 10, 1))
+        faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        surface = surface_of(skin_of(points, faces, rigid(points)), len(faces))
+        x, y, _ = points[faces].mean(axis=1).T
+        front = np.abs(surface.normal[:: len(surface.normal) // len(faces), 2]) > 0.5
+        velocity = np.cos(np.pi * x / sides[0]) * np.cos(np.pi * y / sides[1]) * front
+        surface = dataclasses.replace(surface, velocity=velocity[:, None])
+        own = np.array([surface.resistance(k, surface.pressure(k))[0, 0] for k in ka / sides[0]])
+        exact = [baffled_plate(k, sides) for k in ka / sides[0]]
+        ratio.append(own / (surface.area @ velocity**2) / exact)
+    assert np.abs(2 * ratio[1] - ratio[0] - 1).max() < 0.01, ratio

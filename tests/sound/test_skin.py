@@ -47,8 +47,9 @@ def test_gram_of_rigid_motion_is_that_of_the_box() -> None:
 def test_envelope_is_that_of_the_outermost_points() -> None:
     points, _ = box(SIZE, (3, 2, 1))
     within = np.vstack([0.3 * points, points, [[0.01, 0.02, 0.03]]])
-    found = envelope(within, rigid(within))
+    found = envelope(within, 0.04)
     assert found.volume == pytest.approx(np.prod(SIZE), rel=1e-12)
+    assert np.linalg.norm(found.corners - np.roll(found.corners, 1, axis=1), axis=2).max() <= 0.04
 
 
 def test_refining_changes_neither_volume_nor_gram_of_linear_shapes() -> None:

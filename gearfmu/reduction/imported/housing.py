@@ -21,7 +21,7 @@ from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
-from gearfmu.reduction.imported.skin import Surface, closed_surface
+from gearfmu.reduction.imported.skin import Surface, closed_surface, enveloping_surface
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
 from gearfmu.spec.tables.housing import HousingBody, HousingImportSpec
 
@@ -32,7 +32,8 @@ HOUSING_FACTORS = 5  # of K, with the interfaces held, and at the reference's th
 class ImportedHousing:
     """An imported housing before reduction. full: seats and feet are its interfaces; spans: of every interface the
     lowest and highest z of its nodes, m; sensors: interfaces of three components that nothing loads; surface: its skin,
-    None where the file names none, and skin (3P, N): displacement of its points by the unknowns."""
+    the convex envelope where the file names none, None of a superelement without one, and skin (3P, N): displacement of
+    its points by the unknowns."""
 
     full: FullOrder
     facts: dict[str, object]
@@ -59,11 +60,9 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
         judgement = Judgement(tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max()))
         full = full_order(housing.name, body, [*held, *felt], judgement)
         loaded, sensors = full.interfaces[: len(held)], full.interfaces[len(held) :]
-        surface = closed_surface(mesh, faces, source.skin) if source.skin else None
-        skin = None
-        if surface is not None:
-            transform = elimination(mesh.nodes, [c for c in held if c.kind == "rigid"])[0]
-            skin = sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ transform)
+        surface = closed_surface(mesh, faces, source.skin) if source.skin else enveloping_surface(mesh, faces)
+        transform = elimination(mesh.nodes, [c for c in held if c.kind == "rigid"])[0]
+        skin = sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ transform)
     dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
     heights = {c.name: mesh.nodes[c.nodes, 2] for c in held}
     return ImportedHousing(

@@ -1,4 +1,5 @@
-"""The outer surface of a housing, closed: the faces of a node set by their corners, holes covered by fans of triangles.
+"""The outer surface of a housing, closed: the faces of a node set by their corners, holes covered by fans of triangles;
+the convex envelope of the mesh where no set is named.
 
 A hole (a bore, an opening for a shaft) is an edge loop that belongs to one face only. It is closed by triangles between
 its edges and one more point, the mean of its corners, which moves as their mean.
@@ -10,10 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.sound import envelope
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,18 @@ def enclosed(nodes: np.ndarray, faces: np.ndarray, name: str) -> Surface:
     if _volume(points, closed) <= 0:
         raise MeshError(f"skin '{name}' encloses no volume: name the outer surface, all of it, and not the inner one")
     return Surface(points, closed, sample, len(loops))
+
+
+def enveloping_surface(mesh: ImportedMesh, faces: solids.Faces) -> Surface:
+    """The convex envelope of a mesh, in triangles as long as the edges of its boundary; a point moves as the boundary
+    node that is nearest to it."""
+    corners = np.vstack([faces.quads[:, :4], faces.triangles[:, [0, 1, 2, 2]]])
+    used, at = np.unique(corners), mesh.nodes[corners]
+    around = envelope(mesh.nodes[used], float(np.linalg.norm(at[:, 1] - at[:, 0], axis=1).mean()))
+    nearest = used[cKDTree(mesh.nodes[used]).query(around.points)[1]]
+    entries = np.ones(len(nearest)), (np.arange(len(nearest)), nearest)
+    sample = sp.csr_array(entries, shape=(len(nearest), len(mesh.nodes)))
+    return Surface(around.points, around.triangles[:, [0, 1, 2, 2]], sample, 0)
 
 
 def _loops(faces: np.ndarray, name: str) -> list[np.ndarray]:

@@ -9,7 +9,7 @@ points are L⁻¹ times moments (theory, section 7).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -134,7 +134,7 @@ def _read(source: HousingReducedSpec) -> _Read:
     )
 
 
-def _numbered(rows: Iterable[tuple[int, int]], file: str) -> dict[tuple[int, int], int]:
+def _numbered(rows: Sequence[tuple[int, int]] | np.ndarray, file: str) -> dict[tuple[int, int], int]:
     found = {(int(label), int(component)): k for k, (label, component) in enumerate(rows)}
     if len(found) != len(rows):
         raise MeshError(f"{file}: a row of one point and direction comes twice")

@@ -212,13 +212,20 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
     if not (sun and pin and carrier and mounts):
         return ()
     all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
-    across = {"radial": all_mounts, "tilt": all_mounts * radius**2 / 2}
-    along = {"axial": all_mounts, "torsion": None if "ring" in spec.ports else all_mounts * radius**2}
-    own: dict[str, Any] = {"body": "ring", "damping_ratio": mounts.damping_ratio}
-    seat = {"to": mounts.to, "node": mounts.node}
-    held = [SupportSpec(name="ring", **own, **across, **along)]
+    torsion = None if "ring" in spec.ports else all_mounts * radius**2
+    ring = SupportSpec(
+        name="ring",
+        body="ring",
+        radial=all_mounts,
+        axial=all_mounts,
+        tilt=all_mounts * radius**2 / 2,
+        torsion=torsion,
+        damping_ratio=mounts.damping_ratio,
+    )
+    along = {"name": "ring_seat", "to": mounts.to, "node": mounts.node, "radial": None, "tilt": None}
+    held = [ring]
     if mounts.to is not None:
-        held = [SupportSpec(name="ring", **own, **across), SupportSpec(name="ring_seat", **own, **along, **seat)]
+        held = [ring.model_copy(update={"axial": None, "torsion": None}), ring.model_copy(update=along)]
     return (
         _held("sun", sun),
         *(_held(name, pin, to="carrier", node=f"bolt{k}") for k, name in enumerate(planets)),

@@ -3,62 +3,58 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.body.body import Skin as BodySkin
-from gearfmu.sound import Radiation, Skin, SoundError, SoundPower, power_of, radiation, segments, skin_of
-from gearfmu.sound.store import load_radiation, save_radiation
+from gearfmu.sound import WIDTH, Radiation, SoundError, SoundPower, power_of, segments
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.observed import MODE, MOTION
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.trace import Trace
 
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+SEGMENTS = 40  # of a waterfall, half overlapping, where its lines are not `WIDEST` apart then
+WIDEST = 40.0  # Hz
 
 
 @dataclass(frozen=True)
-class Sounding:
-    """matrix: file of the radiation matrix, made when it is not there and kept; patches: of its boundary elements;
-    speed: channel of a waterfall, one spectrum a segment, their mean when None; start: from which it counts, s."""
+class Heard:
+    """What of a run counts. speed: channel of a waterfall, one spectrum a segment, their mean when None; start: s."""
 
-    matrix: str | os.PathLike[str] | None = None
-    patches: int = 1000
     speed: str | None = None
     start: float = 0.0
 
+    def width(self, time: np.ndarray) -> float:
+        """Hz, spacing of the lines: that of the steady state, or as wide as `SEGMENTS` of a waterfall need."""
+        if self.speed is None or time.size < 2:
+            return WIDTH
+        return float(np.clip(0.5 * SEGMENTS / (time[-1] - time[0]), WIDTH, WIDEST))
 
-def radiated_power(run: Trace, stage: Stage, bodies: Sequence[Body], how: Sounding) -> SoundPower:
-    """Sound power that the housing of a stage radiates in a run; bodies as of `assemble`.
 
-    Raises SoundError for a stage without a housing or skin and a record without equal steps; TraceError where the
-    forces of the bearings were not recorded.
+def radiated_power(run: Trace, stage: Stage, bodies: Sequence[Body], sound: Radiation, heard: Heard) -> SoundPower:
+    """Sound power that the housing of a stage radiates in a run; bodies as of `assemble`, sound: of all coordinates of
+    the housing.
+
+    Raises SoundError for a stage without a housing and a record without equal steps; TraceError where the forces of
+    the bearings were not recorded.
     """
-    body, own = _skinned(stage, bodies)
-    known = _recorded(run, body)
+    known = _recorded(run, housing_body(stage, bodies))
     coordinates = HousingAlone.of(stage, bodies).motion(run).velocity if known is None else known
-    count = coordinates.shape[1]
-    heard = run.time >= how.start
-    pieces = segments(run.time[heard], coordinates[heard], moved=known is not None)
-    skin = skin_of(own.points, own.faces, own.skin_modes[:, :, :count])
-    sound = _matrix(skin, how, f"{body.how.hash} {count} {how.patches}")
-    turning = None if how.speed is None else np.interp(pieces.middle, run.time, run[how.speed])
-    return power_of(pieces, sound, turning, steady=how.speed is None)
+    counts = run.time >= heard.start
+    time = run.time[counts]
+    pieces = segments(time, coordinates[counts], heard.width(time), moved=known is not None)
+    turning = None if heard.speed is None else np.interp(pieces.middle, run.time, run[heard.speed])
+    return power_of(pieces, sound.of(coordinates.shape[1]), turning, steady=heard.speed is None)
 
 
-def _skinned(stage: Stage, bodies: Sequence[Body]) -> tuple[Body, BodySkin]:
-    """The reduced housing of a stage and its skin. SoundError where it has none, or no skin."""
+def housing_body(stage: Stage, bodies: Sequence[Body]) -> Body:
+    """The reduced housing of a stage. SoundError where it has none."""
     if not stage.housings:
         raise SoundError(f"stage {stage.name} has no housing: name one, or put it under the run with `gearfmu house`")
-    body = stage.by_name(bodies)[stage.housings[0].name]
-    if body.skin is None:
-        raise SoundError(f"the housing of {stage.name} has no skin: name its outer surface in [import], skin = …")
-    return body, body.skin
+    return stage.by_name(bodies)[stage.housings[0].name]
 
 
 def _recorded(run: Trace, body: Body) -> np.ndarray | None:
@@ -69,15 +65,3 @@ def _recorded(run: Trace, body: Body) -> np.ndarray | None:
         return None
     moved, root = [run[name] for name in rigid], math.sqrt(body.total_mass)
     return np.stack([*moved, *(root * run[name] for name in modes)], axis=1)
-
-
-def _matrix(skin: Skin, how: Sounding, key: str) -> Radiation:
-    """The radiation matrix of a file where it is of this skin, else made, and kept in the file."""
-    if how.matrix is not None and Path(how.matrix).exists():
-        found, known = load_radiation(how.matrix)
-        if known == key:
-            return found
-    found = radiation(skin, count=how.patches)
-    if how.matrix is not None:
-        save_radiation(found, how.matrix, key)
-    return found
