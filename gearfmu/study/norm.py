@@ -14,7 +14,7 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.run.set_te import set_error
+from gearfmu.stage.run.te import set_error
 from gearfmu.stage.run.trace import Channel, Trace
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
@@ -22,7 +22,7 @@ OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 
 @dataclass(frozen=True)
 class Signals:
-    """What a run is judged by, sampled every `interval` s from `start` s on.
+    """Signals by which a run is judged, sampled every `interval` s from `start` s on.
 
     te (n,) m, transmission error at the sample · force (n,) N, mesh force, mean over the interval; of a set (n, meshes)
     · bearing (n, 2 B) N, x and y forces of every bearing (of a set: every pin), means over the interval · locked (n,)
@@ -48,28 +48,22 @@ class Signals:
         return Trace(time, channels, meta | {"interval": self.interval, "start": self.start, "steady": self.steady})
 
 
-def signals_of(trace: Trace, gears: tuple[str, str], settle: float) -> Signals:
-    """The signals of a coupled run after `settle` (s); gears: names of pinion and wheel."""
-    part = trace.window(settle * (1.0 - 1e-12))
-    locked = f"{gears[0]}.clutch.locked"
-    columns = [part[f"bearing.{gear}.{axis}_mean"] for gear in gears for axis in ("fx", "fy")]
-    interval = float(trace.time[1] - trace.time[0])
-    found = part[locked].astype(bool) if locked in part else None
-    return Signals(
-        part["mesh.te"], part["mesh.force_mean"], np.stack(columns, 1), found, interval, float(part.time[0]), settle > 0
-    )
-
-
-def set_signals(trace: Trace, stage: Stage, settle: float) -> Signals:
-    """The signals of a run of a planetary set after `settle` (s): transmission error of the set, forces in all meshes
-    and on all pins."""
-    part = trace.window(settle * (1.0 - 1e-12))
-    r_b, ratio = set_error(stage)
-    te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
-    force = [part[f"{mesh.name}.force_mean"] for mesh in stage.engagements]
-    pins = [part[f"pin.{s.name}.{axis}_mean"] for s in stage.supports if s.to for axis in ("fx", "fy")]
-    interval = float(trace.time[1] - trace.time[0])
-    return Signals(te, np.stack(force, 1), np.stack(pins, 1), None, interval, float(part.time[0]), settle > 0)
+def signals_of(trace: Trace, stage: Stage, settle: float) -> Signals:
+    """The signals of a coupled run after `settle` (s): of a pair transmission error, mesh force and bearings; of a
+    planetary set the transmission error of the set, forces in all meshes and on all pins."""
+    part, interval = trace.window(settle * (1.0 - 1e-12)), float(trace.time[1] - trace.time[0])
+    if stage.carriers:
+        r_b, ratio = set_error(stage)
+        te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
+        force = np.stack([part[f"{mesh.name}.force_mean"] for mesh in stage.engagements], 1)
+        held = [f"pin.{support.name}" for support in stage.supports if support.to]
+    else:
+        te, force = part["mesh.te"], part["mesh.force_mean"]
+        held = [f"bearing.{gear.name}" for gear in stage.gears]
+    columns = np.stack([part[f"{name}.{axis}_mean"] for name in held for axis in ("fx", "fy")], 1)
+    clutch = f"{stage.gears[0].name}.clutch.locked"
+    locked = part[clutch].astype(bool) if clutch in part and not stage.carriers else None
+    return Signals(te, force, columns, locked, interval, float(part.time[0]), settle > 0)
 
 
 def kept_signals(trace: Trace) -> Signals:
