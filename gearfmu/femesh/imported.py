@@ -107,8 +107,7 @@ def read_surface(source: Path, length: float) -> tuple[np.ndarray, np.ndarray, n
         raise MeshError(
             f"{source}: no quadrilaterals and no triangles of corner nodes: write the outer surface as these"
         )
-    labels = np.asarray(getattr(mesh, "points_id", np.arange(1, len(mesh.points) + 1)), int)
-    return length * np.asarray(mesh.points, float), np.vstack(blocks), labels
+    return length * np.asarray(mesh.points, float), np.vstack(blocks), _labels(mesh)
 
 
 def _from_deck(deck: Deck, source: Path) -> tuple:
@@ -161,13 +160,18 @@ def _from_meshio(source: Path, file_format: str) -> tuple:
         if block.type not in _SURFACES:
             cells.setdefault(block.type, []).append(block.data)
     points = np.asarray(mesh.points, float)
-    labels = np.asarray(getattr(mesh, "points_id", np.arange(1, len(points) + 1)), int)
+    labels = _labels(mesh)
     sets = _meshio_sets(mesh)
     if file_format == "nastran":
         order = np.argsort(labels)
         for name, members in nastran_sets(source).items():
             sets[name] = order[_numbered(np.array(members), labels[order], source, f"SET {name}")]
     return points, {kind: np.concatenate(blocks) for kind, blocks in cells.items()}, sets, labels
+
+
+def _labels(mesh: meshio.Mesh) -> np.ndarray:
+    """Node numbers of a file, or 1, 2, …"""
+    return np.asarray(getattr(mesh, "points_id", np.arange(1, len(mesh.points) + 1)), int)
 
 
 def _read_by_meshio(source: Path, file_format: str) -> meshio.Mesh:

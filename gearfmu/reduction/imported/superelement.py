@@ -73,8 +73,8 @@ def superelement(housing: HousingBody) -> ImportedHousing:
     source = housing.reduced
     assert source is not None
     read = _read(source)
-    seats = [_interface(read, source, "seats", name) for name in source.seats]
-    feet = [_interface(read, source, "feet", name) for name in source.feet]
+    seats = [_interface(read, source, "seats", *at) for at in source.seats.items()]
+    feet = [_interface(read, source, "feet", *at) for at in source.feet.items()]
     rigid = _rigid_motion(read, source)
     _check_mass(read.mass, rigid, source)
     size, sensors = len(read.stiffness), []
@@ -97,8 +97,7 @@ def superelement(housing: HousingBody) -> ImportedHousing:
     return ImportedHousing(full, facts, {}, tuple(sensors), surface, skin)
 
 
-def _interface(read: _Read, source: HousingReducedSpec, group: str, name: str) -> Interface:
-    label: int = getattr(source, group)[name]
+def _interface(read: _Read, source: HousingReducedSpec, group: str, name: str, label: int) -> Interface:
     what, turning = f"{group}.{name}", source.rotations.get(name)
     if turning is None:
         rows = read.motion(label, range(6), what)

@@ -237,7 +237,7 @@ class Stage(LaterFields):
 
     @field_validator("bodies", mode="before")
     @classmethod
-    def _named(cls, value: Any) -> Any:
+    def _named(cls, value: object) -> object:
         return named_tables(value, kind="gear")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Stage:

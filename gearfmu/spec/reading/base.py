@@ -133,7 +133,7 @@ def refuse(remedy: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{remedy}", {"remedy": remedy})
 
 
-def named_tables(tables: Any, **common: Any) -> Any:
+def named_tables(tables: object, **common: object) -> object:
     """Tables by name with that name in them, and fields that they have in common before their own."""
     if not isinstance(tables, dict):
         return tables
