@@ -13,7 +13,7 @@
     gf.sweep("fzg_c", {"torque": [100.0, 200.0, 300.0]}, "out/harris")
 
 Numbers are SI; text carries its unit. `docs/howto-python.md` shows more, `gearfmu --help` the same on the command line.
-What is named here is imported when it is used.
+Names listed here are imported on first use.
 """
 
 from __future__ import annotations
@@ -24,13 +24,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearfmu.api.bodies import frf
     from gearfmu.api.models import assemble, load, load_scene, reduce
-    from gearfmu.api.plans import plan, run_plan
+    from gearfmu.api.plans import plan, run_plan, sweep
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.settings import Settings
     from gearfmu.api.sound import house, sound_power, transfer_paths
     from gearfmu.api.stages import bearings, effects, efficiency, new
-    from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
     from gearfmu.fmu.validate import validate
     from gearfmu.stage.build.model import StageModel
@@ -79,13 +78,12 @@ __all__ = [
 _HOMES = {
     "api.bodies": ("frf",),
     "api.models": ("assemble", "load", "load_scene", "reduce"),
-    "api.plans": ("plan", "run_plan"),
+    "api.plans": ("plan", "run_plan", "sweep"),
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.settings": ("Settings",),
     "api.sound": ("house", "sound_power", "transfer_paths"),
     "api.stages": ("bearings", "effects", "efficiency", "new"),
-    "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
     "fmu.validate": ("validate",),
     "stage.build.model": ("StageModel",),

@@ -1,4 +1,4 @@
-"""The command line. Verbs are loaded when they are called, so that help and errors come at once."""
+"""The command line. Verbs are loaded when they are called, so that help and errors come without delay."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ VERBS = {
         "Quasi-static loaded transmission error, load shares, stiffness of mesh and stage.",
     ),
     "efficiency": (
-        "gearfmu.commands.efficiency:efficiency",
+        "gearfmu.commands.te:efficiency",
         "Loss of every mesh to friction of its flanks.",
     ),
     "bearings": (
@@ -56,8 +56,8 @@ VERBS = {
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "compare": ("gearfmu.commands.runs:compare", "Compare two or more traces in one page."),
     "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),
-    "plan": ("gearfmu.commands.plan:plan", "Effects, level and step of a scene by an error budget: plan.toml."),
-    "convert": ("gearfmu.commands.convert:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
+    "plan": ("gearfmu.commands.sweep:plan", "Effects, level and step of a scene by an error budget: plan.toml."),
+    "convert": ("gearfmu.commands.files:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),
@@ -68,7 +68,7 @@ VERBS = {
 
 
 class Verbs(click.Group):
-    """A group that knows its commands by name and imports one only to run it."""
+    """A group that lists its commands by name and imports one only to run it."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)

@@ -59,7 +59,7 @@ def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None
     print(f"both bodies: {made:.0f} s of processor time, {memory:.2f} GB")
 
     pair = spec.written.geometry
-    result = loaded_te(model, [LOAD], 32, rigid_bearings=True)
+    result = loaded_te(model, [LOAD], 32, **{"effect.bearings": 0.0})
     force = LOAD / pair.gears[0].r_b
     pairs = (result.shares[0] > 1e-6).sum(axis=1).mean()
     print(

@@ -26,9 +26,9 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import Window, alternating, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text, written_whole
 from gearfmu.report.style import panels, styled

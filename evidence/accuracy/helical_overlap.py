@@ -24,8 +24,7 @@ import numpy as np
 from matplotlib import rc_context
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.body.body import Flank
-from gearfmu.body.parts import kept_offsets, tooth_flank
+from gearfmu.body.parts import flank_of, tooth_flank
 from gearfmu.body.toothed import symmetric_mass
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
@@ -94,23 +93,6 @@ def _body(stored: Body, gear: GearSpec, shape: GearGeometry) -> Body:
     sector = gear_sector(shape, gear.face_width, gear.body.mesh)
     body = SectorBody(sector, gear.material, flank, points, gear.rigid_bore)
     statics, modes = static_tables(body, []), elastic_modes(body, MODES)
-    own = Flank(
-        teeth=gear.teeth,
-        internal=False,
-        r_b=shape.r_b,
-        psi_b=shape.psi_b,
-        beta_b=shape.beta_b,
-        face_width=gear.face_width,
-        strip_half_width=gear.body.strip_half_width,
-        roll_range=np.array(flank.roll_range),
-        roll=points.rolls,
-        diameter=modes.nodal_diameter,
-        part=modes.part,
-        parity=modes.parity,
-        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
-        static=kept_offsets(statics.static_ff),
-        node=statics.static_fb,
-    )
     return replace(
         stored,
         mass=symmetric_mass(body.inertia),
@@ -118,7 +100,7 @@ def _body(stored: Body, gear: GearSpec, shape: GearGeometry) -> Body:
         damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
         rows=modes.bore_rows,
         static=statics.static_bb,
-        flank=own,
+        flank=replace(flank_of(gear.teeth, (flank, points), modes, statics), tangent=None),
         picture=None,
         spin=None,
     )
@@ -143,7 +125,7 @@ def row(overlap: float) -> dict[str, Any]:
     spec = stage_at(overlap)
     pair, model = spec.written.geometry, assemble(spec, bodies_of(spec))
     torques = [load * WIDTH * pair.gears[0].r_b for load in LINE_LOADS]
-    result = loaded_te(model, torques, POSITIONS, rigid_bearings=True, slices=SLICES)
+    result = loaded_te(model, torques, POSITIONS, slices=SLICES, **{"effect.bearings": 0.0})
     found: dict[str, Any] = {
         "overlap_ratio": f"{overlap:g}",
         "helix_angle_deg": f"{math.degrees(spec.written.pair.helix_angle):.3f}",

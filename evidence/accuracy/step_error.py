@@ -21,7 +21,7 @@ import numpy as np
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 

@@ -1,11 +1,12 @@
 """What an internal step costs beside the kernel of an earlier commit: instructions, and processor time in turn.
 
     python -m evidence.price.step_cost [--commit 4e4da56] [--level fast] [--rounds 7]
+    python -m evidence.price.step_cost --commit 3116c35f --stage helical_demo --torque 150 --slices 7   # fixed slices
 
-Pair with relief, 302 N·m at 2000 rpm, all outputs on. The earlier commit is unpacked and built beside this one; both
-kernels run the same mesh periods in turn, so that their times share the machine's moods. Prints instructions of a step
-by callgrind (where valgrind is there), the time of a step in the quickest mesh period of each run, which other load on
-the machine disturbs least, and the median of the ratios round by round.
+Pair with relief, 302 N·m at 2000 rpm, all outputs on, or another. The earlier commit is unpacked and built beside this
+one; both kernels run the same mesh periods in turn, so that their times share the machine's moods. Prints instructions
+of a step by callgrind (where valgrind is there), the time of a step in the quickest mesh period of each run, which
+other load on the machine disturbs least, and the median of the ratios round by round.
 """
 
 from __future__ import annotations
@@ -19,13 +20,34 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-STAGE, TORQUE, SPEED = "fzg_c/stage_relief", 302.0, 209.44
+SPEED = 209.44  # rad/s
 LEVELS = {"rigid": 0.0, "fast": 1.0, "standard": 2.0, "full": 3.0}
 H, STEP, WARM, PERIOD, TIMED = 50e-6, 5e-6, 10, 38, 100  # communication steps, of one mesh period too; periods timed
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pair under a torque (N·m) at SPEED."""
+
+    stage: str
+    torque: float
+    slices: int
+    level: str
+
+    @property
+    def arguments(self) -> list[str]:
+        """Of this program."""
+        return [text for name, value in vars(self).items() for text in (f"--{name}", str(value))]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Of the kernel."""
+        return {"level": LEVELS[self.level], "h": STEP, "slices": float(self.slices)}
 
 
 def stored_bodies(spec: Any) -> Any:
@@ -35,7 +57,7 @@ def stored_bodies(spec: Any) -> Any:
     return (body.load_stage_bodies if hasattr(body, "load_stage_bodies") else body.load_bodies)(spec)
 
 
-def write(folder: Path, level: float) -> None:
+def write(folder: Path, case: Case) -> None:
     """Blob, library and arguments of the host program, by the package that this process imports."""
     from gearfmu.kernel.build import build_library
     from gearfmu.spec.stage import load_stage
@@ -43,26 +65,26 @@ def write(folder: Path, level: float) -> None:
 
     build_library()  # where this package looks for it
     build_library(out=folder / "kernel.so")
-    spec = load_stage(STAGE)
+    spec = load_stage(case.stage)
     model = assemble(spec, stored_bodies(spec))
     (folder / "blob").write_bytes(model.blob)
-    known, drive = model.kernel().variables, Steady(model, SPEED, TORQUE)
+    known, drive = model.kernel().variables, Steady(model, SPEED, case.torque)
     start, next_one = drive(0.0), drive(H)
-    words = [f"p{known[n].reference}={v!r}+0" for n, v in {"level": level, "h": STEP, "slices": 5.0}.items()]
+    words = [f"p{known[n].reference}={v!r}+0" for n, v in case.parameters.items()]
     words += [f"i{known[n].reference}={float(v)!r}+{(next_one[n] - v) / H!r}" for n, v in start.items()]
     (folder / "words").write_text(" ".join([*words, f"w{known['energy.stored'].reference}"]), encoding="utf-8")
 
 
-def least(folder: Path, level: float) -> float:
+def least(folder: Path, case: Case) -> float:
     """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
     from gearfmu.kernel import Kernel
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
 
-    spec = load_stage(STAGE)
+    spec = load_stage(case.stage)
     model = assemble(spec, stored_bodies(spec))
-    drive = Steady(model, SPEED, TORQUE)
-    kernel = Kernel(model.blob, {"level": level, "h": STEP, "slices": 5.0}, folder / "kernel.so")
+    drive = Steady(model, SPEED, case.torque)
+    kernel = Kernel(model.blob, case.parameters, folder / "kernel.so")
     best, inputs = float("inf"), [drive(k * H) for k in range(PERIOD * TIMED)]
     for k, values in enumerate(inputs):
         if k % PERIOD == 0:
@@ -80,8 +102,8 @@ def least(folder: Path, level: float) -> float:
 class Side:
     """A tree of sources, its kernel and the host program that runs it."""
 
-    def __init__(self, tree: Path, folder: Path, level: float):
-        self.tree, self.folder, self.level = tree, folder, level
+    def __init__(self, tree: Path, folder: Path, case: Case):
+        self.tree, self.folder, self.case = tree, folder, case
         folder.mkdir()
         self._child("--write")
         source, include = ROOT / "evidence" / "price" / "effects_host.c", tree / "gearfmu" / "kernel" / "src"
@@ -89,7 +111,7 @@ class Side:
 
     def _child(self, what: str) -> str:
         environment = {**os.environ, "PYTHONPATH": str(self.tree), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, __file__, what, str(self.folder), "--at", str(self.level)]
+        command = [sys.executable, __file__, what, str(self.folder), *self.case.arguments]
         return subprocess.run(
             command, check=True, env=environment, cwd=self.tree, stdout=subprocess.PIPE, text=True
         ).stdout
@@ -134,28 +156,30 @@ def main() -> None:
     """Build both, measure in turn, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--commit", default="4e4da56")
+    parser.add_argument("--stage", default="fzg_c/stage_relief")
+    parser.add_argument("--torque", type=float, default=302.0)
+    parser.add_argument("--slices", type=int, default=5)
     parser.add_argument("--level", choices=LEVELS, default="fast")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--write", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--time", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--at", type=float, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
+    case = Case(chosen.stage, chosen.torque, chosen.slices, chosen.level)
     if chosen.write:
-        return write(chosen.write, chosen.at)
+        return write(chosen.write, case)
     if chosen.time:
-        return print(least(chosen.time, chosen.at))
+        return print(least(chosen.time, case))
     with tempfile.TemporaryDirectory() as work:
-        level = LEVELS[chosen.level]
         sides = {
-            chosen.commit: Side(unpacked(chosen.commit, Path(work) / "tree"), Path(work) / "before", level),
-            "this tree": Side(ROOT, Path(work) / "now", level),
+            chosen.commit: Side(unpacked(chosen.commit, Path(work) / "tree"), Path(work) / "before", case),
+            "this tree": Side(ROOT, Path(work) / "now", case),
         }
-        times = {name: [] for name in sides}
+        times: dict[str, list[float]] = {name: [] for name in sides}
         for _ in range(chosen.rounds):
             for name, side in sides.items():
                 times[name].append(side.seconds())
         counts = {name: side.instructions() for name, side in sides.items()} if shutil.which("valgrind") else {}
-    print(f"{STAGE}, level {chosen.level}, h = {1e6 * STEP:g} µs      µs a step   instructions a step")
+    print(f"{case.stage}, level {case.level}, h = {1e6 * STEP:g} µs      µs a step   instructions a step")
     for name in sides:
         counted = f"{counts[name]:12.0f}" if counts else "no valgrind "
         print(f"  {name:<40} {1e6 * min(times[name]):10.2f}   {counted}")

@@ -15,8 +15,8 @@ from evidence.stability.checks import ENERGY, deep, judged, near
 from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
 from gearfmu.cosim.coupled import OK, Result
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.kernel import Kernel
 from gearfmu.spec.scene import load_scene
 from gearfmu.stage import StageModel

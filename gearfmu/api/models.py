@@ -1,4 +1,4 @@
-"""From a stage's file to its bodies and its model: load, reduce what is missing, assemble."""
+"""From a stage's file to its bodies and its model: load, reduce missing bodies, assemble."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
-from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
+from gearfmu.body import Body, body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.expand import with_bores, with_ports
 from gearfmu.spec.forms.general import Stage
@@ -28,20 +28,20 @@ AnyStage: TypeAlias = PathLike | Stage | StageModel
 
 
 class Progress(Protocol):
-    """How far a long function is: called with the part that is done, 0 … 1, and what is being done."""
+    """How far a long function is: called with the part done, 0 … 1, and the present task."""
 
     def __call__(self, fraction: float, text: str = "") -> None: ...
 
 
 def load(stage: PathLike, changes: Changes | None = None) -> Stage:
     """The numbers of a stage, checked and in SI: bodies, rotors, engagements, supports and ports, in the same terms for
-    a pair, a planetary set and any other; `written` is what the file says of a pair or set.
+    a pair, a planetary set and any other; `written` holds the fields of the file of a pair or set.
 
     stage : path of a stage.toml or its folder, or the name of a shipped one ("fzg_c", "fzg_c/stage_relief",
         "two_stage", "planetary54").
     changes : fields that are to be other than in the file, by their dotted keys:
         {"gears.pinion.tip_relief.amount": "20 um", "contact.slices": 7}. Values as the file would say them, SI
-        numbers, or None for what is to be left out. The file stays as it is.
+        numbers, or None to leave a field out. The file stays as it is.
 
     Raises SpecError, which lists everything that is wrong.
     """
@@ -49,7 +49,7 @@ def load(stage: PathLike, changes: Changes | None = None) -> Stage:
 
 
 def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
-    """A scene: a stage in a drivetrain, what happens to it, for how long.
+    """A scene: a stage in a drivetrain, with its events and duration.
 
     scene : path of a scene.toml or the name of a shipped one ("pair_loaded", "clutch_closure", …).
     changes : as in `load`: {"stage.level": "fast", "torque": 200.0, "speed": "1500 rpm"}; `torque` and `speed` are
@@ -62,14 +62,14 @@ def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
 
 def reduce(
     stage: PathLike | Stage, folder: PathLike | None = None, force: bool = False, progress: Progress | None = None
-) -> list[Any]:
-    """The reduced bodies of a stage, in the order of its gears; what is missing or stale is made first (about a minute
+) -> list[Body]:
+    """The reduced bodies of a stage, in the order of its gears; missing or stale ones are made first (about a minute
     a gear) and stored as .h5.
 
     folder : of the .h5 files; when None that of the stage file, or bodies_<fingerprint> beside it where `changes` ask
         for other bodies than the file.
     force : make all of them again.
-    progress : called with (part of a body that is done, what is being done).
+    progress : called with (part of a body that is done, present task).
 
     Raises MeshError and BodyError.
     """
@@ -112,8 +112,8 @@ def assemble(
 
 def reduced_to_move(
     stage: PathLike | Stage, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
-) -> tuple[Stage, list[Any]]:
-    """The stage with these bores, and its bodies: what `assemble` puts together. SpecError, before anything is reduced,
+) -> tuple[Stage, list[Body]]:
+    """The stage with these bores, and its bodies, for `assemble`. SpecError, before anything is reduced,
     for a set that does not say all that it needs to move."""
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
     spec.require_motion()
@@ -122,7 +122,7 @@ def reduced_to_move(
 
 
 def model_of(stage: AnyStage) -> StageModel:
-    """`assemble` for what is no model yet."""
+    """`assemble`, unless it is a model already."""
     return stage if isinstance(stage, StageModel) else assemble(stage)
 
 

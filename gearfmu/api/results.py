@@ -1,4 +1,4 @@
-"""What is handed on: the FMU, the report, traces in other formats."""
+"""Results for others: the FMU, the report, traces in other formats."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing_extensions import Unpack
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, load, model_of
 from gearfmu.api.settings import Quantity, Starts, checked
-from gearfmu.body import load_bodies
+from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import Extras
@@ -27,8 +27,8 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.exchange import convert as convert_trace
+from gearfmu.stage.run.simulate import wound_starts, write_starts
 from gearfmu.stage.run.steady import parameters
-from gearfmu.stage.run.windup import wound_starts, write_starts
 
 
 def export(
@@ -164,7 +164,7 @@ def trace_file(path: PathLike) -> Path:
 
 
 def _labels(runs: Sequence[Run], sources: Sequence[Trace | PathLike]) -> list[str]:
-    """What tells the runs apart: stage, else scene, else folder or file, else a number."""
+    """Names that distinguish the runs: stage, else scene, else folder or file, else a number."""
     files = [str(n + 1) if isinstance(s, Trace) else _short(s) for n, s in enumerate(sources)]
     choices = ([run.stage_name for run in runs], [run.title for run in runs], files)
     return next((found for found in choices if len(set(found)) == len(found)), [str(n + 1) for n in range(len(runs))])
@@ -182,7 +182,7 @@ def stage_of(meta: Mapping[str, Any]) -> str | None:
     return path if path and Path(path).is_file() else meta.get("stage")
 
 
-def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Stage, Sequence[Any]]:
+def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Stage, Sequence[Body]]:
     """The stage of a run and its reduced bodies. meta : of the run's trace or deformation. stage : of the run where it
     is known; else that of the FMU that was run, with the bodies beside the stage file that `stage_of` names.
     GearfmuError where there is none such, or where the FMU is another by now."""

@@ -1,4 +1,4 @@
-"""What a stage does: loaded transmission error, a run alone, a run in a scene."""
+"""Statics and runs of a stage: loaded transmission error, a run alone, a run in a scene."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from gearfmu.cosim.scene_run import Staged
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.tables.profile import Profile, read_profile
-from gearfmu.stage import StageModel, Steady, TeResult, Trace
+from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
-from gearfmu.stage.run.set_te import SetTeResult, stage_te
 from gearfmu.stage.run.simulate import Inputs
-from gearfmu.stage.run.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
 
 
 def te(
@@ -30,24 +29,26 @@ def te(
     mesh: str | None = None,
     pitches: int = 1,
     **settings: Unpack[Settings],
-) -> TeResult | SetTeResult:
+) -> TeResult:
     """Quasi-static loaded transmission error over one pitch or more, output held, torque on the input (the first port).
 
     stage : a name or path, a `load`ed stage, or an `assemble`d model.
     torques : one or several, "302 N*m" or in N·m; 0 is the unloaded stage.
     positions : over one pitch, end point left out.
-    rigid_bearings : hold the axes. mesh : of a train the engagement, the first when None. Neither is for sets.
+    rigid_bearings : hold the axes, not of sets. mesh : the engagement, None: the first of a train, all of a set.
     pitches : teeth of gear A for deviations that differ from tooth to tooth.
     settings : of the kernel (docs/variables.md): slices=10, **{"effect.hertz": False}.
 
-    Of a pair or a train a TeResult: te (T, P) m, mesh_stiffness and stage_stiffness (T, P) N/m, without and with shafts
-    and bearings, shares of the tooth pairs; of a planetary set a SetTeResult with stage_stiffness
-    and load sharing. `failed` names torques without equilibrium; SimulationError where none has one.
+    Returns te (T, P) m and stage_stiffness (T, P) N/m with shafts and bearings; of a pair or a train mesh_stiffness
+    without them and shares of the tooth pairs, of a planetary set load sharing. `failed` names torques without
+    equilibrium; SimulationError where none has one.
     """
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
-    return stage_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
+    if rigid_bearings and (mesh or not model.stage.carriers):
+        known["effect.bearings"] = 0.0
+    return loaded_te(model, values, positions, mesh, pitches, None, **known)
 
 
 def simulate(
@@ -79,7 +80,7 @@ def simulate(
     start, *end = (
         None if value is None else in_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
     )
-    driven = Drive(
+    driven = LoadCase(
         torque=None if torque is None else in_si(torque, "N*m"),
         speed=start,
         duration=None if duration is None else in_si(duration, "s"),
@@ -136,7 +137,7 @@ def run(
     verify : run again at half the communication step and estimate the coupling error.
     progress : called with the part that is done, 0 … 1.
 
-    The trace's meta is the summary, with the outcome: "ok", or what stopped the run. Raises SpecError, BodyError,
+    The trace's meta is the summary, with the outcome: "ok", or the reason of an early end. Raises SpecError, BodyError,
     FmuError and CouplingError where the run cannot begin.
     """
     spec, own = _scene_and_stage(scene, stage)

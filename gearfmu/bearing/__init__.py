@@ -2,8 +2,7 @@
 
 from gearfmu.bearing.catalogue import Filled, filled_ball, filled_roller
 from gearfmu.bearing.law import Balls, Rolling, Row
-from gearfmu.bearing.passing import pass_orders, pass_swing
-from gearfmu.bearing.rest import NoRestError, Rest, rest
+from gearfmu.bearing.rest import NoRestError, Rest, pass_orders, pass_swing, rest
 from gearfmu.bearing.rollers import Rollers
 
 __all__ = [

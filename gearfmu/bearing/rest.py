@@ -1,4 +1,4 @@
-"""Where a bearing stands under a load: the least of U(d) − F·d, found by damped Newton steps."""
+"""Equilibrium of a bearing under a load: the least of U(d) − F·d, found by damped Newton steps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfmu.bearing.law import Balls, Rolling, Row
+from gearfmu.bearing.law import Balls, Law, Rolling, Row
 
 _STEPS = 300
 _EXACT = 1e-10  # largest force left, of the load
@@ -119,3 +119,21 @@ def least(
         if np.abs(at / scale).max() > 1.0:
             break
     raise NoRestError("no displacement carries the load")
+
+
+_ANGLES = 24  # of the cage over the distance of two rolling elements
+
+
+def pass_orders(law: Law) -> tuple[float, float]:
+    """Rolling elements that pass a point of the outer, and of the inner ring, in one revolution of the inner ring."""
+    gamma = law.diameter * math.cos(law.contact_angle) / law.pitch_diameter
+    return 0.5 * law.count * (1 - gamma), 0.5 * law.count * (1 + gamma)
+
+
+def pass_swing(bearing: Rolling, load: np.ndarray) -> np.ndarray:
+    """(5,) m, rad, peak to peak: motion of the inner ring under a constant load (5,) while rolling elements pass.
+    NoRestError: `rest`."""
+    count = bearing.rows[0].law.count
+    alone = bearing.spread(1)
+    angles = 2 * math.pi / count * np.arange(_ANGLES) / _ANGLES
+    return np.ptp([rest(alone.at(angle), load).displacement for angle in angles], axis=0)

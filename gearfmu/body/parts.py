@@ -1,4 +1,4 @@
-"""What every method to a gear body gives, and its pictures, for bodies meshed here and made elsewhere; how a body was
+"""Results of every method to a gear body, and its pictures, for bodies meshed here and made elsewhere; how a body was
 made."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from gearfmu.body.body import Sensors, Tangent
+from gearfmu.body.body import Flank, Sensors, Tangent
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Modes
@@ -80,6 +80,29 @@ def tangent_of(modes: Modes, statics: Statics, points: Points) -> Tangent | None
     return Tangent(rows, statics.static_nt, statics.static_tt)
 
 
+def flank_of(teeth: int, load_points: tuple[ToothFlank, Points], modes: Modes, statics: Statics) -> Flank:
+    """The flank of a body: its geometry and load points, rows of the modes and static tables at them."""
+    flank, points = load_points
+    return Flank(
+        teeth=teeth,
+        internal=flank.internal,
+        r_b=flank.r_b,
+        psi_b=flank.psi_b,
+        beta_b=flank.base_helix_angle,
+        face_width=flank.face_width,
+        strip_half_width=flank.strip_half_width,
+        roll_range=np.array(flank.roll_range),
+        roll=points.rolls,
+        diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
+        static=kept_offsets(statics.static_ff),
+        node=statics.static_fb,
+        tangent=tangent_of(modes, statics, points),
+    )
+
+
 def rim_sensor(body: SectorBody, modes: Modes) -> Sensors | None:
     """The patch of a ring's rim in sector 0; None of an external gear."""
     return Sensors(("rim",), body.patch_point[None], modes.patch_rows) if body.internal else None
@@ -126,7 +149,7 @@ def provenance(seconds: float) -> dict[str, Any]:
 
 
 def _peak_memory() -> float | None:
-    """Largest resident memory of this process so far; None where the system does not tell (Windows)."""
+    """Largest resident memory of this process so far; None where the system does not report it (Windows)."""
     if sys.platform == "win32":
         return None
     import resource

@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.apart import Work
-from gearfmu.body.body import Body, Flank, How, Node
+from gearfmu.body.body import Body, How, Node
 from gearfmu.body.former import GEAR_METHOD
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.parts import (
     Parts,
     drawn_counts,
-    kept_offsets,
+    flank_of,
     pictured_loads,
     provenance,
     rim_sensor,
     sector_picture,
-    tangent_of,
     tooth_flank,
 )
 from gearfmu.femesh import mesh_report, sector_mesh
@@ -43,7 +42,7 @@ Progress = Callable[[str, float], None]
 
 
 def gear_work(gear: ToothedBody) -> Work | None:
-    """What the reduction of a gear meshed here takes; None of one meshed elsewhere. Raises MeshError."""
+    """Memory and time for the reduction of a gear meshed here; None of one meshed elsewhere. Raises MeshError."""
     if gear.imported is not None:
         return None
     geometry = gear_shape(gear)
@@ -72,7 +71,7 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
         rows=made.modes.bore_rows,
         static=made.statics.static_bb,
         error=replace(made.error, ground=(node.name,)),
-        flank=_flank(geometry.z, made, flank, points),
+        flank=flank_of(geometry.z, (flank, points), made.modes, made.statics),
         spin=made.modes.spin,
         picture=made.picture,
         sensors=made.sensors,
@@ -84,28 +83,6 @@ def symmetric_mass(inertia: np.ndarray) -> np.ndarray:
     mass = np.zeros((6, 6))
     mass[:3, :3], mass[3:, 3:] = inertia[0, 0] * np.eye(3), inertia[3:, 3:]
     return mass
-
-
-def _flank(teeth: int, made: Parts, flank: ToothFlank, points: Points) -> Flank:
-    modes, statics = made.modes, made.statics
-    return Flank(
-        teeth=teeth,
-        internal=flank.internal,
-        r_b=flank.r_b,
-        psi_b=flank.psi_b,
-        beta_b=flank.base_helix_angle,
-        face_width=flank.face_width,
-        strip_half_width=flank.strip_half_width,
-        roll_range=np.array(flank.roll_range),
-        roll=points.rolls,
-        diameter=modes.nodal_diameter,
-        part=modes.part,
-        parity=modes.parity,
-        rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
-        static=kept_offsets(statics.static_ff),
-        node=statics.static_fb,
-        tangent=tangent_of(modes, statics, points),
-    )
 
 
 def _made_here(

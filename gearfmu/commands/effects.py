@@ -1,14 +1,19 @@
-"""The verb effects: the table of effects (stage/effects.py), with a stage what it has."""
+"""The verb effects: the table of effects (stage/effects.py), with a stage its own numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.shared import stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
+    from gearfmu.stage import StageModel
+    from gearfmu.stage.effects import Cost
 
 FIELDS = ("formula", "matters", "off", "switch", "code")
 
@@ -16,7 +21,7 @@ FIELDS = ("formula", "matters", "off", "switch", "code")
 @click.command()
 @click.argument("stage", required=False, shell_complete=stage_names)
 def effects(stage: str | None) -> None:
-    """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
+    """The effects there are: formula, when each matters, its price, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs
     from gearfmu.stage.run.inertia import NEGLECTED
 
@@ -35,7 +40,7 @@ def effects(stage: str | None) -> None:
         click.echo(f"  in the stage  {line}")
 
 
-def _cost(cost: Any) -> str:
+def _cost(cost: Cost | None) -> str:
     if cost is None:
         return "not measured"
     price = "" if math.isnan(cost.without) else f"; off, {cost.price_of_off:+.1%} against a kernel without it"
@@ -43,7 +48,7 @@ def _cost(cost: Any) -> str:
 
 
 def _numbers(stage: str) -> dict[str, str]:
-    """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
+    """Data of a stage for each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
     from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape
@@ -93,13 +98,13 @@ def _numbers(stage: str) -> dict[str, str]:
     }
 
 
-def _runout(gear: Any) -> str:
+def _runout(gear: ToothedBody) -> str:
     """Eccentricity and wobble of a gear."""
     eccentricity, wobble = (part.amount if part else 0.0 for part in (gear.eccentricity, gear.wobble))
     return f"{1e6 * eccentricity:g} µm with {1e6 * wobble:g} µrad"
 
 
-def _friction(mesh: Any) -> str:
+def _friction(mesh: EngagementSpec) -> str:
     """Law of a mesh."""
     if mesh.friction is None:
         return "none is stated: it costs nothing"
@@ -107,7 +112,7 @@ def _friction(mesh: Any) -> str:
     return f"coefficient {mesh.friction.coefficient:g}" if constant else f"law {mesh.friction.law}"
 
 
-def _film(stage: Any, mesh: Any) -> str:
+def _film(stage: Stage, mesh: EngagementSpec) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
@@ -116,8 +121,8 @@ def _film(stage: Any, mesh: Any) -> str:
     return f"takes {1e3 * film_stop(stage, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
 
-def _whirling(model: Any) -> str:
-    """What turning does to the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
+def _whirling(model: StageModel) -> str:
+    """Influence of rotation on the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
     from gearfmu.body import load_bodies
     from gearfmu.stage.run.inertia import WHIRL_BAND, whirling
 
@@ -130,7 +135,7 @@ def _whirling(model: Any) -> str:
 
 
 def _left_out(stage: str) -> Iterable[str]:
-    """Sizes of what is left out, a line for every gear whose file tells."""
+    """Sizes of neglected terms, a line for every gear whose file has them."""
     from gearfmu.commands.models import bodies_of
     from gearfmu.stage.build.observed import gear_bodies
     from gearfmu.stage.run.inertia import inertia_terms

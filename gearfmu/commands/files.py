@@ -1,14 +1,17 @@
-"""Verbs about files: inspect, schema."""
+"""Verbs about files: inspect, schema, convert."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import echo_pairs
+
+if TYPE_CHECKING:
+    from gearfmu.spec.forms.general import Stage
 
 UNITS = {
     "r_b": "m", "r_f": "m", "r_a": "m", "base_pitch": "m", "ring_least_tip_radius": "m", "gap_between_planets": "m",
@@ -21,8 +24,8 @@ UNITS = {
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def inspect(path: Path, as_json: bool) -> None:
-    """Say what FILE holds: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage. Lengths
-    in mm or µm, angles in degrees, speeds in rpm; with --json all in SI."""
+    """Show the contents of FILE: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage.
+    Lengths in mm or µm, angles in degrees, speeds in rpm; with --json all in SI."""
     if as_json:
         click.echo(json.dumps(facts_of(path), indent=2, ensure_ascii=False, default=str))
     else:
@@ -57,7 +60,7 @@ def _schema_text(kind: str) -> str:
 
 
 def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
-    """What the file at `path` holds, by its kind; plain: numbers in SI, else specs with quantities as text. Raises
+    """Contents of the file at `path`, by its kind; plain: numbers in SI, else specs with quantities as text. Raises
     GearfmuError for a file that is none of ours."""
     from gearfmu.errors import GearfmuError
 
@@ -72,7 +75,7 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 
 
 def _shipped(name: Path) -> Path:
-    """File of a shipped scene, or of a stage as `find_stage` knows it; an error that names all when there is none."""
+    """File of a shipped scene, or of a stage as `find_stage` finds it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
     from gearfmu.spec.reading.library import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
@@ -148,8 +151,8 @@ def _toml(path: Path) -> dict[str, Any]:
     }
 
 
-def _needs(stage: Any) -> Any:
-    """What the reduction of every body takes, estimated from its mesh; or why it cannot be meshed."""
+def _needs(stage: Stage) -> str | dict[str, dict[str, float]]:
+    """Unknowns and memory for the reduction of every body, estimated from its mesh; or why it cannot be meshed."""
     from gearfmu.body import body_needs
     from gearfmu.errors import MeshError
 
@@ -175,8 +178,8 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
     return {"file": found["file"], "kind": found["kind"], **own, **after}
 
 
-def in_units(found: Any, key: str = "") -> Any:
-    """Numbers whose unit the name does not tell as text with it, here in what follows from a stage and in bodies."""
+def in_units(found: object, key: str = "") -> Any:
+    """Numbers without a unit in their name as text with it, here in what follows from a stage and in bodies."""
     from gearfmu.units import quantity_text
 
     if isinstance(found, dict):
@@ -204,3 +207,15 @@ def _fmu(path: Path) -> dict[str, Any]:
         "platforms": list(fmpy.supported_platforms(str(path))),
         "variables": variables,
     }
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
+@click.argument("out", type=click.Path(path_type=Path), metavar="OUT")
+@click.option("--channel", "channels", multiple=True, metavar="NAME", help="Only this channel; may repeat.")
+def convert(path: Path, out: Path, channels: tuple[str, ...]) -> None:
+    """Write TRACE (the file, or the folder that holds trace.h5) as OUT in the format of its suffix: .csv, .mat
+    (MATLAB), .parquet, .uff or .unv (Universal File Format, data sets 58), .mf4 (ASAM MDF 4)."""
+    from gearfmu.api.results import convert as write
+
+    click.echo(write(path / "trace.h5" if path.is_dir() else path, out, channels or None))

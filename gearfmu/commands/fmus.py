@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import progress_bar, stage_names
+
+if TYPE_CHECKING:
+    from gearfmu.stage import StageModel
 
 OF_INPUT = ("torque", "speed")  # starts that are no parameters
 PORT_KINDS = ("spring", "torque", "fixed")
@@ -68,9 +71,8 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
     from gearfmu.api.results import windup_file, with_windup
-    from gearfmu.commands.models import model_in_scene, model_of
-    from gearfmu.commands.settings import parameters
-    from gearfmu.stage.run.windup import write_starts
+    from gearfmu.commands.models import model_in_scene, model_of, parameters
+    from gearfmu.stage.run.simulate import write_starts
 
     scene, observe = how.pop("scene"), how.pop("observe")
     if scene is not None:
@@ -95,8 +97,8 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
     click.echo(how_to_load(path, model))
 
 
-def how_to_load(path: Path, model: Any) -> str:
-    """What an importer connects, and how Python loads the FMU."""
+def how_to_load(path: Path, model: StageModel) -> str:
+    """Inputs for an importer to connect, and how Python loads the FMU."""
     names = [variable.name for variable in model.kernel_variables() if variable.causality == "input"]
     connect = f"connect {', '.join(names[:6])}{' …' if len(names) > 6 else ''}" if names else "it has no inputs"
     return (

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
+    from gearfmu.body import Body
     from gearfmu.spec.forms.general import Stage
     from gearfmu.stage import StageModel
 
@@ -35,7 +36,7 @@ def model_in_scene(scene: str, stage: str | None, observe: Sequence[str] = ()) -
         return assemble_in_scene(scene, stage, observe, progress)
 
 
-def bodies_of(stage: str) -> tuple[Stage, list[Any]]:
+def bodies_of(stage: str) -> tuple[Stage, list[Body]]:
     """The numbers of STAGE and its bodies (`api.reduce`)."""
     from gearfmu.api.models import load, reduce
 
@@ -44,7 +45,7 @@ def bodies_of(stage: str) -> tuple[Stage, list[Any]]:
         return spec, reduce(spec, progress=progress)
 
 
-def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list[Any]]:
+def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list[Body]]:
     """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are
     not the stage's own."""
     from gearfmu.api.models import bodies_folder, load, reduced_to_move
@@ -61,7 +62,7 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list
 @contextmanager
 def reducing(title: str = "reducing") -> Iterator[Progress]:
     """A progress function for the reduction of bodies: a bar on a terminal, else a line on standard error for every
-    body that is being made, and every ten seconds one that says what is being done and how far it is."""
+    body that is being made, and every ten seconds one with the present task and its share done."""
     with progress_bar(title, named=_body) as progress:
         yield progress
 
@@ -72,5 +73,24 @@ def _body(text: str) -> str:
 
 
 def by_text(progress: Progress) -> Callable[[str, float], None]:
-    """The progress function of reduce_bodies, called with (what is being done, share done)."""
+    """The progress function of reduce_bodies, called with (present task, share done)."""
     return lambda text, share: progress(share, text)
+
+
+def parameters(model: StageModel, settings: tuple[str, ...], option: str = "--set") -> dict[str, float]:
+    """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for names that the
+    model lacks, SpecError for numbers out of range."""
+    from gearfmu.errors import ModelError
+    from gearfmu.stage.run import steady
+
+    model.kernel_variables()  # a model that the kernel refuses is not the option's fault
+    pairs = (text.partition("=") for text in settings)
+    try:
+        return steady.parameters(model, {name: value for name, _, value in pairs})
+    except ModelError as error:
+        raise click.BadParameter(str(error), param_hint=option) from None
+
+
+def level_of(model: StageModel, level: str | None) -> dict[str, float]:
+    """The kernel parameter of --level; none where it is not given."""
+    return parameters(model, (f"level={level}",), "--level") if level else {}

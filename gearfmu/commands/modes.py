@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,7 +14,9 @@ from gearfmu.commands.shared import Quantity, progress_bar, stage_names
 from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
+    from gearfmu.modes.linear import StageModes
     from gearfmu.modes.shapes import BodyModes
+    from gearfmu.report.campbell import Crossing
     from gearfmu.spec.forms.general import Stage
 
 
@@ -87,7 +89,7 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     click.echo(f"{paths[0]}, {paths[1]}")
 
 
-def stage_table(found: Any) -> list[str]:
+def stage_table(found: StageModes) -> list[str]:
     """The linearised stage's modes as lines of a table, means over the pitch; of a train the largest mesh force."""
     lines = [f"linearised at {found.torque:g} N·m, {len(found.position)} positions of one pitch",
              "  mode  frequency   lowest  highest  damping     mesh force    strain energy in %",
@@ -108,9 +110,9 @@ def stage_table(found: Any) -> list[str]:
     return lines
 
 
-def crossing_lines(found: Any, shaft: str, several: bool) -> list[str]:
+def crossing_lines(found: Iterable[Crossing], shaft: str, several: bool) -> list[str]:
     """A line for each mode and each kind of equal meshes: the orders that meet it, and where. several: the stage has
-    several meshes, whose names are told."""
+    several meshes, whose names are given."""
     lines: dict[tuple[str, int], list[str]] = {}
     for crossing in found:
         rpm = 30 / math.pi * crossing.speed
@@ -121,7 +123,7 @@ def crossing_lines(found: Any, shaft: str, several: bool) -> list[str]:
     ]
 
 
-def table(body: Any) -> list[str]:
+def table(body: BodyModes) -> list[str]:
     """The modes as lines of a table."""
     lines = ["    mode    frequency  damping  nodal      motion        energy in %              shape",
              "                   Hz        %  diameters                radial tangent. axial"]  # fmt: skip
@@ -176,7 +178,7 @@ def _check(name: str, names: Sequence[str]) -> None:
         raise click.BadParameter(f"no body '{name}'; the stage has {', '.join(names)}", param_hint="--body")
 
 
-def _write(body: Any, out: Path) -> None:
+def _write(body: BodyModes, out: Path) -> None:
     """Table, contact sheet, and a picture and a .vtu a frequency."""
     from gearfmu.modes.vtu import write_mode
     from gearfmu.report.modes import mode_columns, write_contact_sheet, write_mode_picture

@@ -70,7 +70,7 @@ class _Teeth(click.ParamType):
 @click.option("--relief", type=Quantity("relief"), help='Tip relief of these gears: "20 um", parabolic.')
 @click.option("--torque", type=Quantity("torque_max"), help="Largest torque of the pinion or the carrier.")
 @click.option("--speed", type=Quantity("speed_max"), help="Largest speed of the pinion or the carrier.")
-def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: Any) -> int:
+def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: object) -> int:
     """Write NAME/stage.toml, every field commented: from numbers of teeth, module and face width with everything else
     proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
     from gearfmu.spec.proposals.new import new_stage

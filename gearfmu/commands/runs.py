@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,18 @@ import click
 from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
 
 if TYPE_CHECKING:
+    from gearfmu.body import Body
     from gearfmu.spec.forms.general import Stage
     from gearfmu.spec.scene import SceneSpec
+    from gearfmu.stage import Trace
+    from gearfmu.stage.run.deformation import Deformation
 
 DEMO_STEP = 20e-6  # s
 OUT = click.Path(path_type=Path, file_okay=False)
 
 
-def _list(context: click.Context, option: Any, wanted: bool) -> None:
-    """Print the shipped scenes and what they show, and end."""
+def _list(context: click.Context, option: object, wanted: bool) -> None:
+    """Print the shipped scenes with their descriptions, and end."""
     if not wanted or context.resilient_parsing:
         return
     from gearfmu.spec.scene import load_scene, shipped_scenes
@@ -77,9 +81,10 @@ def run(scene: str | None, out: Path | None, stage: str | None, **how: Any) -> i
     return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=_unit(how), verify=how["verify"])
 
 
-def _unit(how: dict[str, Any]) -> Any:
+def _unit(how: Mapping[str, Any]) -> str | Path:
     """ "kernel", "fmu" or the path of an FMU."""
-    return how["unit"] if how["fmu_path"] is None else how["fmu_path"]
+    unit: str | Path = how["unit"] if how["fmu_path"] is None else how["fmu_path"]
+    return unit
 
 
 @click.command()
@@ -119,16 +124,15 @@ def _unit(how: dict[str, Any]) -> Any:
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque."""
-    from gearfmu.commands.models import model_of
-    from gearfmu.commands.settings import parameters
+    from gearfmu.commands.models import model_of, parameters
     from gearfmu.spec.tables.profile import read_profile
-    from gearfmu.stage.run.steady import Drive, steady_run
+    from gearfmu.stage.run.steady import LoadCase, steady_run
 
     level = drive.pop("level")
     settings = (*settings, f"level={level}") if level else settings
     if profile is None and (missing := [f"--{name}" for name in ("torque", "speed") if drive[name] is None]):
         raise click.UsageError(f"give {' and '.join(missing)}, or a --profile")
-    driven = Drive(**drive, profile=None if profile is None else read_profile(profile))
+    driven = LoadCase(**drive, profile=None if profile is None else read_profile(profile))
     model = model_of(stage)
     with progress_bar(model.name) as progress:
         trace = steady_run(model, driven, parameters(model, settings), progress)
@@ -225,8 +229,8 @@ def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:
     return finish(trace, out, None, prepared)
 
 
-def run_plan(path: Path, out: Path | None, unit: Any) -> int:
-    """Run a plan.toml, print what became of it; 0 when the run reached its end, else 1."""
+def run_plan(path: Path, out: Path | None, unit: str | Path) -> int:
+    """Run a plan.toml, print its outcome; 0 when the run reached its end, else 1."""
     from gearfmu.api.plans import run_plan as run_it
     from gearfmu.planning.book import Plan
     from gearfmu.planning.table import run_text
@@ -239,7 +243,7 @@ def run_plan(path: Path, out: Path | None, unit: Any) -> int:
     return finish(trace, folder, None)
 
 
-def finish(trace: Any, out: Path, stage: str | None, prepared: float | None = None) -> int:
+def finish(trace: Trace, out: Path, stage: str | None, prepared: float | None = None) -> int:
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
     else 1. stage : as of `api.write_report`. prepared : processor time (s) of the work around the simulation, to be
     shown."""
@@ -262,7 +266,7 @@ def finish(trace: Any, out: Path, stage: str | None, prepared: float | None = No
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
-def write_deformed(deformation: Any, folder: Path, spec: Stage, reduced: Any) -> list[Path]:
+def write_deformed(deformation: Deformation, folder: Path, spec: Stage, reduced: Sequence[Body]) -> list[Path]:
     """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd. spec, reduced : the stage and its
     bodies."""
     from gearfmu.modes.deformed import deformed_gear
@@ -276,7 +280,7 @@ def write_deformed(deformation: Any, folder: Path, spec: Stage, reduced: Any) ->
     return [write_series(gear, deformation.time, folder) for gear in gears]
 
 
-def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = None) -> Path:
+def write_report(trace: Trace, out: Path, stage: str | None, home: Path | None = None) -> Path:
     """`api.write_report`, its remark on standard error."""
     from gearfmu.api.results import write_report as write
 

@@ -1,4 +1,4 @@
-"""What several verbs share: quantities with units as options, progress bars, printing of name–value lists."""
+"""Shared by several verbs: quantities with units as options, progress bars, printing of name–value lists."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -33,7 +32,7 @@ class Quantity(click.ParamType):
         """As the option takes it: click would write the unit in capitals."""
         return self.name
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """SI value of the text; a usage error when number or unit are missing or of another kind, SpecError where it
         is out of range."""
         if isinstance(value, float):
@@ -97,7 +96,7 @@ def progress_bar(title: str, named: Callable[[str], str] | None = None) -> Itera
 
 
 class Told:
-    """Lines of progress on standard error: one every `_EVERY` seconds that says what is being done, how far it is and
+    """Lines of progress on standard error: one every `_EVERY` seconds with the present task, its share done and
     for how long nothing new was heard; and one for every new `named(text)`, where that is given."""
 
     def __init__(self, title: str, named: Callable[[str], str] | None = None) -> None:
@@ -114,7 +113,7 @@ class Told:
         self._end.set()
 
     def __call__(self, fraction: float | None, text: str = "") -> None:
-        """What is done now, and the share of it that is done; None where that is not known."""
+        """The present task, and the share of it that is done; None where that is not known."""
         text, share = text.removeprefix(f"{self.title} "), "" if fraction is None else f"{100 * fraction:.0f} %"
         self._doing, self._heard = ", ".join(part for part in (text, share) if part), time.monotonic()
         if self._named and (part := self._named(text)) not in self._seen:
@@ -124,7 +123,7 @@ class Told:
             self._tell_if_due()
 
     def _beat(self) -> None:
-        """Tells also while nothing is heard."""
+        """Reports also while no news arrives."""
         while not self._end.wait(0.1 * _EVERY):
             self._tell_if_due()
 
@@ -138,7 +137,7 @@ class Told:
             click.echo(f"{self.title} {self._doing or 'at work'}{since}", err=True)
 
 
-def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
+def echo_pairs(pairs: Mapping[str, object], indent: str = "") -> None:
     """Print a nested name–value mapping, aligned; numbers with six digits."""
     width = max((len(str(key)) for key in pairs), default=0)
     for key, value in pairs.items():
@@ -151,7 +150,7 @@ def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
             click.echo(f"{indent}{key:<{width}}  {_shown(value)}")
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, (list, tuple)):

@@ -28,16 +28,12 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 @click.option("--quick", is_flag=True, help="Few points on a short window.")
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes.")
 def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
-    """Error and price of the fidelity levels in SCENE, of a pair or planetary set, over the internal step and the
-    slices."""
+    """Error and price of the fidelity levels in SCENE over the internal step and the slices."""
     from gearfmu.commands.models import bodies_for_motion
     from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.stage import load_stage, require_pair
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):
-        if not (stage := load_stage(name)).carriers:
-            require_pair(stage)
         bodies_for_motion(name)
     for spec in specs:
         _errors(spec, out, quick, jobs)

@@ -1,12 +1,14 @@
-"""The verb sweep: many points into one table, and its pictures and page."""
+"""Verbs over many runs: sweep, many points into one table, its pictures and page; plan, settings by an error budget."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.runs import changed_scene
+from gearfmu.commands.shared import Quantity, progress_bar, scene_names
 
 
 @click.command()
@@ -34,10 +36,10 @@ def sweep(
     is taken as by 'te' (Harris map). Keys: torque, speed; stage.<field of the stage file>; of a scene its fields; of a
     stage duration, step, settle, positions, pitches and parameters of docs/variables.md. An interrupted sweep goes on
     when it is called again. Exit code: the number of points that failed (at most 99)."""
-    from gearfmu.api.sweeps import sweep as run_sweep
+    from gearfmu.api.plans import sweep as run_sweep
     from gearfmu.sweeps.charts import write_charts
     from gearfmu.sweeps.page import write_page
-    from gearfmu.sweeps.values import key_and_values
+    from gearfmu.sweeps.plan import key_and_values
 
     folder = out or Path("out") / f"sweep_{Path(subject).stem}"
     with progress_bar(f"sweep {subject}") as progress:
@@ -49,3 +51,40 @@ def sweep(
     failed = len(table.failures)
     click.echo(f"{len(table)} points" + (f", {failed} failed" if failed else ""))
     return min(failed, 99)
+
+
+@click.command()
+@click.argument("scene", shell_complete=scene_names)
+@click.option(
+    "--output", "outputs", multiple=True, required=True,
+    help="Judged outputs: te, bearing.pinion.fx, bearing.pinion, mesh.force …; may repeat.",
+)  # fmt: skip
+@click.option("--band", nargs=2, required=True, metavar="LOW HIGH", help='Where it is judged, "200 Hz" "5 kHz".')
+@click.option("--budget", help='Largest error of the levels in the band, "1 dB".')
+@click.option("--waveform", help='Largest error of the waveforms in the band after a common delay, "5 %".')
+@click.option("--stage", help="Another STAGE than the scene's.")
+@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
+@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
+@click.option("--step", type=Quantity("step"), help="Another communication step than the scene's.")
+@click.option(
+    "--may-drop", "force", multiple=True, metavar="EFFECT",
+    help="An effect that may be left out though it costs little: coast_flank; may repeat.",
+)  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default="plan.toml", show_default=True)
+@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Trials side by side.")
+@click.option("--scheduler", help="Address of a dask scheduler that runs the trials, tcp://host:8786.")
+@click.option("--fresh", is_flag=True, help="Plan anew, though this was planned before.")
+def plan(scene: str, outputs: tuple[str, ...], band: tuple[str, str], out: Path, **how: Any) -> int:
+    """Plan SCENE for an error budget: which effects, level, step and slices it needs. Writes plan.toml for
+    `gearfmu run --plan`; exit code 1 where no set but the full model keeps the budget."""
+    from gearfmu.api.plans import plan as make
+    from gearfmu.planning.table import plan_text
+
+    spec = changed_scene(scene, **{key: how.pop(key) for key in ("step", "stage", "torque", "speed")})
+    jobs, scheduler, force = how.pop("jobs"), how.pop("scheduler"), how.pop("force")
+    with progress_bar(spec.name) as progress:
+        how["tell"] = lambda text: progress(None, text)
+        found = make(spec, outputs, band, on=scheduler or jobs, may_drop=force, name=scene, **how)
+    click.echo(plan_text(found))
+    click.echo(found.save(out))
+    return 0 if all(segment.kept for segment in found.segments) else 1

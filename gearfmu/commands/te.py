@@ -1,4 +1,4 @@
-"""The verb te: loaded transmission error as a table and a picture."""
+"""Verbs on meshes under load: te, the transmission error as a table and a picture; efficiency, losses to friction."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity, level_option, progress_bar, stage_names
+from gearfmu.commands.shared import Quantity, echo_pairs, level_option, progress_bar, stage_names
 from gearfmu.errors import SimulationError
 
 if TYPE_CHECKING:
-    from gearfmu.stage import StageModel
+    from gearfmu.stage import StageModel, TeResult
 
 
 @click.command()
@@ -72,47 +72,55 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
-    from gearfmu.commands.settings import level_of
-
-    model = model_of(stage, bores=bore)
-    where |= level_of(model, where.pop("level"))
-    if doubled is None:
-        doubled = len(model.stage.engagements) == 1
-    if model.stage.carriers:
-        return _of_set(model, list(torques), out, doubled, **where)
+    from gearfmu.commands.models import level_of
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
 
-    meshes, failed = [mesh.name for mesh in model.stage.engagements], False
+    model = model_of(stage, bores=bore)
+    where |= level_of(model, where.pop("level"))
+    carried = bool(model.stage.carriers)
+    if where.pop("rigid_bearings"):
+        if carried:
+            raise click.BadParameter(
+                "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
+            )
+        where["effect.bearings"] = 0.0
+    meshes, failed = [None] if carried else [mesh.name for mesh in model.stage.engagements], False
     for mesh in meshes:
-        result = loaded_te(model, list(torques), mesh=mesh, **where)
+        with progress_bar(f"te {model.name}") as progress:
+            result = loaded_te(model, torques, mesh=mesh, progress=progress, **where)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
         write_columns(path, result.columns())
         picture = path.with_suffix(".png")
-        write_plot(result, picture, _unloaded(model, torques, mesh=mesh, **where))
+        write_plot(result, picture, None if carried else _unloaded(model, torques, mesh=mesh, **where))
         if len(meshes) > 1:
             click.echo(mesh)
-        _tell(result)
-        if doubled:
+        for torque, text in result.rows:
+            click.echo(f"{torque:>12}: {text}" if torque else f"{'':14}{text}")
+        if len(model.stage.engagements) == 1 if doubled is None else doubled:
             _tell_slices(model, torques, mesh, where)
+        for text in above_sharing(result, model.stage.load_sharing):
+            click.echo(f"warning: {text}", err=True)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
     _draw_flanks(model, out)
-    _end(model, torques, failed)
+    warn_of_limits(model, torques)
+    if failed:
+        click.get_current_context().exit(1)
 
 
 def _tell_slices(model: StageModel, torques: Sequence[float], mesh: str | None, where: Mapping[str, float]) -> None:
-    """What the number of slices of a helical stage leaves open, over one pitch."""
+    """Changes of the harmonics of a helical stage with twice the slices, over one pitch."""
     from gearfmu.stage.run.refinement import left_of_slices
 
-    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches", "rigid_bearings"}}
-    left = left_of_slices(model, torques, None, bool(where["rigid_bearings"]), mesh, **parameters)
+    parameters = {key: where[key] for key in where.keys() - {"positions", "pitches"}}
+    left = left_of_slices(model, torques, None, mesh, **parameters)
     if left is not None:
         click.echo(f"{'':14}{left.text}")
 
 
-def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
+def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> TeResult | None:
     """The transmission error without load, for the picture; None where it is among those asked for, or not found."""
     from gearfmu.stage import loaded_te
 
@@ -122,16 +130,9 @@ def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> Any:
         return None
 
 
-def _end(model: StageModel, torques: Sequence[float], failed: bool) -> None:
-    """Warnings; exit code 1 where a torque has no equilibrium."""
-    warn_of_limits(model, torques)
-    if failed:
-        click.get_current_context().exit(1)
-
-
 def _draw_flanks(model: StageModel, out: Path) -> None:
     """A picture of the flanks beside the table, where they are not nominal."""
-    from gearfmu.report.flanks import write_flanks
+    from gearfmu.report.te import write_flanks
 
     picture = out.with_name(f"{out.stem}_flanks.png")
     if write_flanks(model.stage, picture):
@@ -139,7 +140,7 @@ def _draw_flanks(model: StageModel, out: Path) -> None:
 
 
 def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
-    """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
+    """Say on standard error which torques (N·m) on the input are beyond the limits of the stage."""
     from gearfmu.stage.run.limits import beyond_limits
 
     for torque in torques:
@@ -147,44 +148,33 @@ def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
             click.echo(f"warning: {text}", err=True)
 
 
-def _of_set(model: Any, torques: list[float], out: Path, doubled: bool, **where: Any) -> None:
-    if where["rigid_bearings"]:
-        raise click.BadParameter(
-            "the load of a planetary set is shared by the compliance of its bearings", param_hint="--rigid-bearings"
-        )
-    from gearfmu.report.te import write_set_plot
-    from gearfmu.stage.run.set_te import set_te
-    from gearfmu.stage.run.trace import write_columns
-
-    with progress_bar(f"te {model.name}") as progress:
-        known = {name: where[name] for name in ("level",) if name in where}
-        result = set_te(model, torques, where["positions"], where["pitches"], progress, **known)
-    write_columns(out, result.columns())
-    picture = out.with_suffix(".png")
-    write_set_plot(result, picture)
-    _tell(result)
-    if doubled:
-        _tell_slices(model, torques, None, where)
-    for text in above_sharing(result, model.stage.load_sharing):
-        click.echo(f"warning: {text}", err=True)
-    click.echo(f"{out}, {picture}")
-    _draw_flanks(model, out)
-    _end(model, torques, any(result.failed))
-
-
-def above_sharing(result: Any, load_sharing: float) -> list[str]:
-    """Where a planet of a set carries more than the stage file's `load_sharing` says."""
-    from gearfmu.stage.run.set_te import GEARS
-
+def above_sharing(result: TeResult, load_sharing: float) -> list[str]:
+    """Where a planet of a set carries more than `load_sharing` of the stage file."""
     return [
         f"{torque:g} N·m: K_gamma {most:.3f} at the {gear}, above load_sharing = {load_sharing:g} of the stage file"
         for torque, factors in zip(result.torque, result.load_factor, strict=True)
-        for gear, most in zip(GEARS, factors, strict=True)
+        for gear, most in zip(result.centrals, factors, strict=True)
         if most > load_sharing
     ]
 
 
-def _tell(result: Any) -> None:
-    """One line a torque, of a set two more."""
-    for torque, text in result.rows:
-        click.echo(f"{torque:>12}: {text}" if torque else f"{'':14}{text}")
+@click.command()
+@click.argument("stage", shell_complete=stage_names)
+@click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
+@click.option(
+    "--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches of the slowest mesh."
+)
+@level_option
+def efficiency(stage: str, torque: float, speed: float, pitches: int, level: str | None) -> None:
+    """Efficiency of the meshes of STAGE at constant load: mean friction power of a run over whole pitches, and
+    P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction. Power
+    is that which rolls through a mesh: in a planetary set less than the input's.
+
+    The coefficient follows the stage file ([contact] friction), else it is 0.05. Losses of bearings, seals and
+    churned oil are in neither number."""
+    from gearfmu.commands.models import level_of
+    from gearfmu.stage.run.efficiency import mesh_efficiency
+
+    model = model_of(stage)
+    echo_pairs(mesh_efficiency(model, torque, speed, level_of(model, level), pitches=pitches).columns())

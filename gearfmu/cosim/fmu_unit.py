@@ -1,8 +1,12 @@
-"""FmuUnit: an FMI 2.0 co-simulation FMU as a unit, through fmpy's low-level interface with buffers taken once."""
+"""FmuUnit: an FMI 2.0 co-simulation FMU as a unit, through fmpy's low-level interface with buffers allocated once.
+
+Serialised states of our FMUs hold those of the kernel: the same bytes of gk_data, behind a head and the settings
+(src/fmi2/fmi2_state.c)."""
 
 from __future__ import annotations
 
 import shutil
+import struct
 import tempfile
 from collections.abc import Mapping, Sequence
 from ctypes import CFUNCTYPE, c_double, c_int, c_size_t, c_void_p, cast
@@ -36,6 +40,10 @@ from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationErro
 from gearfmu.kernel.binding import OUTCOMES, load
 from gearfmu.kernel.build import SUFFIX, host_platform
 
+HEAD = struct.Struct("<8sQQ64s3d4IQ")  # face_head of fmi2_face.h
+SIZE, CHECK, LAST_GOOD, MODE, BYTES = 1, 2, 6, 8, 11  # places in it
+CHECKED_FROM = struct.calcsize("<8sQQ")
+STEP_MODE = 4  # MODE_STEP
 KINDS = {
     "Real": ("Real", fmi2Real),
     "Integer": ("Integer", fmi2Integer),
@@ -144,7 +152,7 @@ class FmuUnit:
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         addLoggerProxy(byref(self._callbacks))
 
-    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    def _log(self, environment: object, name: bytes, status: int, category: bytes, message: bytes) -> None:
         self.messages.append(message.decode("utf-8", "replace"))
         del self.messages[:-MESSAGES_KEPT]
 
@@ -229,7 +237,7 @@ class FmuUnit:
                 handle.buffer[group.places] = group.view
         return handle.buffer
 
-    def read(self, call: str, references: Any, count: int, address: Any) -> None:
+    def read(self, call: str, references: object, count: int, address: object) -> None:
         """Values of variables of one type (Real, Integer, Boolean) to an address, which must have room for them.
         Raises FmuError when the FMU refuses."""
         if self._getters[call](self._component, references, count, address) > fmi2Warning:
@@ -314,3 +322,29 @@ def _address(function: Any) -> int:
     found = cast(function, c_void_p).value
     assert found is not None, "a function of a loaded library has an address"
     return found
+
+
+def kernel_bytes(state: bytes) -> bytes:
+    """The kernel's part of an FMU's serialised state, as `Kernel.save` gives it."""
+    head = HEAD.unpack_from(state)
+    return state[len(state) - head[BYTES] :]
+
+
+def with_kernel_bytes(fresh: bytes, kernel: bytes, time: float) -> bytes:
+    """The serialised state of an FMU in step mode at `time` (s): settings of `fresh`, the state of an instance that is
+    not initialised, and a state of the kernel with the same parameters."""
+    head = list(HEAD.unpack_from(fresh))
+    settings = fresh[HEAD.size : len(fresh) - head[BYTES]]
+    head[SIZE], head[BYTES] = HEAD.size + len(settings) + len(kernel), len(kernel)
+    head[CHECK], head[LAST_GOOD], head[MODE] = 0, time, STEP_MODE
+    body = HEAD.pack(*head) + settings + kernel
+    head[CHECK] = fnv(body[CHECKED_FROM:])
+    return HEAD.pack(*head) + settings + kernel
+
+
+def fnv(data: bytes) -> int:
+    """FNV-1a, 64 bit."""
+    check = 14695981039346656037
+    for byte in data:
+        check = ((check ^ byte) * 1099511628211) & 0xFFFFFFFFFFFFFFFF
+    return check

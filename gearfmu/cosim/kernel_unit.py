@@ -1,16 +1,21 @@
-"""KernelUnit: the kernel without an FMU around it, as a unit. Same library, same numbers as the FMU."""
+"""KernelUnit: the kernel without an FMU around it as a unit, same library, same numbers as the FMU; `Source`, which
+makes the unit of a run."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.kernel import Kernel
+from gearfmu.stage import StageModel
 
 
 class KernelHandle(NamedTuple):
@@ -119,8 +124,31 @@ class KernelUnit:
         self.kernel.restore(state)
 
     def adopt(self, other: KernelUnit) -> None:
-        """Instead of `initialize`: go on where `other` stands (`Kernel.adopt`)."""
+        """Instead of `initialize`: continue from the state of `other` (`Kernel.adopt`)."""
         self.kernel.adopt(other.kernel)
 
     def close(self) -> None:
         """Nothing to free: Python owns the memory."""
+
+
+class UnitSource(Protocol):
+    """A source of the stage of a run: its model, and a fresh unit of it with these start values."""
+
+    @property
+    def model(self) -> StageModel: ...
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit: ...
+
+
+@dataclass(frozen=True)
+class Source:
+    """The kernel itself (fmu_path None) or an FMU; the model it was made from."""
+
+    model: StageModel
+    fmu_path: Path | None = None
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit:
+        """A fresh instance with these start values."""
+        if self.fmu_path is None:
+            return KernelUnit(self.model.blob, parameters)
+        return FmuUnit(self.fmu_path, parameters)

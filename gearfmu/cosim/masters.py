@@ -1,12 +1,12 @@
-"""Masters: who steps when, with what. One stage (motion in, torque out) and one drivetrain (torque in, motion out).
+"""Masters: a stage (motion in, torque out) and a drivetrain (torque in, motion out) stepped in turn.
 
 gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion over the step with the stage's last mean
          torque and take it back. (2) Step the stage along that motion: φ, w at the start, and the constant
          acceleration that ends at the predicted angle. (3) Step the drivetrain with the stage's mean torque of this
          very step. The momentum that crosses the cut is exact; the motion errs by O(H³) in a step: second order, no
          rollback of the stage, stable for ωH < 2, ω of the softest spring of the cut against the inertia behind it.
-jacobi   What importers do: all outputs are exchanged at the communication points and held. First order; second with
-         `tau_next` held instead of `tau` (Wiring).
+jacobi   The usual way of importers: all outputs are exchanged at the communication points and held. First order; second
+         with `tau_next` held instead of `tau` (Wiring).
 
 A stage under known torques (`Loaded`) has no drivetrain to exchange with: `TorqueMaster`.
 
@@ -31,7 +31,7 @@ RATE = "_rate"  # a signal's rate is the input of its name with this ending
 
 @dataclass(frozen=True)
 class Wiring:
-    """What an importer connects: motion inputs of the stage, rates of its signals, and the torque output that jacobi
+    """Connections of an importer: motion inputs of the stage, rates of its signals, and the torque output that jacobi
     holds over a step ("tau" or "tau_next"). Start values of φ and w are given in any case; after them an input that is
     not connected stays as it is."""
 
@@ -53,7 +53,7 @@ class Cut:
 
 
 class _Exchange:
-    """Handles and buffers of a cut: `motion` is what the ports write, φ, w, a shaft by shaft."""
+    """Handles and buffers of a cut: `motion` is written by the ports, φ, w, a shaft by shaft."""
 
     def __init__(self, cut: Cut) -> None:
         self.cut, self.stage, wiring = cut, cut.stage, cut.wiring
@@ -96,7 +96,7 @@ class _Exchange:
             if self.rates:
                 self._known[len(self.signals) + k] = (last - first) / h if h else 0.0
 
-    def _send(self, inputs: tuple[Any, np.ndarray | slice]) -> None:
+    def _send(self, inputs: tuple[object, np.ndarray | slice]) -> None:
         handle, places = inputs
         self.stage.set(handle, self._values[places])
 
@@ -106,7 +106,7 @@ class _Exchange:
 
 
 class _Exchanging:
-    """What both masters of a cut save: the drivetrain, torques held on it, work done on it."""
+    """State that both masters of a cut save: the drivetrain, torques held on it, work done on it."""
 
     ports: Ports
 

@@ -18,12 +18,11 @@ from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.drivetrain import car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
-from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
@@ -45,7 +44,7 @@ WHOLE = Wiring()
 @dataclass(frozen=True)
 class Staged:
     """A scene with the model of its stage, whose ports are those that the scene's drivetrain needs. fmu : the FMU that
-    the model was taken from, None for one that was assembled; remarks : in what the FMU's ports differ."""
+    the model was taken from, None for one that was assembled; remarks : differences of the FMU's ports."""
 
     scene: SceneSpec
     model: StageModel
@@ -93,9 +92,9 @@ def run(
 
     unit : "fmu" (exported into out_dir) or "kernel". fmu_path : an FMU exported earlier, whose stage is run in place of
     the scene's (`Staged.of_fmu`).
-    verify : run again with half the communication step and estimate the coupling error. progress : told the done
-    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
-    [deformation]. The trace's meta is the summary: outcome "ok" or the name of what stopped the run, last good time,
+    verify : run again with half the communication step and estimate the coupling error. progress : called with
+    the part done, 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
+    [deformation]. The trace's meta is the summary: outcome "ok" or the reason of an early end, last good time,
     CPU time of the whole loop, energy residual of the cut, errors, hashes, versions. Raises CouplingError, SpecError,
     BodyError, FmuError when the run cannot begin.
     """
@@ -203,7 +202,7 @@ def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None 
 
 
 def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
-    """Of the stage: what the scene chooses and what follows from it."""
+    """Of the stage: values that the scene chooses or that follow from it."""
     choice = scene.stage
     return {
         "level": choice.level,

@@ -10,7 +10,7 @@ from typing import Any
 
 from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
-from gearfmu.cosim.source import Source
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.kernel.binding import status_words
 from gearfmu.spec.forms.turning import meshings
 from gearfmu.spec.scene import SceneSpec
@@ -25,7 +25,7 @@ COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "retried_st
 
 
 def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
-    """What was run, how it ended, what it cost, and where it came from.
+    """Subject of a run, its outcome, price and origin.
 
     errors : coupling error by channel, None when the run was not verified.
     """

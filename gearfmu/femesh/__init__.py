@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from gearfmu.femesh.mesh import FeMesh, FlankGrid
-from gearfmu.femesh.quality import mesh_report, scaled_jacobian, volume
+from gearfmu.femesh.quality import mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.ring import ring_sector, sector_mesh
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.femesh.vtu import write_vtu
 
 __all__ = [
     "FeMesh",

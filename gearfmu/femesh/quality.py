@@ -1,13 +1,16 @@
-"""Is a mesh good enough? Scaled Jacobian, volume, elements per load strip."""
+"""Quality of a mesh: scaled Jacobian, volume, elements per load patch; meshes as .vtu for ParaView."""
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
+import meshio
 import numpy as np
 
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh, FlankGrid
+from gearfmu.files import written_whole
 
 
 def scaled_jacobian(mesh: FeMesh) -> np.ndarray:
@@ -34,7 +37,7 @@ def flank_element_length(grid: FlankGrid, r_b: float) -> float:
 def mesh_report(mesh: FeMesh, r_b: float | None = None, strip_half_width: float | None = None) -> dict[str, Any]:
     """Plain facts of a mesh: counts, quality, volume (m³).
 
-    With the base radius r_b (m) also the length of its flank elements (m), with the load strip (m) how many lie in one.
+    With the base radius r_b (m) also the length of its flank elements (m), with the load patch (m) their number in one.
     """
     quality = scaled_jacobian(mesh)
     facts: dict[str, Any] = {
@@ -52,3 +55,30 @@ def mesh_report(mesh: FeMesh, r_b: float | None = None, strip_half_width: float 
         if strip_half_width is not None:
             facts["elements_per_strip"] = 2 * strip_half_width / length
     return facts
+
+
+def write_vtu(mesh: FeMesh, path: str | os.PathLike[str]) -> None:
+    """Write hexahedra and flank faces, whole or not at all.
+
+    Point data: `roll` (m, NaN off the flanks) and one 0/1 field per node set and cut. Cell data: `scaled_jacobian`
+    (NaN on faces) and `flank` (0 solid, +1/−1 the flank side).
+    """
+    roll = np.full(len(mesh.nodes), np.nan)
+    cells = [("hexahedron20", mesh.elements)]
+    quality, sides = [scaled_jacobian(mesh)], [np.zeros(len(mesh.elements))]
+    for side, grid in mesh.flank.items():
+        roll[grid.quads] = grid.roll
+        cells.append(("quad8", grid.quads))
+        quality.append(np.full(len(grid.quads), np.nan))
+        sides.append(np.full(len(grid.quads), 1.0 - 2.0 * side))
+    marked = dict(mesh.sets) | {"cut_minus": mesh.cut_minus, "cut_plus": mesh.cut_plus}
+    point_data = {"roll": roll} | {name: _marks(nodes, len(mesh.nodes)) for name, nodes in marked.items()}
+    with written_whole(path) as temporary:
+        grid = meshio.Mesh(mesh.nodes, cells, point_data, {"scaled_jacobian": quality, "flank": sides})
+        grid.write(temporary, file_format="vtu")
+
+
+def _marks(nodes: np.ndarray, count: int) -> np.ndarray:
+    marks = np.zeros(count)
+    marks[nodes] = 1.0
+    return marks

@@ -1,13 +1,27 @@
-"""modelDescription.xml of FMI 2.0, generated from the kernel's own table of variables."""
+"""modelDescription.xml of FMI 2.0, generated from the kernel's own table of variables, and terminalsAndIcons.xml
+(FMI 3.0, 2.4.9; in FMI 2.0 since 2.0.4): one terminal for each shaft.
+
+The kernel's table has one description for all instances of a variable; here each names its own. Members of a terminal
+carry the names of a rotational flange: `phi` and `tau` as in Modelica.Mechanics.Rotational.Interfaces, plus speed,
+acceleration and mean torque for accurate couplings. Which of them are inputs follows from the kind of port."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from xml.etree import ElementTree as ET
 
 from gearfmu.fmu.units import DISPLAY, base_exponents, unit_of
 from gearfmu.kernel import Variable
+from gearfmu.kernel.instance import INSTANCES
+from gearfmu.spec.forms.general import Stage
+
+OF_SUPPORT, OF_MODE = (13, 14, 15), 2**24  # numbers of the table; where references of amplitudes begin
+AXES = {"x": "along x", "y": "along y", "z": "along z", "rx": "about x", "ry": "about y", "rz": "about z"}
+LOADS = {f"{kind}{axis}": AXES[f"{tilt}{axis}"] for kind, tilt in (("f", ""), ("m", "r")) for axis in "xyz"}
+MEMBERS = ("phi", "w", "a", "tau", "tau_mean")
+KIND = "org.modelica.Modelica.Mechanics.Rotational.Interfaces.Flange_a"
 
 DEFAULT_STEP = 1e-4
 DEFAULT_STOP = 0.1
@@ -22,7 +36,7 @@ LOG_CATEGORIES = {
 
 @dataclass(frozen=True)
 class Identity:
-    """What modelDescription.xml says about the FMU as a whole.
+    """Entries of modelDescription.xml about the FMU as a whole.
 
     identifier: modelIdentifier, a C name; guid: of the model, checked by the binary; native: the binary needs
     nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/;
@@ -82,7 +96,7 @@ def enumeration_type(variable: Variable) -> str:
 
 
 def _capabilities(identity: Identity) -> dict[str, str]:
-    """Only what is real: input interpolation, output derivatives and directional derivatives are not offered."""
+    """No more than implemented: input interpolation, output derivatives and directional derivatives are not offered."""
     able = {
         "canHandleVariableCommunicationStepSize": True,
         "canGetAndSetFMUstate": True,
@@ -170,3 +184,68 @@ def _add_structure(root: ET.Element, variables: Sequence[Variable]) -> None:
     for index in indices:
         ET.SubElement(outputs, "Unknown", {"index": index, "dependencies": ""})
         ET.SubElement(initial, "Unknown", {"index": index})
+
+
+def named(variables: Sequence[Variable], stage: Stage) -> list[Variable]:
+    """The variables with descriptions that differ: "mesh of planet 3 with the ring: tooth pairs in contact"."""
+    subjects = {mesh.name: mesh_name(*mesh.gears) for mesh in stage.engagements}
+    subjects |= {f"{name}.gear": f"rotor {spoken(name)}" for name in stage.rotors}
+    subjects |= {name: f"shaft {spoken(name)}" for name in stage.ports}
+    return [replace(v, description=f"{subject}: {v.description}" if (subject := _subject(v, subjects)) else
+                    v.description) for v in variables]  # fmt: skip
+
+
+def spoken(name: str) -> str:
+    """planet3 → planet 3, input_shaft → input shaft."""
+    return re.sub(r"(?<=[A-Za-z])(?=\d)", " ", name).replace("_", " ")
+
+
+def mesh_name(first: str, second: str) -> str:
+    """The gear that there are several of comes first: "mesh of planet 3 with the ring"."""
+    one, other = sorted((first, second), key=lambda name: not name[-1:].isdigit())
+    return f"mesh of {spoken(one)} with {'' if other[-1:].isdigit() else 'the '}{spoken(other)}"
+
+
+def _subject(variable: Variable, subjects: dict[str, str]) -> str:
+    """Shaft, rotor, mesh, support or mode that a variable belongs to; "" for those of the whole stage."""
+    place, _, last = variable.name.rpartition(".")
+    if variable.reference >= OF_MODE:
+        gear, _, motion = place.partition(".")
+        return f"gear {spoken(gear)}, {f'rigid {AXES[last]}' if motion else spoken(last)}"
+    if variable.reference // INSTANCES in OF_SUPPORT:
+        return f"{spoken(place.replace('.', ' '))}, {(AXES | LOADS)[last.removesuffix('_mean')]}"
+    while place and place not in subjects:
+        place = place.rpartition(".")[0]
+    return subjects.get(place, "")
+
+
+def shafts(variables: Sequence[Variable]) -> dict[str, list[str]]:
+    """Names of the variables of each shaft's terminal, e.g. {"pinion": ["pinion.phi", …]}, in the order of MEMBERS."""
+    names = [v.name for v in variables if v.causality != "parameter"]
+    heads = [name.split(".")[0] for name in names if name.count(".") == 1 and name.endswith(".tau")]
+    return {head: [f"{head}.{m}" for m in MEMBERS if f"{head}.{m}" in names] for head in heads}
+
+
+def terminals_and_icons(variables: Sequence[Variable]) -> bytes:
+    """The XML document (UTF-8)."""
+    root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
+    terminals = ET.SubElement(root, "Terminals")
+    for shaft, names in shafts(variables).items():
+        terminal = ET.SubElement(
+            terminals,
+            "Terminal",
+            {
+                "name": shaft,
+                "matchingRule": "bus",
+                "terminalKind": KIND,
+                "description": f"rotational flange of shaft {shaft}; all angles about +z",
+            },
+        )
+        for name in names:
+            ET.SubElement(
+                terminal,
+                "TerminalMemberVariable",
+                {"variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"},
+            )
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

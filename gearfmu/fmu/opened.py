@@ -7,9 +7,8 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from gearfmu.body import body_hashes, load_bodies
+from gearfmu.body import Body, body_hashes, load_bodies
 from gearfmu.errors import BodyError, FmuError, ModelError, Problem, SpecError
 from gearfmu.fmu.stage_file import EXPORT_AGAIN, MODEL_FILE, STAGE_FILE, read_stage_file, refused
 from gearfmu.spec.forms.expand import with_ports
@@ -46,7 +45,7 @@ class OpenedFmu:
         more = [Problem(str(self.path), "", "", f"and {len(problems) - MOST_SHOWN} more differences")]
         return problems if len(problems) <= MOST_SHOWN else problems[:MOST_SHOWN] + more
 
-    def with_bodies(self, own: Stage) -> tuple[Stage, Sequence[Any]]:
+    def with_bodies(self, own: Stage) -> tuple[Stage, Sequence[Body]]:
         """The FMU's stage with the files and the reduced bodies that lie beside a stage file. own : the stage of that
         file. BodyError where its bodies are others than those of the FMU, SpecError where its files are."""
         if body_hashes(own) != self.model.body_hashes:

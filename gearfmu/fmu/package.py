@@ -1,4 +1,8 @@
-"""An FMU file from a stage model: XML from the kernel's table, the model blob, a byte copy of the kernel library."""
+"""An FMU file from a stage model: XML from the kernel's table, the model blob, a byte copy of the kernel library, and
+the kernel's C sources for platforms without a binary.
+
+FMI 2.0.4 has no build description; sources/buildDescription.xml has the form of FMI 3.0 (2.5.4), which newer importers
+read. Flags are those of the shipped binaries: with them gcc, clang and zig give the same bits."""
 
 from __future__ import annotations
 
@@ -10,21 +14,27 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TypedDict
+from xml.etree import ElementTree as ET
 
 from typing_extensions import Unpack
 
 from gearfmu.errors import FmuError
 from gearfmu.files import written_whole
-from gearfmu.fmu.description import Identity, model_description
+from gearfmu.fmu.description import Identity, model_description, named, terminals_and_icons
 from gearfmu.fmu.documentation import licences, page
-from gearfmu.fmu.naming import named
-from gearfmu.fmu.source_code import build_description, compiled, source_files
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
-from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.build import SUFFIX, BuildError, host_platform, library_path
+from gearfmu.kernel.build import FLAGS, HERE, SUFFIX, BuildError, fmi_headers, host_platform, library_path, sources
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.model import StageModel
+
+FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+SYSTEM_HEADERS = "errno float math stdarg stddef stdint stdio stdlib string".split()  # all that the sources include
+# At the head of every file that is compiled: what no attribute exports stays inside, whatever flags an importer takes
+HIDDEN = "".join(f"#include <{name}.h>\n" for name in SYSTEM_HEADERS) + (
+    "#if defined(__GNUC__) && !defined(_WIN32)\n#pragma GCC visibility push(hidden)\n#endif\n#line 1\n"
+)
+COMPILER_OPTIONS = " ".join(flag for flag in FLAGS if not flag.startswith("-W"))
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 RUNTIMES = ("native", "python")
@@ -32,7 +42,7 @@ LONGEST_NAME = 40
 
 
 class Extras(TypedDict, total=False):
-    """What an FMU may also carry. terminals : terminalsAndIcons.xml, which FMI Library 3 refuses in FMI 2
+    """Optional contents of an FMU. terminals : terminalsAndIcons.xml, which FMI Library 3 refuses in FMI 2
     (docs/howto-fmu.md). sources : the C sources of the binary and a build description (native only). author,
     copyright, license : of the model, for its description; nothing is said there without them."""
 
@@ -192,3 +202,32 @@ def _pythonfmu_folder() -> Path:
         return Path(str(metadata.distribution("pythonfmu").locate_file("pythonfmu")))
     except metadata.PackageNotFoundError:
         raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu") from None
+
+
+def source_files() -> dict[str, bytes]:
+    """Path below sources/ → content: the C files of the kernel, included files, and the headers of FMI 2."""
+    root = HERE / "src"
+    own = {path.relative_to(root).as_posix(): path for path in sources()}
+    head = {".c": HIDDEN.encode()}
+    return {name: head.get(path.suffix, b"") + path.read_bytes() for name, path in sorted(own.items())} | {
+        name: (fmi_headers() / name).read_bytes() for name in FMI_HEADERS
+    }
+
+
+def compiled(names: list[str]) -> list[str]:
+    """Those of the files that a compiler is given."""
+    return [name for name in names if name.endswith(".c")]
+
+
+def build_description(identifier: str, names: list[str]) -> bytes:
+    """buildDescription.xml for these files."""
+    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    options = {"language": "C99", "compiler": "gcc", "compilerOptions": COMPILER_OPTIONS}
+    files = ET.SubElement(configuration, "SourceFileSet", options)
+    for name in compiled(names):
+        ET.SubElement(files, "SourceFile", {"name": name})
+    ET.SubElement(files, "IncludeDirectory", {"name": "."})
+    ET.SubElement(configuration, "Library", {"name": "m", "external": "true"})
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Protocol
 
 
-def common_width(gears: Iterable[Any]) -> float:
-    """Common face width (m) of gears in mesh, of anything with a `face_width`."""
+class Wide(Protocol):
+    """Anything with a face width, m."""
+
+    @property
+    def face_width(self) -> float: ...
+
+
+def common_width(gears: Iterable[Wide]) -> float:
+    """Common face width (m) of gears in mesh."""
     return min(float(gear.face_width) for gear in gears)
 
 

@@ -11,8 +11,7 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh import FeMesh
-from gearfmu.modes.harmonics import main_harmonic
-from gearfmu.modes.shapes import BodyModes, Mode, cylindrical, energy_shares
+from gearfmu.modes.shapes import BodyModes, Mode, cylindrical, energy_shares, main_harmonic
 
 Progress = Callable[[str, float], None]
 

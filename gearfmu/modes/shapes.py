@@ -1,4 +1,4 @@
-"""Modes of one body with their shapes on its surface: what pictures, .vtu files and tables are made from."""
+"""Modes of one body with their shapes on its surface: the source of pictures, .vtu files and tables."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+
+MOST = 12
+CELLS = 24  # of radius and of width: points in one cell are compared with each other around the axis
 
 DRAWN = 0.05  # of the body's diameter: the largest displacement as it is drawn
 
@@ -39,7 +42,7 @@ class Mode:
 
     @property
     def name(self) -> str:
-        """What the shape is called: umbrella, torsion, breathing, tilting, …"""
+        """Name of the shape: umbrella, torsion, breathing, tilting, …"""
         radial, tangential, axial = self.energy
         if self.motion == "out-of-plane":
             return {0: "umbrella" if axial > 0.5 else "counter-torsion", 1: "tilting"}.get(
@@ -85,3 +88,40 @@ def cylindrical(points: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     c, s = (points[:, k] / np.where(radius > 0, radius, 1.0) for k in (0, 1))
     radial, tangential = c * vectors[:, 0] + s * vectors[:, 1], c * vectors[:, 1] - s * vectors[:, 0]
     return np.stack([radial, tangential, vectors[:, 2]], axis=1)
+
+
+def harmonic_shares(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Parts (MOST + 1,) of a shape's mean square that go with cos and sin of ν times the angle, ν = 0 … MOST.
+
+    points (P, 3) m of a body of revolution or nearly so, shape (P, 3). The cylindrical components of the points in each
+    ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time: where points lie at few
+    angles, as on bolts, several ν fit and the parts add up to more than 1.
+    """
+    angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
+    field = cylindrical(points, shape)
+    cell = _cells(radius) * CELLS + _cells(points[:, 2])
+    total, shares = (field**2).sum(), np.zeros(MOST + 1)
+    for number in np.unique(cell):
+        here = np.flatnonzero(cell == number)
+        for nu in range(MOST + 1):
+            basis = np.stack([np.cos(nu * angle[here]), np.sin(nu * angle[here])][: 2 if nu else 1], axis=1)
+            fitted = basis @ np.linalg.lstsq(basis, field[here], rcond=None)[0]
+            shares[nu] += (fitted**2).sum() / total
+    return shares
+
+
+def main_harmonic(points: np.ndarray, shape: np.ndarray, cyclic_index: int, sectors: int) -> tuple[int, float]:
+    """Nodal diameter of a mode of a cyclic body, and its share: `cyclic_index`, and 1, with many sectors; with few of
+    them the strongest of those with this index (ν = index, N − index, N + index …)."""
+    if sectors > MOST:
+        return cyclic_index, 1.0
+    possible = [nu for nu in range(MOST + 1) if 0 in ((nu - cyclic_index) % sectors, (nu + cyclic_index) % sectors)]
+    shares = harmonic_shares(points, shape)[possible]
+    return possible[int(np.argmax(shares))], float(shares.max())
+
+
+def _cells(values: np.ndarray) -> np.ndarray:
+    """Number of each value's cell; cells are a little wider than the span over CELLS, and lie so that equal values but
+    for rounding share one."""
+    span = max(np.ptp(values), 1e-6 * np.abs(values).max())
+    return ((values - values.min()) / span * (CELLS - 1) + 0.37).astype(int)

@@ -1,9 +1,10 @@
-"""A plan as a value and as plan.toml: what every segment is run with, and why."""
+"""A plan as a value and as plan.toml: settings of every segment, with reasons; plans that were made before."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -54,7 +55,7 @@ class Segment:
     was taken over settled before, s; bound, error: of the chosen set, budgets; safety: what the bound is multiplied by;
     noise: of the full model, budgets; price: processor time of the stage over that of level fast at its default step;
     realtime: processor seconds of the stage per simulated second. price_full, price_default, error_default: of the full
-    model and of what the scene asks for itself.
+    model and of the outputs that the scene itself records.
     """
 
     name: str
@@ -142,13 +143,36 @@ def _toml(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     return found
 
 
-def _tables(value: Any) -> bool:
+def _tables(value: object) -> bool:
     return isinstance(value, (list, tuple)) and bool(value) and isinstance(value[0], dict)
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, float):
         return "nan" if math.isnan(value) else str(value)
     return json.dumps(value, ensure_ascii=False)
+
+
+def kept_plan(identity: str) -> Plan | None:
+    """The plan that was made before for the same model, scene, outputs, budget and kernel; None where there is none
+    that can be read."""
+    try:
+        return Plan.load(_kept_at(identity))
+    except SpecError:
+        return None
+
+
+def keep_plan(plan: Plan) -> Plan:
+    """The plan, also kept in $GEARFMU_CACHE/plans or the user's cache folder, where that can be written."""
+    try:
+        plan.save(_kept_at(plan.identity))
+    except OSError:
+        pass
+    return plan
+
+
+def _kept_at(identity: str) -> Path:
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Path(os.environ.get("GEARFMU_CACHE") or caches / "gearfmu") / "plans" / f"{identity[:32]}.toml"

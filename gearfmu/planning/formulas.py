@@ -1,6 +1,6 @@
-"""What an effect should cost in error, before anything is run: relative errors in the band.
+"""Expected error of each effect left out, before anything is run: relative errors in the band.
 
-They choose where the search begins, and stand in the table beside what is measured; only trial runs decide. An effect
+They choose where the search begins, and are listed beside the measured errors; only trial runs decide. An effect
 names its formula in the table of effects (`Effect.indicator`). One that names none is solved for quasi-statically:
 transmission error over a pitch with and without it, relative to its alternating part.
 """
@@ -23,7 +23,7 @@ from gearfmu.stage import StageModel
 from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.te import loaded_te
 
 POSITIONS = 16
 DECIBEL = 20.0 / math.log(10.0)  # of a small relative error
@@ -33,7 +33,7 @@ UNKNOWN = float("nan")
 
 @dataclass(frozen=True)
 class Conditions:
-    """What formulas are told: the stage, the request, mean force of the first mesh (N), speed of the input and of a
+    """Arguments of the formulas: the stage, the request, mean force of the first mesh (N), speed of the input and of a
     carrier (rad/s, 0 without one), mesh frequency (Hz), the full run."""
 
     model: StageModel
@@ -122,10 +122,10 @@ FORMULAS: dict[str, Callable[[Conditions], float]] = {
 
 
 def _quasi_static(settings: dict[str, float], known: Conditions) -> float:
-    """rms of what the transmission error changes over a pitch, its mean left out, over its own alternating part."""
+    """rms of the change of the transmission error over a pitch, its mean left out, over its own alternating part."""
     own: dict[str, Any] = {"slices": float(known.full.choice.slices)}
     try:
-        on, off = (stage_te(known.model, [known.torque], POSITIONS, **(own | more)).te[0] for more in ({}, settings))
+        on, off = (loaded_te(known.model, [known.torque], POSITIONS, **(own | more)).te[0] for more in ({}, settings))
     except GearfmuError:
         return UNKNOWN
     return float(np.std(off - on) / max(float(np.std(on)), 1e-15))

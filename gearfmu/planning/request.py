@@ -1,4 +1,4 @@
-"""What a plan is asked for: outputs of a scene, a band, and how wrong they may be there."""
+"""Request to a plan: outputs of a scene, a band, and how wrong they may be there."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from gearfmu.errors import GearfmuError, Problem, SpecError, near_or_all
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.run.set_te import set_error
+from gearfmu.stage.run.te import set_error
 from gearfmu.units import to_si
 
 WHERE = "plan"
-HIGHEST = 0.45  # of the sampling rate: what lies above is folded and filtered
+HIGHEST = 0.45  # of the sampling rate: higher frequencies are folded and filtered
 MEANS = ("fx", "fy", "fz", "mx", "my", "force")  # outputs that have a mean over the communication step beside them
 _SHARE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*(\S*)\s*$")
 
@@ -91,7 +91,7 @@ def _outputs(model: StageModel, names: Sequence[str], problems: list[Problem]) -
 
 
 def _judged(known: set[str]) -> list[str]:
-    """What is judged most: transmission errors and forces of meshes, supports with all their directions."""
+    """Outputs that are judged most: transmission errors and forces of meshes, supports with all their directions."""
     supports = {".".join(name.split(".")[:2]) for name in known if name.startswith(("bearing.", "pin.", "seat."))}
     return ["te", *sorted(n for n in known if n.endswith((".te", ".force"))), *sorted(supports)]
 

@@ -1,4 +1,4 @@
-"""What a planned run is stepped with: the kernel, or the exported FMU.
+"""Stepping of a planned run by the kernel, or by the exported FMU.
 
 Only kernels take a state over from another choice (`gk_adopt`), right after a step. A run that changes its choice is
 therefore remembered one communication step early, in the kernel's bytes, which an FMU's state holds too. A kernel makes
@@ -12,11 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from gearfmu.cosim.coupled import CoupledRun, Saved
-from gearfmu.cosim.fmu_state import kernel_bytes, with_kernel_bytes
-from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.fmu_unit import FmuUnit, kernel_bytes, with_kernel_bytes
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run
-from gearfmu.cosim.source import Source
 from gearfmu.planning.choice import Choice
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
@@ -46,7 +44,7 @@ class Road:
         unit.close()
 
     def keep(self, run: CoupledRun) -> Saved:
-        """Where a run stands, for `again`."""
+        """State of a run, for `again`."""
         saved = run.save()
         return saved if self.fmu is None else replace(saved, stage=kernel_bytes(saved.stage))
 

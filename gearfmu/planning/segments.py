@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import coupled_run, drive_of
-from gearfmu.cosim.source import Source
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Window, pilot_choice
 from gearfmu.planning.windows import LONGEST, first_window, whole_periods
@@ -61,7 +61,7 @@ def parts(scene: SceneSpec, model: StageModel, request: Request) -> Iterator[Par
 def _transient(
     name: str, span: tuple[float, float], scene: SceneSpec, known: tuple[StageModel, Request, float, float]
 ) -> Part:
-    """A part of a transient scene; its window lies in it, after settling where there is room."""
+    """A part of a transient scene; its window lies in it, after settling where it is long enough."""
     start, end = span
     length, settle = first_window(*known)
     room = end - start

@@ -1,4 +1,4 @@
-"""Trial runs: a choice over a window of a scene. What a worker computes, here or elsewhere; a run that fails is an
+"""Trial runs: a choice over a window of a scene. Computed by a worker, here or elsewhere; a run that fails is an
 infinite error, not an end.
 
 A trial does not begin at the start of the scene. A pilot, level fast with all effects, is run there once in every
@@ -15,9 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import Choice
 from gearfmu.planning.judge import Signals
@@ -40,7 +39,7 @@ SOLVER = ("solver.status", "energy.residual")
 
 @dataclass(frozen=True)
 class Window:
-    """start, length: s of the scene; settle: s before it that a trial takes to forget what it took over."""
+    """start, length: s of the scene; settle: s before it in which a trial forgets its initial state."""
 
     start: float
     length: float
@@ -53,7 +52,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Task:
-    """One trial: scene (as JSON), choice, window, what is asked; priced: whether the price is measured by replay, in
+    """One trial: scene (as JSON), choice, window, request; priced: whether the price is measured by replay, in
     turn with that of level fast, or read off the run itself; through: a choice that the state passes through for one
     communication step, which makes a twin of a run."""
 
@@ -68,7 +67,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Trial:
-    """What a trial gave. signals: over the window, empty after a failure; lost: s without contact in the window, of the
+    """Result of a trial. signals: over the window, empty after a failure; lost: s without contact in the window, of the
     worst mesh; coast: whether both flanks of a mesh carried; drive: smallest force on the carrying flanks over its
     mean; force: mean of the first mesh, N; price: processor time of the stage over that of level fast at its default
     step; realtime: processor seconds of the stage per simulated second; cpu: processor seconds of
@@ -123,7 +122,7 @@ def shortened(scene: SceneSpec, end: float) -> SceneSpec:
 
 
 def pilot_choice(scene: SceneSpec) -> Choice:
-    """What states are made with: level fast, all effects of the scene."""
+    """Choice for the states: level fast, all effects of the scene."""
     off = tuple(sorted(scene.stage.effects.off))
     return Choice(PILOT_LEVEL, fitting(scene.coupling.step, PILOT_STEP), scene.stage.slices, off)
 
@@ -188,7 +187,7 @@ def scene_and_model(text: str) -> tuple[SceneSpec, StageModel]:
 
 @lru_cache(maxsize=2)
 def _base(text: str) -> Replay:
-    """What prices are measured in turn with: level fast at its default step."""
+    """Reference of prices, measured in turn: level fast at its default step."""
     scene, model = scene_and_model(text)
     part = shortened(scene, BASE_STEPS * scene.coupling.step).model_copy(update={"settle": 0.0})
     choice = Choice("fast", 0.0, scene.stage.slices, scene.stage.effects.off)
@@ -269,7 +268,7 @@ def _one_step(before: CoupledRun, run: CoupledRun) -> CoupledRun:
 
 
 def _judged(task: Task, part: Trace, meshes: Sequence[str], price: Price) -> Trial:
-    """What the trace of the window says."""
+    """Results from the trace of the window."""
     interval = float(part.time[1] - part.time[0])
     values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in task.request.outputs}
     lost = max(float(part[f"{mesh}.open_time"][-1] - part[f"{mesh}.open_time"][0]) for mesh in meshes)

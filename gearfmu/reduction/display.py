@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from gearfmu.fem import surface
+from gearfmu.femesh.mesh import FeMesh
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Outline:
     sample: sp.csr_array
 
 
-def outline(drawn: Any, nodes: np.ndarray) -> Outline:
+def outline(drawn: FeMesh, nodes: np.ndarray) -> Outline:
     """Surface of the coarse sector mesh `drawn`: the corners of its outer faces.
 
     nodes (N, 3): the finite-element mesh of the same sector, from whose four nearest nodes the points take their

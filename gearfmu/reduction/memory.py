@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from gearfmu.errors import MeshError
+from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.spec.forms.planetary import CarrierMeshSpec
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 
-_BASE = 0.2e9  # bytes of the program with its packages, and of what is small
+_BASE = 0.2e9  # bytes of the program with its packages, and of small arrays
 _FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand
 _SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector and in its coordinates
-_WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
+_WHOLE_FACTOR = 30.0  # of the factor of a whole body: measured 29 to 33
 _SPACE = 36  # fields of the space of low modes per mode of a family
 CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
 _PART_FACTORS = 3  # of one of its equal parts, in single precision: K and at the last two points
@@ -42,19 +45,19 @@ class Need:
 
 @dataclass(frozen=True)
 class ReductionSize:
-    """What the memory of a gear's reduction grows with beside its mesh: teeth, modes stored, loads on one tooth."""
+    """Sizes beside the mesh that the memory of a reduction grows with: teeth, modes stored, loads on one tooth."""
 
     teeth: int
     modes: int
     loads: int
 
 
-def gear_need(sector: Any, body: Any) -> Need:
-    """Need of a gear: its sector (FeMesh) and what a spec says about the reduction (BodySpec)."""
+def gear_need(sector: FeMesh, body: BodySpec) -> Need:
+    """Need of a gear: its sector (FeMesh) and counts of the reduction (BodySpec)."""
     return sector_need(sector, ReductionSize(sector.teeth, body.modes, 2 * body.roll_points * body.width_functions))
 
 
-def sector_need(sector: Any, size: ReductionSize) -> Need:
+def sector_need(sector: FeMesh | CyclicCut, size: ReductionSize) -> Need:
     """Need of a gear that is reduced by cyclic symmetry; sector: its nodes, cut_minus and cut_plus."""
     cut, unknowns = 3 * len(sector.cut_minus), 3 * (len(sector.nodes) - len(sector.cut_plus))
     loads, family = 2 * size.loads, size.modes / size.teeth + 4
@@ -64,7 +67,7 @@ def sector_need(sector: Any, size: ReductionSize) -> Need:
 
 
 def available_memory() -> float | None:
-    """Bytes that programs can still take (MemAvailable); None where the system does not tell."""
+    """Bytes that programs can still take (MemAvailable); None where the system does not report it."""
     try:
         lines = _MEMORY_TABLE.read_text(encoding="ascii").splitlines()
     except OSError:
@@ -91,7 +94,7 @@ def modes_need(unknowns: int) -> Need:
 
 
 def require_memory(need: Need, remedy: str) -> None:
-    """MeshError where the memory is not there. remedy: what to lower."""
+    """MeshError where the memory is not there. remedy: counts to lower."""
     there = available_memory()
     if there is None or need.memory <= there:
         return
@@ -101,7 +104,7 @@ def require_memory(need: Need, remedy: str) -> None:
     )
 
 
-def lower_counts(counts: Any, table: str) -> str:
+def lower_counts(counts: MeshSpec | CarrierMeshSpec, table: str) -> str:
     """The remedy where element counts (MeshSpec, CarrierMeshSpec) of `table` can be lowered."""
     own = {name: value for name, value in counts.model_dump().items() if isinstance(value, int)}
     named = ", ".join(f"{name} = {value}" for name, value in own.items())

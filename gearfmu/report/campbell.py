@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from gearfmu.files import written_whole
 from gearfmu.modes.linear import GROUPS, StageModes
-from gearfmu.report.style import COLOURS, INK, MUTED, WIDTH, styled
+from gearfmu.report.style import COLOURS, INK, MUTED, WIDTH, styled, written
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.limits import engagements_per_turn
@@ -99,8 +98,7 @@ def write_campbell(modes: StageModes, name: str, families: Sequence[Family], spe
         axis.set(xlim=(0, limit), ylim=(0, top), xlabel=f"speed of the {name} in rpm", ylabel="frequency in Hz")
         axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS}", loc="right", color=MUTED)
         figure.legend(loc="outside upper left", ncols=4)
-        with written_whole(path) as temporary:
-            figure.savefig(temporary, dpi=150, format="png")
+        written(figure, path)
 
 
 def _orders(figure: Figure, label: str, each: float, ends: tuple[float, float], number: int) -> None:

@@ -1,4 +1,4 @@
-"""Which figures a run is told by: a pair or train mesh by mesh, a set planet by planet, a run-up by its orders."""
+"""Choice of a run's figures: a pair or train mesh by mesh, a set planet by planet, a run-up by its orders."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ import numpy as np
 
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
-from gearfmu.report import housing, mesh_cycle, plots, plots_nvh, plots_runup, plots_set
+from gearfmu.report import housing, mesh_cycle, planets, plots, plots_nvh, plots_runup
 from gearfmu.report.chart import Plot
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
-from gearfmu.report.plots_set import PlanetSet
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
 from gearfmu.stage.build.meshes import tooth_phases
@@ -29,11 +28,8 @@ def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
     """Every figure the run allows, and in words why others are not there."""
     deformed, gaps = _deformed(run)
     gaps = [*gaps, *run.statics[1]]
-    if run.planets is not None:
-        made, missing = _made(_of_set(run, run.planets, deformed))
-        return made, [*gaps, *missing]
-    made, missing = _made(_of_meshes(run, deformed))
-    if not run.angles:
+    made, missing = _made(_figures(run, deformed))
+    if not run.angles and run.planets is None:
         missing.append("No mesh orders: the trace has no gear speed or no tooth numbers.")
     return made, [*gaps, *missing]
 
@@ -59,17 +55,20 @@ def turning(run: Run) -> View | None:
     forces = [mesh for mesh in meshes(run.trace) if f"{mesh}.force" in run.trace]
     if run.stage is None or run.trace.time.size < 2 or not forces:
         return None
-    if run.planets is not None:
-        window = plots_set.detail_window(run.trace, run.planets, run.window)
-    else:
-        window = detail_window(run.trace, forces[0], run.angles.get(forces[0]))
+    window = _late(run) if run.planets else detail_window(run.trace, forces[0], run.angles.get(forces[0]))
     times = np.zeros(0) if run.deformation is None else run.deformation.time
     recorded = [(gear, times) for gear in deformed_gears(run)[0]]
     return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), window, recorded)
 
 
+def _late(run: Run) -> tuple[float, float]:
+    """The last mesh periods (s) of a set."""
+    assert run.planets is not None
+    return planets.detail_window(run.trace, run.planets, run.window)
+
+
 def _deformed(run: Run) -> tuple[list[Maker], list[str]]:
-    """What makes the pictures and films of deformed gears, and why others are missing."""
+    """Makers of pictures and films of deformed gears, and why others are missing."""
     gears, missing = deformed_gears(run)
     kinds = (drawn.pictures, drawn.film)
     assert run.deformation is not None or not gears
@@ -80,50 +79,31 @@ def _deformed(run: Run) -> tuple[list[Maker], list[str]]:
     ], missing
 
 
-def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
-    """A pair or a train."""
-    trace, window, names = run.trace, run.window, meshes(run.trace)
-    makers: list[Maker] = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
-    for mesh in names:
-        makers.append(partial(plots.mesh_force_and_error, trace, mesh))
-        makers.append(
-            partial(plots.mesh_force_and_error, trace, mesh, detail_window(trace, mesh, run.angles.get(mesh)))
-        )
-    makers += [lambda: plots.bearing_forces(trace), lambda: plots.axial_and_tilting(trace)]
+def _figures(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
+    """All figures: of a pair or train mesh by mesh, of a set its planets side by side."""
+    trace, window, own, angles = run.trace, run.window, run.planets, run.angles
+    makers: list[Maker] = [lambda: plots.torque_and_slip(trace)]
+    makers.append(partial(plots.speeds, trace, own.rotors if own else ()))
+    over_frequency: list[Maker]
+    if own is None:
+        for mesh in meshes(trace):
+            late = detail_window(trace, mesh, angles.get(mesh))
+            makers += [partial(plots.mesh_force_and_error, trace, mesh, part) for part in (None, late)]
+        over_frequency = [lambda: plots_nvh.force_spectrum(trace, window, angles)]
+    else:
+        makers += [partial(planets.forces, trace, own, part) for part in (None, _late(run))]
+        makers += [partial(make, trace, own, window) for make in (planets.planets, planets.sharing)]
+        makers.append(partial(plots.pin_forces, trace, own.planets))
+        over_frequency = [partial(plots_nvh.spectra_by_central, trace, own, window)]
+    makers += [partial(plots.bearing_forces, trace, own is not None), lambda: plots.axial_and_tilting(trace)]
     makers += _statics(run, [[mesh] for mesh in run.shown_meshes])
     makers += deformed
-    if run.run_up is not None:
-        makers += [partial(make, run.run_up) for make in plots_runup.FIGURES]
-    else:
-        makers.append(lambda: plots_nvh.force_spectrum(trace, window, run.angles))
-    makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in run.angles.items()]
-    if run.run_up is None:
-        makers.append(lambda: plots_nvh.force_spectrogram(trace, run.angles))
+    makers += [partial(plots.energy, trace)] if own else []
+    makers += over_frequency if run.run_up is None else [partial(make, run.run_up) for make in plots_runup.FIGURES]
+    if own is None:
+        makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
+        makers += [lambda: plots_nvh.force_spectrogram(trace, angles)] if run.run_up is None else []
     return makers + housing.figures(run)
-
-
-def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
-    """A planetary set: its planets side by side instead of mesh by mesh."""
-    trace, window = run.trace, run.window
-    over_frequency: list[Maker] = [lambda: plots_set.spectrum(trace, own, window)]
-    if run.run_up is not None:
-        over_frequency = [partial(make, run.run_up) for make in plots_runup.FIGURES]
-    return [
-        lambda: plots_set.speeds(trace, own),
-        lambda: plots.torque_and_slip(trace),
-        lambda: plots_set.forces(trace, own),
-        lambda: plots_set.forces(trace, own, plots_set.detail_window(trace, own, window)),
-        lambda: plots_set.planets(trace, own, window),
-        lambda: plots_set.sharing(trace, own, window),
-        lambda: plots_set.pin_forces(trace, own),
-        *_statics(run, [[mesh] for mesh in run.shown_meshes]),
-        *deformed,
-        lambda: plots.bearing_forces(trace, carried=True),
-        lambda: plots.axial_and_tilting(trace),
-        lambda: plots_set.energy(trace),
-        *over_frequency,
-        *housing.figures(run),
-    ]
 
 
 def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:

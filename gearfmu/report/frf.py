@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axis import Axis
 
 from gearfmu.reduction.transfer import Reference
 from gearfmu.report.style import COLOURS, INK, panels, saved, styled
@@ -44,11 +44,13 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
         return saved(figure, path)
 
 
-def error_curves(exact: Reference, found: Iterable[tuple[str, int, np.ndarray]]) -> tuple[str, dict[str, Any]]:
+def error_curves(
+    exact: Reference, found: Iterable[tuple[str, int, np.ndarray]]
+) -> tuple[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """The errors of (method, n, error (F,)) as the text of a CSV file (`method,n,frequency_Hz,error`), and as curves
     for `write_error_chart` with the norm of the exact transfer matrix."""
     frequency, lines = exact.judging.frequency, ["method,n,frequency_Hz,error"]
-    curves: dict[str, Any] = {"norm": (frequency, np.linalg.norm(exact.matrix, axis=(1, 2)))}
+    curves = {"norm": (frequency, np.linalg.norm(exact.matrix, axis=(1, 2)))}
     for method, size, error in found:
         lines += [f"{method},{size},{f:.6g},{e:.4e}" for f, e in zip(frequency, error, strict=True)]
         curves[f"{label_of(method)}, n = {size}"] = (frequency, error)
@@ -56,16 +58,16 @@ def error_curves(exact: Reference, found: Iterable[tuple[str, int, np.ndarray]])
 
 
 def label_of(method: str) -> str:
-    """A method's name for a legend; what follows a blank in `method` stays as it is."""
+    """A method's name for a legend; text behind a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
 
 
-def readable(axis: Any, powers: bool) -> None:
+def readable(axis: Axis, powers: bool) -> None:
     """Label the ticks of an axis as powers of ten or as plain numbers."""
     axis.set_major_formatter(_power if powers else "{x:g}")
     axis.set_minor_formatter("")
 
 
-def _power(value: float, _: int) -> str:
+def _power(value: float, _: float) -> str:
     return f"1e{round(np.log10(value))}"

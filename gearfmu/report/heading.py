@@ -1,4 +1,4 @@
-"""What a report begins with: the stage and its operating point, and the key numbers of a planetary set."""
+"""Head of a report: the stage and its operating point, and the key numbers of a planetary set."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.report import plots_set
 from gearfmu.report.mesh_cycle import face_load_factor, static_face_load_factor
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words
+from gearfmu.report.planets import shares
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
-from gearfmu.report.signals import GEAR_SPEED, input_shaft
+from gearfmu.report.signals import GEAR_SPEED, input_shaft, mesh_speed
 from gearfmu.spec.forms.general import Stage, ToothedBody
 
 PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
@@ -75,7 +75,7 @@ def of_set(run: Run) -> list[tuple[str, str]]:
         found.append(("Speeds, mean", words))
     if speeds.get("sun") and abs(speeds.get(own.carrier, 0.0)) > 1e-9:
         found.append(("Ratio, speed of the sun over that of the carrier", f"{speeds['sun'] / speeds[own.carrier]:.4g}"))
-    frequency = plots_set.mesh_speed(part, own) / (2 * math.pi)
+    frequency = mesh_speed(part, own) / (2 * math.pi)
     if frequency > 1e-3:
         found.append(("Mesh frequency", f"{frequency:.4g} Hz"))
     return found + _phasing(run) + _factors(run)
@@ -134,7 +134,7 @@ def _factors(run: Run) -> list[tuple[str, str]]:
     assert run.planets is not None
     found = []
     try:
-        means = plots_set.shares(run.trace, run.planets, run.window)[1]
+        means = shares(run.trace, run.planets, run.window)[1]
     except MetricsError:
         means = {}
     for central, meshes in run.planets.meshes.items():

@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from gearfmu.body import Body
 from gearfmu.files import write_text
@@ -26,7 +25,7 @@ RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")
 
 def write(
     trace: Trace,
-    summary: Mapping[str, Any],
+    summary: Mapping[str, object],
     out_dir: str | os.PathLike[str],
     spec: Stage | None = None,
     bodies: Sequence[Body] | None = None,
@@ -34,8 +33,8 @@ def write(
 ) -> Path:
     """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
 
-    trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
-    summary : fields of docs/file-formats.md; what is missing is shown as "not given".
+    trace : any subset of channels; figures of a missing channel are left out, with a remark where it matters.
+    summary : fields of docs/file-formats.md; missing ones are shown as "not given".
     spec : the stage, for tooth numbers; bodies : its Body objects, for statics and the turning gears;
     deformation : of gears at chosen times, drawn where bodies are given too. Raises OSError when the folder cannot be
     written.

@@ -18,10 +18,9 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 
 from gearfmu.fem.surface import shape as face_shape
-from gearfmu.files import written_whole
 from gearfmu.modes import BodyModes, Mode
 from gearfmu.modes.shapes import cylindrical
-from gearfmu.report.style import INK, MUTED, styled
+from gearfmu.report.style import INK, MUTED, styled, written
 
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
 _BRIGHT = np.linspace(0.06, 0.93, 256)  # of turbo, without its dark ends
@@ -60,8 +59,7 @@ def write_mode_picture(body: BodyModes, mode: Mode, path: Path) -> None:
             bar = figure.colorbar(ScalarMappable(norm, colours), ax=axis, shrink=0.6, aspect=26, pad=0.01)
             bar.outline.set_visible(False)
         figure.suptitle(f"{body.name}, {heading(mode)}", x=0.012, ha="left", color=INK, fontsize=12)
-        with written_whole(path) as temporary:
-            figure.savefig(temporary, dpi=150, format="png")
+        written(figure, path)
 
 
 def write_contact_sheet(body: BodyModes, path: Path) -> None:
@@ -79,8 +77,7 @@ def write_contact_sheet(body: BodyModes, path: Path) -> None:
         for axis in axes[len(modes) :]:
             axis.axis("off")
         figure.suptitle(f"{body.name}: the lowest {len(modes)} frequencies", x=0.012, ha="left", color=INK, fontsize=12)
-        with written_whole(path) as temporary:
-            figure.savefig(temporary, dpi=130, format="png")
+        written(figure, path, 130)
 
 
 def heading(mode: Mode, short: bool = False) -> str:

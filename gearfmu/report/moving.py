@@ -17,7 +17,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.body import Body
+from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.modes.deformed import DeformedGear
+from gearfmu.reduction.display import Picture
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
@@ -84,7 +86,7 @@ class View:
 
     @property
     def caption(self) -> str:
-        """What is seen, and what was left out."""
+        """Caption: visible bodies and omissions."""
         span = 1e3 * (self.time[-1] - self.time[0])
         text = (
             f"{span:.3g} ms of the run, slowed down; gears turn by their recorded angles. Elastic displacement under "
@@ -159,9 +161,10 @@ def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
     return found
 
 
-def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Drawn:
+def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray, phase: float) -> Drawn:
     (name, body), rotor = named, stage.rotor_of(named[0])
     display, carrier = body.picture, stage.carrier_of(rotor)
+    assert display is not None
     turned = _rotor_angle(trace, stage, rotor)
     assert turned is not None
     angle, (x, y) = np.interp(time, trace.time, turned), stage.rotors[rotor].axis
@@ -180,7 +183,7 @@ def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, 
 
 
 def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
-    """Angle (n,) rad of a rotor in the fixed axes; a rotor that stands does not turn."""
+    """Angle (n,) rad of a rotor in the fixed axes; a rotor at rest does not turn."""
     if stage.rotors[rotor].stands:
         return np.zeros(trace.time.size)
     return trace[f"{rotor}{GEAR_PHI}"] if f"{rotor}{GEAR_PHI}" in trace else None
@@ -221,7 +224,9 @@ def _load(
         body = made[name]
         body.contacts[mesh.name] = own
         if body.unit is None:
-            body.rolls, body.unit = _unit_loads(bodies[name].picture)
+            picture = bodies[name].picture
+            assert picture is not None
+            body.rolls, body.unit = _unit_loads(picture)
 
 
 def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
@@ -230,7 +235,7 @@ def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray)
     return np.zeros_like(time) if frame is None else np.interp(time, trace.time, trace[f"{frame}{GEAR_PHI}"])
 
 
-def _unit_loads(display: Any) -> tuple[np.ndarray, np.ndarray]:
+def _unit_loads(display: Picture) -> tuple[np.ndarray, np.ndarray]:
     """Rolls (R,) ascending and displacement (2, R, P, 3) m/N under unit loads on the flanks 0 and 1 of tooth 0."""
     order = np.argsort(np.asarray(display.load_roll, float))
     first, points = np.asarray(display.loads, float)[order], np.asarray(display.points, float)
@@ -280,7 +285,7 @@ def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
             body.extra = np.mean(own, axis=0)
 
 
-def _recede(body: Drawn, mesh: str, geometry: Any) -> np.ndarray:
+def _recede(body: Drawn, mesh: str, geometry: ReferenceGear) -> np.ndarray:
     """(F,) m, signed as the force: how far the loaded flanks of a gear yield at their contacts, mean over them."""
     if body.unit is None or body.rolls is None or mesh not in body.contacts:
         return np.zeros(FRAMES)
@@ -291,7 +296,7 @@ def _recede(body: Drawn, mesh: str, geometry: Any) -> np.ndarray:
     return np.asarray((force * np.interp(roll, body.rolls, yields)).sum(axis=1) / count)
 
 
-def _yield(points: np.ndarray, unit: np.ndarray, geometry: Any, roll: float) -> float:
+def _yield(points: np.ndarray, unit: np.ndarray, geometry: ReferenceGear, roll: float) -> float:
     """Displacement (m/N) along the normal where a unit load acts on flank 0 of tooth 0 at a roll (m)."""
     t = geometry.psi_b - roll / geometry.r_b
     radial, normal = np.array([math.cos(t), math.sin(t)]), np.array([-math.sin(t), math.cos(t)])

@@ -1,6 +1,6 @@
 """Arrays in a page: one block of bytes, compressed, that its script unpacks (`web/report.js`, function `unpack`).
 
-Numbers of even steps are told by their first and their step; up to EXACT of them are stored as doubles; longer curves
+Numbers of even steps are stored as the first and the step; up to EXACT of them are stored as doubles; longer curves
 in LEVELS steps of their range, as differences, high bytes and low bytes apart, which deflate packs three times closer
 than floats. Curves of more than MOST points are stored by the lowest and the highest of COLUMNS parts. The CSV files
 beside the page have every digit.
@@ -12,6 +12,7 @@ import base64
 import gzip
 import json
 import struct
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ EVEN = 1e-9  # of the whole range
 
 
 class Pack:
-    """Arrays and the plain structure that names them by number. `text()` is what the page carries."""
+    """Arrays and the plain structure that names them by number. The page carries `text()`."""
 
     def __init__(self) -> None:
         self._known: dict[bytes, int] = {}
@@ -55,7 +56,7 @@ class Pack:
         head += b" " * (-(4 + len(head)) % 8)
         return squeezed(struct.pack("<I", len(head)) + head + bytes(self._bytes))
 
-    def _once(self, key: bytes, make: Any) -> int:
+    def _once(self, key: bytes, make: Callable[[], dict[str, Any]]) -> int:
         if key not in self._known:
             head = make()
             self._known[key] = len(self._heads)

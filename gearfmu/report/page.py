@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearfmu.extras import MissingPackage
 from gearfmu.report.chart import Chart, Plot
@@ -14,10 +14,13 @@ from gearfmu.report.figures import chart_element, chart_numbers
 from gearfmu.report.packed import Pack, squeezed
 from gearfmu.report.results import REACHED_THE_END
 
+if TYPE_CHECKING:
+    from gearfmu.report.moving import View
+
 NO_SCRIPT = "A script inside this page draws the figures; it is switched off. Their data lie in the folder data."
 
 
-def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: Any = None) -> str:
+def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: View | None = None) -> str:
     """The whole document around the given parts. plots: those among them whose charts the script draws; stage: the
     numbers of the turning view (`moving.View`), None without one."""
     charts = {plot.name: plot.picture for plot in plots if isinstance(plot.picture, Chart)}
@@ -28,7 +31,7 @@ def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: Any
     return f"{top}<body><main>\n" + "\n".join(body) + f"\n</main>{scripts}</body></html>\n"
 
 
-def _scripts(charts: Mapping[str, Chart], stage: Any) -> str:
+def _scripts(charts: Mapping[str, Chart], stage: View | None) -> str:
     pack = Pack()
     content: dict[str, Any] = {"figures": {name: chart_numbers(chart, pack) for name, chart in charts.items()}}
     if stage is not None:
@@ -67,7 +70,7 @@ def contents(links: Mapping[str, str]) -> str:
 
 
 def tiles(results: Sequence[tuple[str, str, str]]) -> str:
-    """The key results: value, unit, what it is."""
+    """The key results: value, unit, description."""
     found = "".join(
         f"<div><b>{escape(value.replace('-', '−'))}<small>{escape(unit)}</small></b><span>{escape(label)}</span></div>"
         for value, unit, label in results
@@ -76,7 +79,7 @@ def tiles(results: Sequence[tuple[str, str, str]]) -> str:
 
 
 def facts(pairs: Mapping[str, str]) -> str:
-    """How it was run: what it is → value."""
+    """Conditions of the run: description → value."""
     rows = "".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in pairs.items())
     return f'<dl class="run">{rows}</dl>'
 
@@ -116,7 +119,7 @@ def _told(plot: Plot) -> str:
 
 
 def section(title: str, *parts: str, name: str = "") -> str:
-    """A titled section around ready-made parts; name: what links call it."""
+    """A titled section around ready-made parts; name: target of links."""
     mark = f' id="{name}"' if name else ""
     return f"<section{mark}><h2>{escape(title)}</h2>{''.join(parts)}</section>"
 

@@ -1,4 +1,4 @@
-"""What a planned run tells of its plan: effects with their error and price, the work–precision chart, tripwires, spot
+"""Chapter on the plan of a planned run: effects with their error and price, the work–precision chart, tripwires, spot
 checks. Everything comes from the trace's meta "plan" (gearfmu/planning/run.py); nothing is computed here."""
 
 from __future__ import annotations
@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
 from gearfmu.report import page
@@ -77,7 +78,7 @@ def _told(item: Mapping[str, Any], kind: str) -> str:
 
 
 def _number(value: float | None) -> str:
-    """None is what JSON has for a failed run or an unknown number."""
+    """None: of a failed run, or an unknown number."""
     return "" if value is None else f"{value:.2g}"
 
 
@@ -94,13 +95,13 @@ def _chart(segment: Mapping[str, Any]) -> str:
         )
 
 
-def _precision(panel: Any, segment: Mapping[str, Any]) -> None:
+def _precision(panel: Axes, segment: Mapping[str, Any]) -> None:
     for point in segment["points"]:
         chosen, full = point["chosen"], point["words"].startswith("full model")
         place = (point["price"], max(point["bound"], LEAST))
         panel.loglog(*place, "o" if chosen else ".", color=COLOURS[1 if chosen else 0], markersize=8 if chosen else 5)
         if chosen or full:
-            side = {"xytext": (-6, 6), "ha": "right"} if full else {"xytext": (0, -16), "ha": "center"}
+            side: dict[str, Any] = {"xytext": (-6, 6), "ha": "right"} if full else {"xytext": (0, -16), "ha": "center"}
             text = "full model, error 0" if full else "the plan"
             panel.annotate(text, place, textcoords="offset points", fontsize=8, **side)
     panel.axhline(1.0 / segment["safety"], color=COLOURS[1], linewidth=0.8, linestyle="--")
@@ -113,8 +114,8 @@ def _precision(panel: Any, segment: Mapping[str, Any]) -> None:
     panel.set_ylabel("error bound, budgets")
 
 
-def _bars(left: Any, right: Any, lines: Sequence[Mapping[str, Any]]) -> None:
-    """Errors, and savings, of what was a choice."""
+def _bars(left: Axes, right: Axes, lines: Sequence[Mapping[str, Any]]) -> None:
+    """Errors and savings of the choices."""
     known = [line for line in lines if line["error"] is not None or line["effect"] in ("modes", "slices", "step")]
     places = list(range(len(known)))
     error = [min(line["error"] or 0.0, MOST_SHOWN) for line in known]

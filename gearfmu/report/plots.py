@@ -1,4 +1,4 @@
-"""Figures over time: torque and slip, speeds, mesh force and transmission error, bearing forces."""
+"""Figures over time: torques, speeds, forces of meshes, bearings and pins, transmission error, energy."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import numpy as np
 
 from gearfmu.report.chart import SPANS, Curve, Panel, Plot, Span, over_time
 from gearfmu.report.names import mesh_words
-from gearfmu.report.signals import LOCKED, bearings, drive_side, lock_time, meshes, noise_floor, spans
+from gearfmu.report.results import port_work
+from gearfmu.report.signals import GEAR_SPEED, LOCKED, bearings, drive_side, lock_time, meshes, noise_floor, spans
 from gearfmu.stage.run.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi
+ENERGIES = ("energy.work", "energy.stored", "energy.dissipated", "energy.residual")
 LEVER = 0.01  # m: moments below the noise of forces times this lever are noise
 MOST_SPANS = 300  # shaded in a panel
 
@@ -39,16 +41,22 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     return Plot("torque", title, caption, over_time(panels), columns(trace, clutch + others + slips))
 
 
-def speeds(trace: Trace) -> Plot | None:
-    """Speed of everything that turns, in rpm, without sign, each once; None when nothing does."""
-    names = distinct(
-        trace, [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"]
-    )
+def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot | None:
+    """Speeds in rpm; None when nothing turns. groups: names of rotors that share a panel, with their signs; without
+    groups everything that turns, each once, by magnitude."""
+    turning = [n for n in trace.channels if n.endswith(".w") and trace.channels[n].unit == "rad/s"]
+    of_groups = [[n for rotor in own if (n := f"{rotor}{GEAR_SPEED}") in trace and np.any(trace[n])] for own in groups]
+    rows = [row for row in of_groups if row] if groups else [distinct(trace, turning)]
+    names = [name for row in rows for name in row]
     if not names:
         return None
-    curves = tuple(Curve(trace.time, np.abs(trace[name]) * RPM, name, "rpm") for name in names)
-    chart = over_time([Panel("speed in rpm", curves, height=200)])
-    return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", chart, columns(trace, names))
+    panels = []
+    for row in rows:
+        curves = (Curve(trace.time, (trace[n] if groups else np.abs(trace[n])) * RPM, n, "rpm") for n in row)
+        panels.append(Panel("speed in rpm", tuple(curves), height=150 if groups else 200))
+    means = ", ".join(f"{n.removesuffix(GEAR_SPEED)} {np.mean(trace[n]) * RPM:.1f}" for n in names)
+    words = f"Mean in rpm: {means}; the data are in rad/s." if groups else "Magnitudes; the data keep sign and rad/s."
+    return Plot("set_speed" if groups else "speed", "Speeds", words, over_time(panels), columns(trace, names))
 
 
 def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | None = None) -> Plot | None:
@@ -115,6 +123,45 @@ def axial_and_tilting(trace: Trace) -> Plot | None:
     caption = "Along and about the fixed axes x, y and z; those of pins turn with the carrier."
     title = "Axial forces and tilting moments"
     return Plot("axial", title, caption, over_time(panels), columns(trace, names))
+
+
+def pin_forces(trace: Trace, planets: Sequence[str]) -> Plot | None:
+    """Magnitude of the force of every planet on its pin in the plane of the wheels."""
+    known = {planet: force for planet in planets if (force := pin_force(trace, planet)) is not None}
+    if not known:
+        return None
+    curves = tuple(Curve(trace.time, 1e-3 * force, planet, "kN") for planet, force in known.items())
+    chart = over_time([Panel("force in kN", curves, height=200)])
+    names = [f"pin.{planet}.{d}" for planet in known for d in ("fx", "fy")]
+    caption = (
+        "Force of every planet on its pin, magnitude across the axis; the data hold both components, in axes that "
+        "turn with the carrier."
+    )
+    return Plot("pin", "Pin forces", caption, chart, columns(trace, names))
+
+
+def pin_force(trace: Trace, planet: str) -> np.ndarray | None:
+    """(n,) N: magnitude of the force of a planet on its pin across the axis; None where it was not recorded."""
+    names = [f"pin.{planet}.{direction}" for direction in ("fx", "fy")]
+    return np.hypot(trace[names[0]], trace[names[1]]) if all(name in trace for name in names) else None
+
+
+def energy(trace: Trace) -> Plot | None:
+    """Work of every shaft, stored and dissipated energy, and the residual of the balance."""
+    works = [name for name in trace.channels if name.startswith("drive.") and name.endswith(".work")]
+    works = [name for name in works if name != "drive.energy.work"] or ["energy.work"]
+    if any(name not in trace for name in (*works, *ENERGIES)):
+        return None
+    left_over = Curve(trace.time, trace["energy.residual"], "stored − work + dissipated since the start", "J")
+    panels = (
+        Panel("energy in J", channels(trace, (*works, "energy.stored", "energy.dissipated")), height=190),
+        Panel("error of the balance in J", (left_over,), height=120),
+    )
+    of_shafts = sum(float(np.ptp(trace[name])) for name in works)
+    through = port_work(trace) if works == ["energy.work"] else of_shafts  # energy.work: of all ports, with sign
+    left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
+    caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
+    return Plot("energy", "Energy", caption, over_time(panels), columns(trace, [*works, *ENERGIES]))
 
 
 def channels(trace: Trace, names: Iterable[str], scale: float = 1.0, unit: str | None = None) -> tuple[Curve, ...]:

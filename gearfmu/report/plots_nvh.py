@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,17 @@ from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits, over_time
 from gearfmu.report.names import shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import Window, bearings, meshes, noise_floor
+from gearfmu.report.signals import (
+    GEAR_SPEED,
+    PlanetSet,
+    Window,
+    bearings,
+    mesh_speed,
+    meshes,
+    noise_floor,
+    on_mounts,
+    recorded,
+)
 from gearfmu.stage.run.trace import Trace
 
 RANGE_DB = 90
@@ -21,12 +31,14 @@ LOOKS = ("dashed", "dotted")  # of the orders of one mesh and the next
 MOST_ROWS, MOST_COLUMNS = 400, 700  # of a map in the page
 SENSOR = "sensor."
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
-SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
+MARKED_ORDERS = 12  # of a set
+STEADY = 0.1  # nine tenths of the speeds lie as close together, over their median, where mesh orders are marked
+SHOWN_TO = 12e3  # Hz; the data reach half the sampling rate
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Of signals: what the names of their figures begin with, title of their spectra, unit, reference of levels."""
+    """Of signals: prefix of the names of their figures, title of their spectra, unit, reference of levels."""
 
     prefix: str
     spectra: str
@@ -49,7 +61,7 @@ ACCELERATIONS = Kind("housing_", "Spectra of the accelerations of the housing", 
 
 def force_channels(trace: Trace) -> list[str]:
     """The channels whose sound matters: bearing forces, then mesh forces. Where the mean over the communication step
-    was recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back. Forces that
+    was recorded ("…_mean") it replaces the sample at its end: averaging weakens folded parts. Forces that
     cancel are left out (`noise_floor`)."""
     names = [f"bearing.{name}.{direction}" for name in bearings(trace) for direction in ("fx", "fy")]
     names += [f"{mesh}.force" for mesh in meshes(trace)]
@@ -72,6 +84,50 @@ def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spec
 def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
     """Level of every bearing and mesh force over frequency: `spectra`."""
     return spectra(trace, window, angles, force_channels(trace), FORCES)
+
+
+def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+    """Spectra of the mesh forces and of the ring's force on its mounts along fixed axes. Marked: mesh orders k f_m, and
+    around each the sidebands of the planets' passing, k f_m ± N f_c (N planets, f_c: carrier)."""
+    part = trace.window(window.start, window.end)
+    groups = {f"meshes of the {c}": [f"{mesh}.force" for mesh in meshes.values()] for c, meshes in own.meshes.items()}
+    groups |= {"ring on its mounts": fixed} if (fixed := list(on_mounts(part))) else {}
+    used = {name: recorded(part, name) for group in groups.values() for name in group}
+    spectra = {name: spectrum_of(part, best, segment(part.time.size, 1)) for name, best in used.items()}
+    mesh_frequency = mesh_speed(part, own) / (2 * np.pi)
+    speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
+    carrier = float(np.median(speed)) / (2 * np.pi)
+    steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
+    top = min(SHOWN_TO, 0.5 / metrics.sample_step(part.time))
+    marks = tuple(_side_marks(mesh_frequency, len(own.planets) * carrier, top)) if steady else ()
+    panels = [
+        replace(panel, label=f"{title}: {panel.label}")
+        for title, group in groups.items()
+        for panel in [_levels({name: spectra[name] for name in group}, top, marks, FORCES)]
+    ]
+    chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
+    first = next(iter(spectra.values()))
+    caption = (
+        f"Rms amplitude of each line, Hann, resolution {first.resolution:.3g} Hz, {window.start:.3g} s to "
+        f"{window.end:.3g} s ({window.reason}). "
+    )
+    caption += (
+        f"Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: k·f_m ± {len(own.planets)} f_c, "
+        f"f_c = {carrier:.2f} Hz of the carrier."
+        if steady
+        else "Mesh orders are not marked: the speed is not steady."
+    )
+    data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in spectra.items()}
+    return Plot("spectrum", "Spectra of the forces", caption, chart, data)
+
+
+def _side_marks(mesh_frequency: float, passing: float, top: float) -> list[Mark]:
+    """Marks of the mesh orders and their sidebands below `top`; all in Hz."""
+    found = []
+    for order in range(1, min(MARKED_ORDERS, int(top / mesh_frequency)) + 1):
+        at = order * mesh_frequency
+        found += [Mark(at / 1e3, str(order)), *(Mark((at + side * passing) / 1e3, "", "side") for side in (-1, 1))]
+    return found
 
 
 def loudest_sensors(trace: Trace) -> list[str]:

@@ -69,7 +69,7 @@ def dynamic_factors(trace: Trace) -> dict[str, float]:
     meshes behind that of the mesh).
 
     Static is the mean where the scene has a settling time, else the 10 ms moving average, looked at where it is at
-    least LOADED of its largest. The largest force of a step stands for its sample where it was recorded (X.force_max).
+    least LOADED of its largest. The largest force of a step replaces its sample where it was recorded (X.force_max).
     K_v of ISO 6336-1 is meant, as far as a simulation has it: of the normal force, its largest value in this run.
     """
     window = window_of_interest(trace)
@@ -102,7 +102,7 @@ def port_work(trace: Trace) -> float:
 
 
 def energy_balance(trace: Trace) -> dict[str, float]:
-    """What the energy balance of the stage leaves at the end over the work through its ports; empty where either was
+    """Residual of the energy balance of the stage at the end over the work through its ports; empty where either was
     not recorded."""
     work = port_work(trace)
     if "energy.residual" not in trace or not work:
@@ -110,7 +110,7 @@ def energy_balance(trace: Trace) -> dict[str, float]:
     return {"energy_residual_of_port_work": float(trace["energy.residual"][-1]) / work}
 
 
-def strict(value: Any) -> Any:
+def strict(value: object) -> Any:
     """`value` as plain JSON: numpy scalars become Python's, numbers that are not finite become null."""
     if isinstance(value, Mapping):
         return {str(key): strict(item) for key, item in value.items()}

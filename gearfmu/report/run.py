@@ -7,12 +7,21 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
-from gearfmu.report.plots_set import PlanetSet, planet_set
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
-from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
+from gearfmu.report.signals import (
+    PlanetSet,
+    Window,
+    known_meshings,
+    mesh_angles,
+    meshes,
+    planet_set,
+    window_of_interest,
+)
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.deformation import Deformation
@@ -47,7 +56,7 @@ class Run:
         return planet_set(self.trace, self.known)
 
     @cached_property
-    def angles(self) -> dict[str, Any]:
+    def angles(self) -> dict[str, np.ndarray]:
         """Mesh angle (n,) rad by engagement."""
         return mesh_angles(self.trace, self.spec)
 
@@ -58,7 +67,7 @@ class Run:
 
     @cached_property
     def shown_meshes(self) -> list[str]:
-        """Engagements whose statics stand in the report: all, of a set the first of every central gear."""
+        """Engagements with statics in the report: all, of a set the first of every central gear."""
         forces = [mesh for mesh in meshes(self.trace) if f"{mesh}.force" in self.trace]
         if self.planets is None:
             return forces
@@ -90,7 +99,7 @@ class Run:
 
     @property
     def title(self) -> str:
-        """What was run."""
+        """Name of scene or run."""
         return str(self.summary.get("scene") or self.trace.meta.get("scene") or "simulation")
 
     @property

@@ -15,8 +15,7 @@ from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, loudest_sensors
-from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
-from gearfmu.report.signals import GEAR_SPEED, Window, bearings
+from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
@@ -25,7 +24,7 @@ from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
-BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution
+BACKWARD = 0.02  # of it: largest loss on the way, wobble of the drive below one swing per revolution
 LEAST_SAMPLES = 5  # between two knots of the spline that follows the angle
 SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
@@ -37,7 +36,7 @@ MODES = 30  # of the linearised stage, the lowest
 
 @dataclass(frozen=True)
 class Signal:
-    """values (n,); unit, and what its level refers to; sides: for every mesh order the orders beside it, of the
+    """values (n,); unit, and reference of its level; sides: for every mesh order the orders beside it, of the
     carrier, that the signal has by the passing of the planets."""
 
     values: np.ndarray
@@ -220,7 +219,7 @@ def _force(part: Trace, name: str) -> Signal:
         own = ACCELERATIONS
         return Signal(part[name], own.unit, own.reference, {}, metrics.sample_step(part.time))
     step = metrics.sample_step(part.time) if f"{name}_mean" in part else 0.0
-    return Signal(mean_or_sample(part, name), "N", 1.0, {}, step)
+    return Signal(part[recorded(part, name)], "N", 1.0, {}, step)
 
 
 def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from gearfmu.report import heading, page, plots_nvh, plots_set
+from gearfmu.report import heading, page, plots_nvh
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words, plain
+from gearfmu.report.planets import planet_results, shares
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results
 from gearfmu.report.run import Run
@@ -40,7 +41,7 @@ FACTOR_WORDS = (
 
 
 def tiles(run: Run) -> list[tuple[str, str, str]]:
-    """The key results: value, unit, what it is; of several meshes the largest, with its name."""
+    """The key results: value, unit, description; of several meshes the largest, with its name."""
     results, names = {**key_results(run.trace), **dynamic_factors(run.trace)}, meshes(run.trace)
     found = []
     for key, scale, unit, words in (
@@ -73,7 +74,7 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
 def _most_loaded(run: Run) -> list[tuple[str, str, str]]:
     assert run.planets is not None
     try:
-        means = plots_set.shares(run.trace, run.planets, run.window)[1]
+        means = shares(run.trace, run.planets, run.window)[1]
     except MetricsError:
         return []
     mesh = max(means, key=lambda name: means[name])
@@ -114,7 +115,7 @@ def _row(key: str, value: float, names: Sequence[str]) -> str:
 
 
 def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
-    """A result of key_results: words, its channel, its unit. names: of the meshes; of several the name is told."""
+    """A result of key_results: words, its channel, its unit. names: of the meshes; of several with the name."""
     mesh = next((name for name in names if len(names) > 1 and key.startswith(f"{name}_")), "")
     inner = key.removeprefix(f"{mesh}_") if mesh else key
     if inner in WORDS:
@@ -132,7 +133,7 @@ def planets(run: Run) -> list[str]:
     if run.planets is None:
         return []
     try:
-        table = page.table(*plots_set.results(run.trace, run.planets, run.window))
+        table = page.table(*planet_results(run.trace, run.planets, run.window))
     except MetricsError:
         return []
     window = run.window
@@ -146,7 +147,7 @@ def planets(run: Run) -> list[str]:
 
 
 def warned(trace: Trace) -> list[str]:
-    """What the sampling does to spectra, as a warning."""
+    """Influence of the sampling on spectra, as a warning."""
     try:
         warning = plots_nvh.sampling_warning(trace)
     except MetricsError:
@@ -176,7 +177,7 @@ def _breaking(channel: str) -> str:
     return escape(channel).replace(".", ".<wbr>")
 
 
-def facts(summary: Mapping[str, Any]) -> dict[str, str]:
+def facts(summary: Mapping[str, object]) -> dict[str, str]:
     """How it was run."""
     known = {
         "torque of the input": _text(summary, "torque", 1, "N·m"),
@@ -206,7 +207,7 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 
 
 def _left_of_slices(run: Run) -> str:
-    """What the number of slices of a helical pair leaves open; "" for other stages, where that takes minutes, and
+    """Error by the number of slices of a helical pair; "" for other stages, where that takes minutes, and
     without torque or bodies."""
     torque = run.summary.get("torque")
     if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
@@ -276,7 +277,7 @@ def _frf_words(name: str, frf: FrfError) -> str:
     )
 
 
-def provenance(summary: Mapping[str, Any]) -> dict[str, str]:
+def provenance(summary: Mapping[str, object]) -> dict[str, str]:
     """The rest of the summary."""
     shown = {
         "scene",
@@ -304,7 +305,7 @@ def provenance(summary: Mapping[str, Any]) -> dict[str, str]:
 
 
 def channels(trace: Trace) -> str:
-    """The channels of the trace: plain name, name, unit, what it is."""
+    """The channels of the trace: plain name, name, unit, description."""
     rows = [
         f"<tr><td>{escape(plain(name))}</td><td><code>{escape(name)}</code></td><td>{escape(own.unit)}</td>"
         f"<td>{escape(own.description)}</td></tr>"

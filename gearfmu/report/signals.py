@@ -1,9 +1,11 @@
-"""What a trace tells about itself: which meshes and bearings it has, where it is in steady operation, how fast the
+"""Facts of a trace: which meshes and bearings it has, where it is in steady operation, how fast the
 teeth mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,3 +118,52 @@ def _last_rise(time: np.ndarray, locked: np.ndarray) -> float | None:
         return None
     slipping = np.flatnonzero(~locked)
     return float(time[0] if slipping.size == 0 else time[slipping[-1] + 1])
+
+
+@dataclass(frozen=True)
+class PlanetSet:
+    """The engagements of a trace that a carrier carries: by central gear ("sun") and planet ("planet1"), from names as
+    sun_planet1; the Meshing of the first."""
+
+    carrier: str
+    meshes: Mapping[str, Mapping[str, str]]
+    meshing: Meshing
+
+    @property
+    def rotors(self) -> list[list[str]]:
+        """The carrier, the planets, the central gears."""
+        return [[self.carrier], self.planets, [name for name in self.meshes if name]]
+
+    @property
+    def planets(self) -> list[str]:
+        """Names of the planets, in order."""
+        return list(dict.fromkeys(planet for own in self.meshes.values() for planet in own))
+
+
+def planet_set(trace: Trace, known: Mapping[str, Meshing]) -> PlanetSet | None:
+    """The set of a trace; None where no carrier carries an engagement. known: Meshing by engagement."""
+    found: dict[str, dict[str, str]] = {}
+    carried = {mesh: own for mesh, own in known.items() if own.carrier is not None and f"{mesh}.force" in trace}
+    for mesh in carried:
+        central, _, planet = mesh.rpartition("_")
+        found.setdefault(central or mesh, {})[planet] = mesh
+    first = next(iter(carried.values()), None)
+    return PlanetSet(first.carrier, found, first) if first is not None and first.carrier is not None else None
+
+
+def mesh_speed(trace: Trace, own: PlanetSet) -> float:
+    """Median of the mesh frequency, rad/s."""
+    turning: dict[str, Any] = {n: trace[f"{n}{GEAR_SPEED}"] for n in (own.meshing.rotor, own.carrier)}
+    return max(float(np.median(np.abs(own.meshing.relative(turning)))) * own.meshing.teeth, 1e-9)
+
+
+def recorded(trace: Trace, name: str) -> str:
+    """The channel of the mean over the communication step where there is one, which folds less, else `name`."""
+    return f"{name}_mean" if f"{name}_mean" in trace else name
+
+
+def on_mounts(part: Trace) -> dict[str, np.ndarray]:
+    """Force of the ring on its mounts, N, along the fixed axes x and y, by name; none where it cancels."""
+    known = {name: part[recorded(part, name)] for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
+    floor = noise_floor(part)
+    return known if any(np.abs(values).max() >= floor for values in known.values()) else {}

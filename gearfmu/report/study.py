@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 
 from gearfmu.report.style import COLOURS, MUTED, panels, saved, styled
 from gearfmu.stage.build.levels import LEVELS
@@ -15,7 +16,7 @@ QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bea
 MARKS = {"rk45": "s", "dg4": "o"}
 
 
-def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -> list[Path]:
+def write_chart(rows: Sequence[object], slices: int, path: Path, title: str = "") -> list[Path]:
     """SVG and PNG beside each other at `path` with the suffix replaced; returns both.
 
     rows: of gearfmu.study, one scene; slices: of the scene, drawn full, others thin.
@@ -30,7 +31,7 @@ def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -
         return saved(figure, path)
 
 
-def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
+def draw(panel: Axes, rows: Sequence[Any], slices: int, name: str) -> None:
     """One quantity (te, force, bearing) of the rows into a matplotlib panel."""
     lines: dict[tuple[str, str, int], list[Any]] = {}
     for row in rows:
@@ -52,7 +53,7 @@ def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
     panel.set_ylabel(f"{QUANTITIES[name]}, %")
 
 
-def _write_steps(panel: Any, line: list[Any], time: list[float], error: list[float]) -> None:
+def _write_steps(panel: Axes, line: Sequence[Any], time: list[float], error: list[float]) -> None:
     """The step beside the first and the last point of a line."""
     for k in sorted({0, len(line) - 1}):
         panel.annotate(

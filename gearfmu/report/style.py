@@ -74,7 +74,13 @@ def png(figure: Figure) -> str:
     return f'<img alt="" src="data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}">'
 
 
-def saved(figure: Any, path: Path) -> list[Path]:
+def written(figure: Figure, path: Path, dpi: float = 150) -> None:
+    """Write a figure as PNG or as the suffix says, whole or not at all."""
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=dpi)
+
+
+def saved(figure: Figure, path: Path) -> list[Path]:
     """Write a figure as SVG and PNG; without a date, so that the same rows give the same bytes."""
     written = [path.with_suffix(suffix) for suffix in (".svg", ".png")]
     for target in written:

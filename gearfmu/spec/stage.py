@@ -58,13 +58,6 @@ def stage_class(tables: Mapping[str, Any]) -> type[Form | Stage]:
 ROLLING = "by its rolling bearing"
 
 
-def require_pair(stage: Stage) -> None:
-    """SpecError unless the file is of a pair: a verb about one pair, or its gears' files, means nothing else."""
-    if (kind := stage.written.kind) != "external_pair":
-        remedy = "this is about one pair: name a stage of kind external_pair, such as fzg_c"
-        raise SpecError([Problem(str(stage.source), "kind", f'"{kind}"', remedy)])
-
-
 Read: TypeAlias = "tuple[Form | Stage | None, list[Problem]]"  # with files as seen from here, and all that is wrong
 
 

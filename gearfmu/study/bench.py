@@ -24,12 +24,12 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import StageModel, Trace, assemble
+from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.model import integrator_of
 from gearfmu.stage.build.tables import ROLLS
-from gearfmu.study.norm import Signals, set_signals, signals_of
+from gearfmu.study.norm import Signals, signals_of
 
-CHUNK = 100  # communication steps that are timed at once
+CHUNK = 100  # communication steps that are timed together
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
 LONGEST_PASS = 2.0  # s of processor time
 
@@ -48,7 +48,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Recording:
-    """What is needed to play a stage back: blob, parameters, names and values (steps, k) of the inputs of every
+    """Data to play a stage back: blob, parameters, names and values (steps, k) of the inputs of every
     communication step, the saved state at step `first`; before: communication steps of the scene before the first
     row."""
 
@@ -64,8 +64,8 @@ class Recording:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run: what integrated it, signals, internal step (s; rk45: mean accepted step), dynamic modes,
-    outcome, bits of solver.status, what the kernel said, recording (None where it was left behind)."""
+    """A finished run: integrator, signals, internal step (s; rk45: mean accepted step), dynamic modes,
+    outcome, bits of solver.status, message of the kernel, recording (None where it was left behind)."""
 
     point: Point
     integrator: str
@@ -113,14 +113,14 @@ class Kept(KernelUnit):
         self.rows.append(list(self.now.values()))
 
     def recording(self, blob: bytes, step: float) -> Recording:
-        """What plays this unit back."""
+        """Recording of this unit."""
         known = (blob, self.parameters, tuple(self.now), np.array(self.rows), step)
         return Recording(*known, max(self.first, 0), self.state, self.before)
 
 
 @dataclass
 class KeptSource:
-    """A Source whose unit is kept, with what it was given."""
+    """A Source whose unit is kept, with its inputs."""
 
     model: StageModel
     settle: float
@@ -132,10 +132,10 @@ class KeptSource:
 
 
 def models_for(
-    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: Any
+    scene: SceneSpec, bodies: Sequence[Body] | None = None, rolls: int = ROLLS, **changes: object
 ) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
-    along a flank; changes: of what is written in its file."""
+    along a flank; changes: of fields of its file."""
     stage = rewritten(load_stage(scene.stage.name), **changes)
     return assemble(in_drivetrain(scene, stage), bodies or load_bodies(stage), rolls)
 
@@ -172,7 +172,7 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     return Run(
         point,
         integrator,
-        _signals(result.trace, model, scene.settle if end > scene.settle else 0.0),
+        signals_of(result.trace, model.stage, scene.settle if end > scene.settle else 0.0),
         end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
         int(facts["solver.n_dyn"]),
         result.outcome,
@@ -180,14 +180,6 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         done.kernel.warning,
         done.recording,
     )
-
-
-def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
-    """What a run of a pair or of a planetary set is judged by."""
-    if model.stage.carriers:
-        return set_signals(trace, model.stage, settle)
-    pinion, wheel = (gear.name for gear in model.stage.gears)
-    return signals_of(trace, (pinion, wheel), settle)
 
 
 def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.run.set_te import set_error
+from gearfmu.stage.run.te import set_error
 from gearfmu.stage.run.trace import Channel, Trace
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
@@ -22,11 +22,12 @@ OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 
 @dataclass(frozen=True)
 class Signals:
-    """What a run is judged by, sampled every `interval` s from `start` s on.
+    """Signals by which a run is judged, sampled every `interval` s from `start` s on.
 
-    te (n,) m, transmission error at the sample · force (n,) N, mesh force, mean over the interval; of a set (n, meshes)
-    · bearing (n, 2 B) N, x and y forces of every bearing (of a set: every pin), means over the interval · locked (n,)
-    bool, the clutch, or None · steady: settled scene. A run that stopped early has fewer samples.
+    te (n,) m, transmission error at the sample; of a train (n, meshes) · force (n,) N, mesh force, mean over the
+    interval; of a train or set (n, meshes) · bearing (n, 2 B) N, x and y forces of every bearing (of a set: every pin),
+    means over the interval · locked (n,) bool, the clutch, or None · steady: settled scene. A run that stopped early
+    has fewer samples.
     """
 
     te: np.ndarray
@@ -39,8 +40,8 @@ class Signals:
 
     def trace(self, meta: dict) -> Trace:
         """The signals as a Trace, to be kept in a file."""
-        time = self.start + self.interval * np.arange(self.te.size)
-        channels = {"te": Channel(self.te, "m")}
+        time = self.start + self.interval * np.arange(len(self.te))
+        channels = {f"te_{k}": Channel(column, "m") for k, column in enumerate(np.atleast_2d(self.te.T))}
         channels |= {f"force_{k}": Channel(column, "N") for k, column in enumerate(np.atleast_2d(self.force.T))}
         channels |= {f"bearing_{k}": Channel(column, "N") for k, column in enumerate(self.bearing.T)}
         if self.locked is not None:
@@ -48,36 +49,38 @@ class Signals:
         return Trace(time, channels, meta | {"interval": self.interval, "start": self.start, "steady": self.steady})
 
 
-def signals_of(trace: Trace, gears: tuple[str, str], settle: float) -> Signals:
-    """The signals of a coupled run after `settle` (s); gears: names of pinion and wheel."""
+def signals_of(trace: Trace, stage: Stage, settle: float) -> Signals:
+    """The signals of a coupled run after `settle` (s): transmission errors and forces of all meshes, and forces on all
+    bearings but the seats of gears on their shafts; of a planetary set its own transmission error and its pins."""
     part = trace.window(settle * (1.0 - 1e-12))
-    locked = f"{gears[0]}.clutch.locked"
-    columns = [part[f"bearing.{gear}.{axis}_mean"] for gear in gears for axis in ("fx", "fy")]
+    te = _set_te(part, stage) if stage.carriers else np.stack([part[f"{m.name}.te"] for m in stage.engagements], 1)
+    force = np.stack([part[f"{mesh.name}.force_mean"] for mesh in stage.engagements], 1)
+    held = "pin." if stage.carriers else "bearing."
+    first = [name for name in part.channels if name.startswith(held) and name.endswith(".fx_mean")]
+    names = [name.replace(".fx_", f".{axis}_") for name in first for axis in ("fx", "fy")]
+    locked = next((part[name].astype(bool) for name in part.channels if name.endswith(".clutch.locked")), None)
     interval = float(trace.time[1] - trace.time[0])
-    found = part[locked].astype(bool) if locked in part else None
-    return Signals(
-        part["mesh.te"], part["mesh.force_mean"], np.stack(columns, 1), found, interval, float(part.time[0]), settle > 0
-    )
+    bearing = np.stack([part[name] for name in names], 1)
+    return Signals(_flat(te), _flat(force), bearing, locked, interval, float(part.time[0]), settle > 0)
 
 
-def set_signals(trace: Trace, stage: Stage, settle: float) -> Signals:
-    """The signals of a run of a planetary set after `settle` (s): transmission error of the set, forces in all meshes
-    and on all pins."""
-    part = trace.window(settle * (1.0 - 1e-12))
+def _set_te(part: Trace, stage: Stage) -> np.ndarray:
+    """(n,) m, of a planetary set as a whole."""
     r_b, ratio = set_error(stage)
-    te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
-    force = [part[f"{mesh.name}.force_mean"] for mesh in stage.engagements]
-    pins = [part[f"pin.{s.name}.{axis}_mean"] for s in stage.supports if s.to for axis in ("fx", "fy")]
-    interval = float(trace.time[1] - trace.time[0])
-    return Signals(te, np.stack(force, 1), np.stack(pins, 1), None, interval, float(part.time[0]), settle > 0)
+    return np.asarray(r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"]))
+
+
+def _flat(columns: np.ndarray) -> np.ndarray:
+    """(n,) where there is one column."""
+    return columns[:, 0] if columns.shape[1:] == (1,) else columns
 
 
 def kept_signals(trace: Trace) -> Signals:
     """The signals of a Trace made by `Signals.trace`."""
-    force, bearing = (_columns(trace, name) for name in ("force", "bearing"))
+    te, force, bearing = (_columns(trace, name) for name in ("te", "force", "bearing"))
     locked = trace["locked"].astype(bool) if "locked" in trace else None
     place = (trace.meta[name] for name in ("interval", "start", "steady"))
-    return Signals(trace["te"], force if force.shape[1] > 1 else force[:, 0], bearing, locked, *place)
+    return Signals(_flat(te), _flat(force), bearing, locked, *place)
 
 
 def _columns(trace: Trace, name: str) -> np.ndarray:
@@ -86,8 +89,8 @@ def _columns(trace: Trace, name: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative errors of transmission error, its mean, mesh forces together, and bearing forces (the worst bearing, x
-    and y together)."""
+    """Relative errors of transmission errors together, their means, mesh forces together, and bearing forces (the worst
+    bearing, x and y together)."""
 
     te: float
     te_mean: float
@@ -104,10 +107,10 @@ STOPPED = Errors(float("nan"), float("nan"), float("nan"), float("nan"))
 
 def errors(found: Signals, wanted: Signals) -> Errors:
     """Errors of a run against a reference of the same samples; NaN when it stopped early."""
-    if found.te.size != wanted.te.size:
+    samples = len(wanted.te)
+    if len(found.te) != samples:
         return STOPPED
-    te, mean = _relative(found.te[:, None], wanted.te[:, None], wanted)
-    samples = wanted.te.size
+    te, mean = _relative(found.te.reshape(samples, -1), wanted.te.reshape(samples, -1), wanted)
     force, _ = _relative(found.force.reshape(samples, -1), wanted.force.reshape(samples, -1), wanted)
     first = range(0, wanted.bearing.shape[1], 2)
     sides = [_relative(found.bearing[:, k : k + 2], wanted.bearing[:, k : k + 2], wanted)[0] for k in first]

@@ -258,7 +258,7 @@ def _row(scene: SceneSpec, run: Run, price: Price, reference: Reference) -> Row:
 def _transient(scene: SceneSpec, run: Run, reference: Reference) -> TransientRow:
     wanted = reference.signals
     locked = lock_time(wanted)
-    at = wanted.te.size if np.isnan(locked) else round((locked - wanted.start) / wanted.interval)
+    at = len(wanted.te) if np.isnan(locked) else round((locked - wanted.start) / wanted.interval)
     bands = [band_error(run.signals, wanted, part) for part in (slice(0, at), slice(at, None))]
     head = (scene.name, run.point.level, run.integrator, run.h, run.point.slices)
     return TransientRow(*head, lock_time(run.signals) - locked, *bands)

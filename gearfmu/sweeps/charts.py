@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from gearfmu.files import written_whole
 from gearfmu.report.metrics import level
-from gearfmu.report.style import panels, styled
+from gearfmu.report.style import panels, styled, written
 from gearfmu.report.te import write_plot
-from gearfmu.stage.run.te import mesh_harmonics
+from gearfmu.stage.run.te import TeResult
 from gearfmu.sweeps.table import SweepTable
 
 TORQUE, SPEED = "torque_Nm", "speed_rad_s"
@@ -24,7 +22,7 @@ LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
 
 
 def write_charts(table: SweepTable, out: Path) -> list[Path]:
-    """Write what the table allows as .png into `out`; returns the paths.
+    """Write the charts of the table as .png into `out`; returns the paths.
 
     harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders
     over torque. levels : of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two
@@ -59,16 +57,9 @@ def _harris(table: SweepTable, path: Path) -> Path:
     parts = [_curve(table.curves, row) for row in chosen]
     ends = ("te_um", "mesh_stiffness_N_per_um", "stage_stiffness_N_per_um")
     te, mesh, stage = ([part[n] for n in table.curves if n.endswith(end) for part in parts] for end in ends)
-    result: Any = SimpleNamespace(
-        torque=table[TORQUE][chosen],
-        position=parts[0]["position"],
-        te=1e-6 * np.array(te[: len(parts)]),
-        mesh_stiffness=1e6 * np.array(mesh[: len(parts)]) if mesh else None,
-        stage_stiffness=1e6 * np.array(stage[: len(parts)]),
-    )
-    result.found = result  # a sweep keeps no torque without equilibrium
-    result.harmonics = partial(mesh_harmonics, result.te, pitches=int(result.position[-1]) + 1)
-    write_plot(result, path)
+    none, count = np.zeros((0, 0, 0)), len(parts)
+    curves = 1e-6 * np.array(te[:count]), 1e6 * np.array(mesh[:count]), 1e6 * np.array(stage[:count])
+    write_plot(TeResult(table[TORQUE][chosen], parts[0]["position"], *curves, none, none, ("",) * count), path)
     return path
 
 
@@ -86,7 +77,7 @@ def _orders(table: SweepTable, path: Path) -> Path:
             axis.plot(table[TORQUE][rows], table[name][rows], marker=".", label=_order_label(name))
         axis.set(xlabel=LABELS[TORQUE], ylabel="transmission error, rms in µm", title=title, ylim=(0, None))
         axis.legend(title="mesh order", ncols=len(names))
-        _save(figure, path)
+        written(figure, path)
     return path
 
 
@@ -111,11 +102,11 @@ def _levels(table: SweepTable, axes: list[str], path: Path) -> Path:
             panes[0].legend()
         panes[0].set_title(title)
         panes[-1].set_xlabel(label_of(axes[0]))
-        _save(figure, path)
+        written(figure, path)
     return path
 
 
-def _map(figure: Any, axis: Any, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
+def _map(figure: Figure, axis: Axes, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
     """One colour map: the first key to the right, the second upwards."""
     x, y = (ticks_of(table, key)[rows] for key in axes[:2])
     right, up = np.unique(x), np.unique(y)
@@ -147,8 +138,3 @@ def label_of(name: str) -> str:
 def _plain(name: str) -> str:
     """ "bearing pinion" of "bearing_pinion_rms_ac_N"."""
     return name.removesuffix("_rms_ac_N").replace("_", " ")
-
-
-def _save(figure: Any, path: Path) -> None:
-    with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=150)

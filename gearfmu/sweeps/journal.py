@@ -1,5 +1,5 @@
-"""What is known of a sweep's points, kept as it comes: JSON lines, one a point, so that a sweep that was interrupted
-goes on where it stopped."""
+"""Results of a sweep's points, kept in order of arrival: JSON lines, one a point, so that an interrupted sweep is
+continued."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Journal:
                 file.write("\n")
 
     def get(self, identity: str) -> Outcome | None:
-        """What became of a point, None where it was not computed."""
+        """Outcome of a point, None where it was not computed."""
         return self._known.get(identity)
 
     def add(self, identity: str, outcome: Outcome) -> None:
@@ -47,7 +47,7 @@ def _lines(path: Path) -> list[tuple[str, Outcome]]:
     return found
 
 
-def _strict(value: Any) -> Any:
+def _strict(value: object) -> Any:
     """Numbers that are not finite become null."""
     if isinstance(value, dict):
         return {key: _strict(item) for key, item in value.items()}

@@ -1,4 +1,4 @@
-"""What a sweep computes: points of a grid, and what each key of a point belongs to.
+"""Points of a sweep's grid, and the owner of each key of a point.
 
 A *scene* is run at every point. A *stage* is run alone where its points have a `speed`, else its loaded transmission
 error is taken. Keys:
@@ -14,10 +14,13 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gearfmu.errors import GearfmuError
 from gearfmu.spec.reading.base import Quantity, read_toml
@@ -27,6 +30,9 @@ from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.scene import SceneSpec, StageChoice, full_key, scene_path, shipped_scenes
 from gearfmu.spec.stage import stage_class
 from gearfmu.units import to_si
+
+_RANGE = re.compile(r"\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*(\S.*?)?\s*$")
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 
 RUN, SIMULATE, TE = "run", "simulate", "te"
 OWN = {  # keys of a stage that is computed alone, with their units
@@ -55,13 +61,13 @@ class Plan:
     axes: tuple[str, ...]
 
     def unit(self, key: str) -> str | None:
-        """SI unit of a key, "" for a plain number; None for what is no quantity."""
+        """SI unit of a key, "" for a plain number; None where it is no quantity."""
         if key in OWN.get(self.what, {}):
             return OWN[self.what][key]
         quantity = self._quantity(key)
         return None if quantity is None else quantity.unit
 
-    def number(self, key: str, value: Any) -> Any:
+    def number(self, key: str, value: object) -> Any:
         """A value of a key in SI, as the table has it; text, switches and numbers without unit as they are."""
         unit = self.unit(key)
         return to_si(value, unit) if unit and isinstance(value, str) else value
@@ -83,7 +89,7 @@ class Plan:
         return quantity_at(SceneSpec, full_key(read_toml(self.subject), key, str(self.subject)))
 
 
-def plan(subject: str | os.PathLike[str], over: Mapping[str, Any] | Sequence[Values]) -> Plan:
+def plan(subject: str | os.PathLike[str], over: Mapping[str, object] | Sequence[Values]) -> Plan:
     """The Plan of a sweep of a scene or stage, by path or shipped name.
 
     over : values by key, a list each (or one value): their grid, the last key fastest; or the points themselves.
@@ -121,7 +127,7 @@ def _grid(over: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
     return tuple(dict(zip(over, values, strict=True)) for values in itertools.product(*lists)) if over else ()
 
 
-def _several(value: Any) -> bool:
+def _several(value: object) -> bool:
     return not isinstance(value, (str, bytes, Mapping)) and hasattr(value, "__iter__")
 
 
@@ -133,3 +139,39 @@ def _file(subject: str | os.PathLike[str]) -> tuple[Path, bool]:
     if not path.exists() and str(subject) in shipped_scenes():
         return scene_path(str(subject)).resolve(), True
     return find_stage(subject).resolve(), False
+
+
+def key_and_values(text: str) -> tuple[str, list[Any]]:
+    """("torque", ["100 N*m", "200 N*m"]) from "torque=100, 200 N*m": a list, whose last unit holds for numbers without
+    one, or start:end:count, both ends included. SweepError for anything else."""
+    key, sign, rest = text.partition("=")
+    if not sign or not key.strip() or not rest.strip():
+        raise SweepError(f'\'{text}\' is not KEY=VALUES: write torque="100, 200 N*m" or speed="1000:6000:11 rpm"')
+    found = _RANGE.match(rest)
+    return key.strip(), _range(found, text) if found else _list(rest)
+
+
+def _range(found: re.Match[str], text: str) -> list[Any]:
+    start, end, count, unit = found.groups()
+    try:
+        values = np.linspace(float(start), float(end), int(count)).tolist()
+    except ValueError:
+        raise SweepError(f"'{text}': a range is start:end:count, numbers with one unit behind them") from None
+    return [f"{value:.15g} {unit}" if unit else value for value in values]
+
+
+def _list(text: str) -> list[Any]:
+    items = [item.strip() for item in text.split(",") if item.strip()]
+    last = _NUMBER.match(items[-1])
+    unit = last[2] if last else ""
+    return [_item(item, unit) for item in items]
+
+
+def _item(text: str, unit: str) -> Any:
+    match = _NUMBER.match(text)
+    if not match:
+        return {"true": True, "false": False}.get(text, text)
+    number, own = match[1], match[2] or unit
+    if own:
+        return f"{number} {own}"
+    return int(number) if re.fullmatch(r"[+-]?\d+", number) else float(number)

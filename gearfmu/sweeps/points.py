@@ -1,4 +1,4 @@
-"""One point of a sweep: what a worker computes, wherever it is."""
+"""One point of a sweep, computed by a worker anywhere."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
 
-from gearfmu.body import load_bodies, reduce_apart, reduce_bodies
+from gearfmu.body import Body, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.kernel.build import source_hash, sources
 from gearfmu.spec.forms.general import Stage
@@ -50,7 +50,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a point. name: OK or what went wrong, told in `message`; row: numbers by column; curve: columns
+    """Outcome of a point. name: OK or the fault, described in `message`; row: numbers by column; curve: columns
     over the mesh cycle, of a transmission error."""
 
     name: str
@@ -62,7 +62,7 @@ class Outcome:
 
 @lru_cache(maxsize=1)
 def program() -> str:
-    """Version of the package and fingerprint of its kernel's sources: what must be the same on all workers."""
+    """Version of the package and fingerprint of its kernel's sources, equal on all workers."""
     return f"{version('gearfmu')} {source_hash(sources())[:16]}"
 
 
@@ -81,7 +81,7 @@ def compute(task: Task) -> Outcome:
 
 
 def prepare(variant: Variant) -> str:
-    """Make what is missing of a variant's bodies; "" or what went wrong."""
+    """Make the missing bodies of a variant; returns "" or the fault."""
     try:
         spec = variant.spec()
         if variant.folder is None:
@@ -111,7 +111,7 @@ def _computed(task: Task) -> Outcome:
 
 
 @lru_cache(maxsize=4)
-def _stage(variant: Variant) -> tuple[Any, list[Any]]:
+def _stage(variant: Variant) -> tuple[Stage, list[Body]]:
     """Spec and bodies."""
     spec = variant.spec()
     return spec, load_bodies(spec, variant.folder)

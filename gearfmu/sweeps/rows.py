@@ -16,8 +16,8 @@ from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_inte
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
-from gearfmu.stage.run.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
+from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
 
@@ -25,7 +25,7 @@ ORDERS = 5  # of the mesh
 POSITIONS = 41
 
 
-def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, list[float]]]:
+def te_row(model: StageModel, values: Mapping[str, object]) -> tuple[dict[str, float], dict[str, list[float]]]:
     """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), means of
     mesh stiffness and stage stiffness; of several meshes with the mesh's name before; of a set stage stiffness alone,
     and K_gamma at sun and ring."""
@@ -38,18 +38,17 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
     row: dict[str, float] = {}
     curve: dict[str, list[float]] = {}
     for mesh in names:
-        found = stage_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
+        found = loaded_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
         before = f"{mesh}_" * (len(names) > 1)
         row |= _te_numbers(found, before)
         curve |= _curve(found, before)
-        if isinstance(found, SetTeResult):
-            row |= {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, found.load_factor[0], strict=True)}
+        row |= {f"K_gamma_{gear}": float(k) for gear, k in zip(found.centrals, found.load_factor[0], strict=True)}
     return row, curve
 
 
-def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
+def run_alone(model: StageModel, values: Mapping[str, object]) -> Trace:
     """`steady_run` at a point."""
-    return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
+    return steady_run(model, LoadCase(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
 def run_scene(scene: SceneSpec, stage: Stage, bodies: list[Body]) -> Trace:
@@ -101,11 +100,11 @@ def _own(what: str, values: Mapping[str, Any]) -> dict[str, float]:
     return {k: to_si(v, units[k]) if isinstance(v, str) else float(v) for k, v in own.items()}
 
 
-def _settings(what: str, model: StageModel, values: Mapping[str, Any]) -> dict[str, float]:
+def _settings(what: str, model: StageModel, values: Mapping[str, object]) -> dict[str, float]:
     return parameters(model, {key: value for key, value in values.items() if key not in OWN[what]})
 
 
-def _te_numbers(result: Any, before: str) -> dict[str, float]:
+def _te_numbers(result: TeResult, before: str) -> dict[str, float]:
     te = 1e6 * result.te[0]
     found = {"te_mean_um": te.mean(), "te_pp_um": np.ptp(te)}
     for name, values in result.columns().items():
@@ -115,6 +114,6 @@ def _te_numbers(result: Any, before: str) -> dict[str, float]:
     return {before + name: float(value) for name, value in found.items()}
 
 
-def _curve(result: Any, before: str) -> dict[str, list[float]]:
+def _curve(result: TeResult, before: str) -> dict[str, list[float]]:
     columns = {name: values.tolist() for name, values in result.columns().items() if name != "torque_Nm"}
     return {name if name == "position" else before + name: values for name, values in columns.items()}

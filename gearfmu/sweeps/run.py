@@ -21,14 +21,14 @@ from gearfmu.sweeps.points import LOST, OK, Outcome, Task, Variant, compute, pre
 from gearfmu.sweeps.runners import Lost, Runner
 from gearfmu.sweeps.table import SweepTable, column, column_name
 
-FORMAT = 1  # of what is kept: points of another format are computed anew
+FORMAT = 1  # of the stored points: those of another format are computed anew
 JOURNAL, TRACES, BODIES = "points.jsonl", "traces", "bodies"
 Progress = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class _Point:
-    """A point, the variant of the stage it stands on, and the fingerprint of all that decides its numbers."""
+    """A point, its variant of the stage, and the fingerprint of all that decides its numbers."""
 
     values: Mapping[str, Any]
     variant: Variant
@@ -36,7 +36,7 @@ class _Point:
 
 
 def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress: Progress | None = None) -> SweepTable:
-    """Compute what is not yet in the folder `out` and return all of it.
+    """Compute the points that are not yet in the folder `out`; returns all.
 
     Writes points.jsonl after every point; at the end sweep.parquet or sweep.csv, of transmission errors also curves.…;
     traces/*.h5 where `traces`; bodies/ where points need other bodies than those beside the stage file, which are made
@@ -47,12 +47,12 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
     points = _points(plan, out)
     _prepare([p for p in points if isinstance(p, _Point)], runner, told)
     outcomes: list[Outcome | None] = [_kept(p, journal, out, traces) for p in points]
-    open_ = [n for n, known in enumerate(outcomes) if known is None]
-    tasks = [_task(plan, points[n], traces) for n in open_]
+    open_ = [(n, p) for n, p in enumerate(points) if outcomes[n] is None and isinstance(p, _Point)]
+    tasks = [_task(plan, point, traces) for _, point in open_]
     failed, done = sum(known is not None and known.name != OK for known in outcomes), len(points) - len(open_)
     for number, result in runner(compute, tasks):
-        n, outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
-        outcomes[n] = _keep(points[n], outcome, journal, out)
+        (n, point), outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
+        outcomes[n] = _keep(point, outcome, journal, out)
         failed, done = failed + (outcome.name != OK), done + 1
         told(done / len(points), f"{done} of {len(points)} points" + (f", {failed} failed" if failed else ""))
     return _table(plan, points, [o for o in outcomes if o is not None], out)
@@ -80,7 +80,7 @@ def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
 
 def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) -> tuple[Variant, str]:
     """The variant with the folder of its bodies, and a fingerprint of its numbers: a stage that was changed so that
-    the bodies beside its file do not fit has bodies of its own in `out`. fitting: what is known of that, by the
+    the bodies beside its file do not fit has bodies of its own in `out`. fitting: results of this check, by the
     fingerprints of bodies."""
     spec = variant.spec()
     hashes = body_hashes(spec)
@@ -115,7 +115,7 @@ def _prepare(points: list[_Point], runner: Runner, told: Progress) -> None:
 
 
 def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) -> Outcome | None:
-    """What is known of a point: refused ones, and those of the journal that need not be computed again."""
+    """Known outcome of a point: refused ones, and those of the journal that need not be computed again."""
     if isinstance(point, Outcome):
         return point
     known = journal.get(point.identity)
@@ -124,11 +124,11 @@ def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) ->
     return known
 
 
-def _task(plan: Plan, point: Any, traces: bool) -> Task:
+def _task(plan: Plan, point: _Point, traces: bool) -> Task:
     return Task(str(plan.subject), plan.what, point.values, point.variant, traces, program())
 
 
-def _keep(point: Any, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
+def _keep(point: _Point, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
     """The outcome without its trace, which is now in a file, noted in the journal."""
     if outcome.trace is not None:
         outcome.trace.save(out / trace_name(point.identity))
@@ -156,7 +156,9 @@ def _table(plan: Plan, points: list[_Point | Outcome], outcomes: list[Outcome], 
     return table
 
 
-def _curves(columns: Mapping[str, Any], keys: Mapping[str, str], outcomes: list[Outcome]) -> dict[str, np.ndarray]:
+def _curves(
+    columns: Mapping[str, np.ndarray], keys: Mapping[str, str], outcomes: list[Outcome]
+) -> dict[str, np.ndarray]:
     """The curves of all points, one below the other, with the point and its values in every line."""
     lengths = [len(outcome.curve.get("position", ())) for outcome in outcomes]
     if not sum(lengths):
@@ -169,6 +171,6 @@ def _curves(columns: Mapping[str, Any], keys: Mapping[str, str], outcomes: list[
     return found
 
 
-def _digest(value: Any) -> str:
+def _digest(value: object) -> str:
     """SHA-256, hex, of a JSON value."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()

@@ -26,7 +26,7 @@ Runner = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[tuple[int, Any
 
 @dataclass(frozen=True)
 class Lost:
-    """What stands for a result when workers died over it."""
+    """In place of a result when workers died over it."""
 
     message: str
 
@@ -36,7 +36,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_this_process(function: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+def in_this_process(function: Callable[[Any], Any], arguments: Sequence[object]) -> Iterator[tuple[int, Any]]:
     """A Runner: one argument after the other, here."""
     for number, argument in enumerate(arguments):
         yield number, function(argument)
@@ -92,7 +92,7 @@ class _Team:
         self._workers: list[subprocess.Popen[bytes]] = []
         self._closed = False
 
-    def call(self, function: Callable[[Any], Any], argument: Any) -> Any:
+    def call(self, function: Callable[[Any], Any], argument: object) -> Any:
         """function(argument), computed by this thread's worker; Lost when TRIES of them died over it."""
         code: int | None = None
         for _ in range(TRIES):

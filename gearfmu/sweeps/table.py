@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,7 +24,7 @@ NO_NUMBERS = ("point", "outcome", "message", "trace")
 @dataclass(frozen=True)
 class SweepTable:
     """columns : name → (n,), one row a point: `point`; the keys of the points, SI, unit behind the name (torque_Nm,
-    speed_rad_s); `outcome`, "ok" or what went wrong; `message`; `trace`, name of its file or ""; then the results, NaN
+    speed_rad_s); `outcome`, "ok" or the fault; `message`; `trace`, name of its file or ""; then the results, NaN
     where a point has none.
     axes : names of the columns that were swept. curves : of a transmission error, the same for all positions of all
     points. folder : of the files.
@@ -46,12 +46,12 @@ class SweepTable:
 
     @property
     def failures(self) -> list[str]:
-        """A sentence for every point that has no results: its values, what went wrong."""
+        """A sentence for every point that has no results: its values, the fault."""
         bad = np.flatnonzero(self["outcome"] != "ok")
         return [f"{self.values(i)}: {self['outcome'][i]}: {self['message'][i]}" for i in bad.tolist()]
 
     def values(self, row: int) -> str:
-        """What was swept, as text: "torque_Nm = 100, speed_rad_s = 200"."""
+        """Swept keys and values, as text: "torque_Nm = 100, speed_rad_s = 200"."""
         return ", ".join(f"{name} = {_shown(self[name][row])}" for name in self.axes)
 
     def trace(self, row: int) -> Trace:
@@ -109,7 +109,7 @@ def table_suffix() -> str:
     return ".parquet" if has("pyarrow") else ".csv"
 
 
-def column(values: Sequence[Any]) -> np.ndarray:
+def column(values: Sequence[object]) -> np.ndarray:
     """(n,) of one type: numbers, NaN where None; switches; else text."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)
@@ -125,5 +125,5 @@ def column_name(key: str, unit: str | None) -> str:
     return f"{key}_{plain}" if plain else key
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -11,9 +11,9 @@ import pytest
 from evidence.accuracy.coupling import Distance, distance
 from gearfmu.cosim.accuracy import Window, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import load_scene
 
 pytestmark = pytest.mark.full

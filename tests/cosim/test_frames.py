@@ -9,8 +9,8 @@ import pytest
 
 from gearfmu import cosim, fmu
 from gearfmu.cosim.frames import frame_plan
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, SpecError
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.scenes.deformation import DeformationChoice

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearfmu import fmu
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.cosim.summary import summary
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene

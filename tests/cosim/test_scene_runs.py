@@ -11,8 +11,8 @@ import pytest
 from gearfmu import cosim, fmu
 from gearfmu.cosim.accuracy import Window, coupling_errors, rms
 from gearfmu.cosim.coupled import OK
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model, verified
-from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, FmuError, ModelError, SpecError
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.stage.run.trace import Trace

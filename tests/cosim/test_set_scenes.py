@@ -10,8 +10,8 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Result
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.fmu import export
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.scenes.shaft_loads import SpeedControl

@@ -12,10 +12,10 @@ from scipy.linalg import expm
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Plan, Result, run_coupled
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.masters import master
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
-from gearfmu.cosim.source import Source
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene

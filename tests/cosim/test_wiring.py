@@ -8,10 +8,9 @@ import pytest
 from gearfmu import fmu
 from gearfmu.cosim.accuracy import rms
 from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import drive_of, run_once, stage_model
-from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.spec.scene import load_scene
 from gearfmu.stage import StageModel

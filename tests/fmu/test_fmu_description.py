@@ -18,8 +18,7 @@ from small_stage import small_model, unpack
 import gearfmu
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export, package
-from gearfmu.fmu.description import DEFAULT_STEP
-from gearfmu.fmu.naming import named
+from gearfmu.fmu.description import DEFAULT_STEP, named
 from gearfmu.fmu.package import content_identifier, write_archive
 from gearfmu.fmu.units import ATOMS, base_exponents, unit_of
 from gearfmu.kernel import build, library_path

@@ -12,7 +12,7 @@ from evidence.fmu_probes.everything import findings
 from evidence.fmu_probes.probes import Subject
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export
-from gearfmu.fmu.terminals import shafts
+from gearfmu.fmu.description import shafts
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 

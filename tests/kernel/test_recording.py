@@ -8,7 +8,7 @@ from small_model import pair_blob
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 
 H, STEPS = 2e-5, 60  # s; communication steps
 NAMES = ("mesh.force", "mesh.te", "energy.work", "solver.steps")

@@ -28,7 +28,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     spec = load_stage(stage)
     bodies = load_bodies(spec)
     model = assemble(spec, bodies)
-    result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
+    result = loaded_te(model, [torque], positions=64, **{"effect.bearings": 0.0})
     stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
     gears = spec.written.geometry.gears
     path = own_path(model, torque)

@@ -118,8 +118,8 @@ def test_a_housing_under_a_run_is_the_housing_in_the_run() -> None:
 @pytest.mark.full
 def test_with_turning_gears_the_static_yield_of_the_housing_is_all_that_is_missing() -> None:
     """A housing 10⁴ times as heavy yields alike under the mean load and hardly moves above 100 Hz: with its receptance
-    Y₁, f₀ = (I + D Y₁) f₁. Sensors in third octaves from 400 Hz, down to 40 dB below the loudest, within 1.3 dB (measured
-    .9 to 1.0); 12 dB without."""
+    Y₁, f₀ = (I + D Y₁) f₁. Sensors in third octaves from 400 Hz, down to 40 dB below the loudest, within 1.3 dB
+    (measured .9 to 1.0); 12 dB without."""
     step, stage, bodies = 25e-6, gf.load(HOUSED), gf.reduce(gf.load(HOUSED))
     *gears, own = bodies
     sensors = dataclasses.replace(own.sensors, rows=own.sensors.rows / 100)

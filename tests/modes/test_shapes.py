@@ -14,8 +14,7 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.modes.harmonics import MOST, harmonic_shares
-from gearfmu.modes.shapes import energy_shares
+from gearfmu.modes.shapes import MOST, energy_shares, harmonic_shares
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.spec.forms.expand import rewritten

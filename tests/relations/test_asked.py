@@ -17,7 +17,7 @@ from kinds import KINDS, Kind, drawn, level_number
 from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.spec.tables.profile import Profile
 from gearfmu.stage import StageModel, Steady, Trace, simulate
-from gearfmu.stage.run.steady import Drive, steady_run
+from gearfmu.stage.run.steady import LoadCase, steady_run
 
 STEP, DURATION, SETTLED = 20e-6, 0.035, 0.015  # s
 ASKED = 1e-3
@@ -110,7 +110,7 @@ def test_two_effects_off_and_the_stiffness_of_level_paper_are_known_too() -> Non
 def test_a_profile_of_one_torque_is_run_at_it(parameters: dict[str, float]) -> None:
     kind = KINDS["pair"]
     profile = Profile(np.array([0.0, DURATION]), torque=np.full(2, kind.torque), speed=np.full(2, kind.speed))
-    trace = steady_run(kind.model(), Drive(profile=profile, step=STEP), {"level": 1.0, **parameters})
+    trace = steady_run(kind.model(), LoadCase(profile=profile, step=STEP), {"level": 1.0, **parameters})
     found = deviations(trace, kind.model().driven_by_springs(), kind)
     assert max(map(abs, found.values())) < ASKED, found
 

@@ -13,7 +13,7 @@ from kinds import COARSE, KINDS, assembled
 
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.spec.tables.supports import SupportSpec
-from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.te import loaded_te
 
 TORQUE, POSITIONS = 300.0, 16  # N·m, over a pitch
 COARSEST = COARSE.model_copy(
@@ -58,7 +58,7 @@ def transmission_error(teeth: int = 24, helix: float = 0.0, held: bool = False) 
         update={"bodies": changed, "rotors": rotors, "supports": tuple(map(support, stage.supports))}
     )
     bodies = {gear.name: reduced_gear(gear) for gear in other.gears}
-    return stage_te(assembled(other, bodies), [TORQUE], POSITIONS).te[0]
+    return loaded_te(assembled(other, bodies), [TORQUE], POSITIONS).te[0]
 
 
 def test_a_vanishing_helix_angle_of_either_hand_is_a_spur_gear() -> None:

@@ -14,8 +14,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.limits import largest_torque
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import stage_te
-from gearfmu.stage.run.te import statics_of
+from gearfmu.stage.run.te import loaded_te, statics_of
 
 COUNTS = {"pair": 60, "helical": 50, "internal": 40, "train": 20, "set": 5, "helical_set": 2}
 NEAR = 1e-6  # of the load: a neighbour
@@ -65,8 +64,8 @@ def test_a_load_without_equilibrium_is_named_and_loses_no_other(name: str) -> No
     """The loads before and after it are those of a call without it, but for what single precision leaves undecided."""
     model = KINDS[name].model()
     torques, broken = [0.5 * KINDS[name].torque, KINDS[name].torque], WRONG_WAY * KINDS[name].torque
-    alone = stage_te(model, torques, 2)
-    found = stage_te(model, [torques[0], broken, torques[1]], 2)
+    alone = loaded_te(model, torques, 2)
+    found = loaded_te(model, [torques[0], broken, torques[1]], 2)
     assert [bool(why) for why in found.failed] == [False, True, False] and not any(alone.failed)
     assert f"no static equilibrium under {broken:g} N·m" in found.failed[1]
     assert np.all(np.isnan(found.te[1])) and np.all(np.isnan(found.stage_stiffness[1]))
@@ -74,4 +73,4 @@ def test_a_load_without_equilibrium_is_named_and_loses_no_other(name: str) -> No
     assert np.array_equal(found.found.te, found.te[[0, 2]]) and found.found.failed == ("", "")
     assert found.failed[1] in dict(found.rows).values()
     with pytest.raises(SimulationError, match="no static equilibrium"):
-        stage_te(model, [broken], 2)
+        loaded_te(model, [broken], 2)

@@ -18,8 +18,8 @@ from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import StageModel, Steady
-from gearfmu.stage.run.set_te import stage_te
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.te import loaded_te
 from gearfmu.stage.run.trace import Trace
 from gearfmu.study.bench import Point, measure, models_for
 from gearfmu.study.ladder import window
@@ -32,7 +32,7 @@ SHARE = 1e-3  # of the mean force: below it an order is not heard
 
 def harmonics(model: StageModel, torque: float, positions: int = POSITIONS, **parameters: float) -> np.ndarray:
     """(HARMONICS,) m, rms, of the static transmission error."""
-    return stage_te(model, [torque], positions, **parameters).harmonics(HARMONICS)[0]
+    return loaded_te(model, [torque], positions, **parameters).harmonics(HARMONICS)[0]
 
 
 def moved(coarse: np.ndarray, fine: np.ndarray, least: float) -> list[str]:
@@ -73,7 +73,7 @@ def test_no_line_of_the_transmission_error_at_the_parts(slices: int) -> None:
     """Of parts that entered one after the other there would be orders k·slices/overlap: none is above its neighbours by
     more than half."""
     kind, overlap = KINDS["helical"], 1.016
-    found = stage_te(kind.model(), [kind.torque], 400, slices=float(slices)).harmonics(80)[0]
+    found = loaded_te(kind.model(), [kind.torque], 400, slices=float(slices)).harmonics(80)[0]
     for order in np.round(np.arange(1, 80 * overlap / slices) * slices / overlap).astype(int):
         if 3 < order < 77:
             near = np.r_[found[order - 4 : order - 1], found[order : order + 3]]  # found[k - 1]: order k

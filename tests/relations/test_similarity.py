@@ -31,7 +31,7 @@ from gearfmu.spec.reading.base import Quantity, Spec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.te import loaded_te
 
 C = 4.0
 H = 10e-6  # s
@@ -195,7 +195,7 @@ def test_frequencies_fall_with_the_size(name: str) -> None:
 def test_transmission_error_grows_with_the_size(name: str) -> None:
     """Stiffness per face width stays, to the roughness of light contacts."""
     kind = KINDS[name]
-    small, large = (stage_te(model_at(kind, c), [load_at(kind, c).torque], 3) for c in (1.0, C))
+    small, large = (loaded_te(model_at(kind, c), [load_at(kind, c).torque], 3) for c in (1.0, C))
     assert large.te / C == pytest.approx(small.te, rel=1e-6)
     assert large.stage_stiffness / C == pytest.approx(small.stage_stiffness, rel=1e-3)
 

@@ -16,7 +16,7 @@ import pytest
 from kinds import KINDS, Kind, drawn
 
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 from gearfmu.stage import StageModel
 
 H, INNER = 24e-6, 4e-6  # s: communication step, internal step
@@ -31,7 +31,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 folder = Path(sys.argv[1])
 given = dict(np.load(folder / "given.npz"))
 kernel = Kernel((folder / "blob").read_bytes(), {"level": 1.0, "h": float(sys.argv[2])})

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu.report.flanks import write_flanks
+from gearfmu.report.te import write_flanks
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stage import load_stage

@@ -14,9 +14,8 @@ from gearfmu.body import load_bodies
 from gearfmu.cli import outcome
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
-from gearfmu.report.plots_set import planet_set
 from gearfmu.report.runup import Turning, resonances, run_up_of_meshes, run_up_of_set
-from gearfmu.report.signals import Window, known_meshings
+from gearfmu.report.signals import Window, known_meshings, planet_set
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.run.trace import Channel, Trace

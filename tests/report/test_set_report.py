@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from gearfmu import report
-from gearfmu.report import plots_set
+from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart
 from gearfmu.report.heading import of_set, phasing, planet_phases
 from gearfmu.report.metrics import Spectrum, band_rms
-from gearfmu.report.plots_set import LEAST_SPAN, planet_set, planets, shares, sharing
+from gearfmu.report.planets import LEAST_SPAN, planets, shares, sharing
 from gearfmu.report.run import Run
-from gearfmu.report.signals import Window, known_meshings
+from gearfmu.report.signals import Window, known_meshings, planet_set
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace
 
@@ -128,7 +128,7 @@ def test_spectrum_of_the_ring_is_that_of_its_force_as_recorded() -> None:
     trace = set_run()
     own = planet_set(trace, known_meshings(trace))
     assert own is not None
-    plot = plots_set.spectrum(trace, own, Window(0.0, 0.2, "here"))
+    plot = plots_nvh.spectra_by_central(trace, own, Window(0.0, 0.2, "here"))
     assert f"f_m = {MESH:.1f} Hz" in plot.caption and f"f_c = {CARRIER / 2 / np.pi:.2f} Hz" in plot.caption
     lines = Spectrum(plot.columns["frequency_[Hz]"], plot.columns["bearing.ring.fx_rms_[N]"], 1)
     middle, low, high = (band_rms(lines, MESH + side * 13.53 - 6.0, MESH + side * 13.53 + 6.0) for side in (0, -1, 1))
@@ -141,7 +141,7 @@ def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:
     trace = Trace(trace.time, {**trace.channels, "carrier.gear.w": swinging}, trace.meta)
     own = planet_set(trace, known_meshings(trace))
     assert own is not None
-    assert "the speed is not steady" in plots_set.spectrum(trace, own, Window(0.0, 0.2, "here")).caption
+    assert "the speed is not steady" in plots_nvh.spectra_by_central(trace, own, Window(0.0, 0.2, "here")).caption
 
 
 def test_a_pair_is_no_set() -> None:
@@ -153,7 +153,7 @@ def test_a_pair_is_no_set() -> None:
 def test_energy_that_the_balance_leaves_is_told_of_what_passed_through() -> None:
     trace = set_run()
     channels = {**trace.channels, "energy.residual": Channel(np.linspace(0.0, 1.02, SAMPLES), "J")}
-    plot = plots_set.energy(Trace(trace.time, channels, trace.meta))
+    plot = plots.energy(Trace(trace.time, channels, trace.meta))
     assert plot is not None and "5.0e-05 of the energy" in plot.caption
     rows = list(csv.reader(",".join(plot.columns).splitlines()))
     assert "drive.carrier.work_[J]" in rows[0]

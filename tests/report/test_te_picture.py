@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import gearfmu as gf
-from gearfmu.report.te import peak_to_peak, write_plot, write_set_plot
+from gearfmu.report.te import peak_to_peak, write_plot
 from gearfmu.stage import loaded_te
-from gearfmu.stage.run.set_te import SetTeResult
 from gearfmu.stage.run.te import TeResult
 
 POSITION = np.arange(16) / 16
@@ -18,17 +17,13 @@ TORQUE = np.array([50.0, 200.0])
 
 
 def made(torque: np.ndarray, te: np.ndarray) -> TeResult:
-    alike = np.ones((torque.size, POSITION.size))
-    return TeResult(
-        torque,
-        POSITION,
-        te,
-        alike,
-        alike,
-        np.ones((torque.size, 16, 4)),
-        np.ones((torque.size, 5)),
-        ("",) * torque.size,
-    )
+    alike, found = np.ones(te.shape), ("",) * torque.size
+    return TeResult(torque, POSITION, te, alike, alike, np.ones((torque.size, 16, 4)), np.ones((torque.size, 5)), found)
+
+
+def of_set(te: np.ndarray, sharing: np.ndarray, failed: tuple[str, ...] = ("", "")) -> TeResult:
+    none = np.zeros((2, 0))
+    return TeResult(TORQUE, POSITION, te, none, te, none[..., None], none, failed, np.nan, sharing, np.ones((2, 16, 2)))
 
 
 def test_every_torque_is_named_with_its_peak_to_peak_and_the_unloaded_one_beside(tmp_path: Path) -> None:
@@ -45,7 +40,7 @@ def test_every_torque_is_named_with_its_peak_to_peak_and_the_unloaded_one_beside
 def test_a_set_has_its_load_factor_over_the_torque(tmp_path: Path) -> None:
     te, sharing = np.zeros((2, 16)), np.ones((2, 16, 2, 3))
     sharing[1, 4, 0] = (1.2, 0.9, 0.9)
-    write_set_plot(SetTeResult(TORQUE, POSITION, te, te, sharing, np.ones((2, 16, 2)), ("", "")), tmp_path / "te.svg")
+    write_plot(of_set(te, sharing), tmp_path / "te.svg")
     seen = (tmp_path / "te.svg").read_text(encoding="utf-8")
     assert "mesh load factor K_γ" in seen and "planet 3" in seen
 
@@ -62,6 +57,5 @@ def test_rounding_is_no_error_of_transmission() -> None:
 
 def test_a_torque_without_equilibrium_is_a_row_with_its_reason() -> None:
     alike, sharing = np.ones((2, 16)), np.ones((2, 16, 2, 3))
-    found = SetTeResult(TORQUE, POSITION, alike, alike, sharing, np.ones((2, 16, 2)), ("", "no static equilibrium"))
-    rows = found.rows
+    rows = of_set(alike, sharing, ("", "no static equilibrium")).rows
     assert rows[-1] == ("200.0 N·m", "no static equilibrium") and len(rows) == 1 + 2 + 1

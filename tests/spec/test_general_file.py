@@ -11,6 +11,7 @@ from refused import refused
 from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError
 from gearfmu.spec.forms.body import expected_hash
+from gearfmu.spec.reading.base import field_path
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 
@@ -133,3 +134,9 @@ def test_no_layer_of_problems_hides_the_next(tmp_path):
         ("slices = ", "slicess = "),
     )  # fmt: skip
     assert {"engagements.stage1.gears", "ports.output.at"} <= set(found), found
+
+
+@pytest.mark.parametrize("kind", ["gear", "ring", "shaft", "carrier", "housing"])
+def test_a_problem_is_named_by_its_field_whatever_the_kind_of_body(kind):
+    assert field_path({"bodies": {"part": {"kind": kind}}}, ("bodies", "part", kind, "odd")) == "bodies.part.odd"
+    assert field_path({"kind": "planetary_set"}, (kind, "teeth")) == f"{kind}.teeth", "a missing table"

@@ -14,7 +14,7 @@ from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.schema import set_schema
-from gearfmu.spec.stage import load_stage, require_pair
+from gearfmu.spec.stage import load_stage
 
 TEXT = find_stage("planetary54").read_text(encoding="utf-8")
 
@@ -124,11 +124,6 @@ def test_pin_errors_move_the_axes_of_planets(tmp_path):
     rotors = spec.rotors
     assert rotors["planet2"].offset == pytest.approx((-12e-6, 0.0)) and rotors["planet1"].offset == (0.0, 0.0)
     assert "the 4 are 0 to 3" in problems(tmp_path, (old, "pin_errors = { 4 ="))["set.pin_errors.4"]
-
-
-def test_a_verb_that_needs_a_pair_says_so():
-    with pytest.raises(SpecError, match="this is about one pair"):
-        require_pair(load_stage("planetary54"))
 
 
 def test_a_body_depends_on_its_own_numbers_only(tmp_path):

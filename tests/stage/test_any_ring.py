@@ -13,7 +13,7 @@ from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import Steady, assemble, simulate
-from gearfmu.stage.run.set_te import set_te
+from gearfmu.stage.run.te import loaded_te
 
 COARSE = {"modes": 24, "roll_points": 8, "width_functions": 3}
 
@@ -32,7 +32,7 @@ def test_a_set_with_61_teeth_in_its_ring_is_reduced_and_moves(tmp_path: Path) ->
     spec = rewritten(spec, **gears, carrier=plate)
     bodies = [reduce_body(spec, name) for name in (*gears, "carrier")]
     model = assemble(spec, bodies)
-    shares = set_te(model, [300.0], 2).sharing
+    shares = loaded_te(model, [300.0], 2).sharing
     assert shares == pytest.approx(np.ones(shares.shape), abs=0.05)
     model = model.driven_by_springs()
     trace = simulate(model, Steady(model, 40.0, 300.0), 1e-3, 20e-6, {"level": 1.0})

@@ -42,7 +42,7 @@ def test_pair_stiffness_at_the_pitch_point(plain: StageModel, pair: PairGeometry
 def test_transmission_error_over_one_pitch(plain: StageModel, torque: str) -> None:
     """Mean and peak to peak within 3 % of CalculiX, tip contact included."""
     golden = GOLDEN["te_um_by_torque_Nm_and_position"][torque]
-    ours = 1e6 * loaded_te(plain, [float(torque)], GOLDEN["positions_per_pitch"], rigid_bearings=True).te[0]
+    ours = 1e6 * loaded_te(plain, [float(torque)], GOLDEN["positions_per_pitch"], **{"effect.bearings": 0.0}).te[0]
     here = ours[[int(k) for k in golden]]
     theirs = np.array(list(golden.values()))
     print(
@@ -59,7 +59,7 @@ def test_transmission_error_on_rigid_bores(spec: Stage) -> None:
     averaged bores, which are 4 % softer; in truth single positions stay within 1 %."""
     bodies = rigid_bores.rigid_bore_bodies(spec)
     golden, count = GOLDEN["te_um_with_clamped_bores"], GOLDEN["positions_per_pitch"]
-    result = loaded_te(assemble(spec, bodies), [float(t) for t in golden], count, rigid_bearings=True)
+    result = loaded_te(assemble(spec, bodies), [float(t) for t in golden], count, **{"effect.bearings": 0.0})
     for curve, (torque, theirs) in zip(1e6 * result.te, golden.items(), strict=True):
         here, values = curve[[int(k) for k in theirs]], np.array(list(theirs.values()))
         print(f"{torque} N·m: {len(values)} positions, {100 * (here / values - 1).min():+.2f} … "

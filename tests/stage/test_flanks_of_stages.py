@@ -21,8 +21,7 @@ from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.flanks import FlankField
 from gearfmu.stage.build.meshes import tooth_phases
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import set_te
-from gearfmu.stage.run.te import statics_of
+from gearfmu.stage.run.te import loaded_te, statics_of
 
 TORQUE = 600.0
 
@@ -50,7 +49,7 @@ def test_an_eccentric_planet_at_one_angle_is_a_pin_out_of_its_place(spec: Stage,
     phase = tooth_phases(spec)["planet2"]
     eccentric = in_set(spec, planet_eccentricity={1: Eccentricity(amount=e, angle=bolt + direction - phase)})
     pinned = in_set(spec, pin_errors={1: (e * math.cos(direction), e * math.sin(direction))})
-    plain, found, expected = (set_te(assemble(s, parts), [TORQUE], 1) for s in (spec, eccentric, pinned))
+    plain, found, expected = (loaded_te(assemble(s, parts), [TORQUE], 1) for s in (spec, eccentric, pinned))
     shares = found.sharing[0, 0, :, 1], expected.sharing[0, 0, :, 1], plain.sharing[0, 0, :, 1]
     print(f"shares of planet 2 at sun and ring {shares[0]}, by its pin {shares[1]}, in place {shares[2]}")
     change = np.abs(expected.sharing - plain.sharing).max()
@@ -85,7 +84,7 @@ def test_relief_of_a_ring_opens_its_mesh(spec: Stage, parts: list[Any]) -> None:
         model = assemble(rewritten(spec, ring=ring), parts)
         sections, number = read_blob(model.blob), [g.name for g in model.stage.gears].index("ring")
         assert (f"flank{number}" in sections) is (kind == "linear")
-        errors.append(set_te(model, [TORQUE], 2).te[0] - set_te(plain, [TORQUE], 2).te[0])
+        errors.append(loaded_te(model, [TORQUE], 2).te[0] - loaded_te(plain, [TORQUE], 2).te[0])
     linear, parabolic = np.abs(errors)
     print(f"te by relief {1e6 * linear} µm, parabolic {1e6 * parabolic} µm")
     assert 0.1e-6 < parabolic.max() < linear.max() < 20e-6

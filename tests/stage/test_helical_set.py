@@ -17,7 +17,7 @@ from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.run.set_te import SetTeResult, set_te
+from gearfmu.stage.run.te import TeResult, loaded_te
 
 BETA, TORQUE, SLICES, WIDTH, STEEL = math.radians(20), 300.0, 6, 30e-3, 2.06e11
 SUPPORTS = ("bearing.sun", "bearing.ring", "bearing.carrier")
@@ -123,23 +123,23 @@ def test_a_set_of_the_other_hand_is_the_mirror_image() -> None:
         assert forces[0] == pytest.approx(forces[1][::-1], rel=1e-6)
 
 
-def errors(rigid: RigidSet, torque: float = TORQUE, positions: int = 12) -> SetTeResult:
-    return set_te(rigid.model(), [torque], positions, **FOUNDATION)
+def errors(rigid: RigidSet, torque: float = TORQUE, positions: int = 12) -> TeResult:
+    return loaded_te(rigid.model(), [torque], positions, **FOUNDATION)
 
 
 def test_a_vanishing_helix_is_the_spur_set() -> None:
     """But for what helical slices yield of their own, which spur gears go without."""
     models = [by_functions_alone(replace(HELICAL, helix_angle=beta).model()) for beta in (1e-7, 0.0)]
-    nearly, spur = (set_te(model, [TORQUE], 6, **FOUNDATION) for model in models)
+    nearly, spur = (loaded_te(model, [TORQUE], 6, **FOUNDATION) for model in models)
     assert np.abs(nearly.te - spur.te).max() < 1e-6 * np.abs(spur.te).max()
     assert np.abs(nearly.sharing - spur.sharing).max() < 1e-6
 
 
-def overlapping(slices: int, helix_angle: float = BETA) -> SetTeResult:
+def overlapping(slices: int, helix_angle: float = BETA) -> TeResult:
     """At an overlap ratio of one, flanks of steel: parts of a line of contact yield each by itself."""
     width = math.pi * HELICAL.module / math.sin(BETA)
     rigid = replace(HELICAL, teeth=(27, 33), width=width, slices=slices, youngs_modulus=STEEL, helix_angle=helix_angle)
-    return set_te(rigid.model(), [TORQUE], 6, **FOUNDATION | {"slices": float(slices)})
+    return loaded_te(rigid.model(), [TORQUE], 6, **FOUNDATION | {"slices": float(slices)})
 
 
 def test_overlap_smooths_the_transmission_error() -> None:
@@ -223,7 +223,7 @@ def test_tilting_planets_of_the_shipped_set_take_load_to_the_ends_of_their_teeth
 @pytest.mark.full
 def test_the_shipped_set_is_smooth_and_shares_alike(shipped: StageModel) -> None:
     """At 400 N·m: 0.2 µm of 172 µm, planets a third of a pitch apart."""
-    found = set_te(shipped, [CARRIER], 12)
+    found = loaded_te(shipped, [CARRIER], 12)
     print(found.te.mean(), np.ptp(found.te), found.load_factor)
     assert np.ptp(found.te) < 0.3e-6 and found.load_factor.max() < 1.01
     assert found.sharing.mean(axis=1) == pytest.approx(1.0, abs=1e-3)

@@ -317,7 +317,7 @@ def test_an_equilibrium_stays(model: StageModel) -> None:
 
 def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMesh, bodies, model) -> None:
     """Both bodies' static tables with bore and rim held, and the local law with the relative curvature 1/s − 1/s'."""
-    result = loaded_te(model, [TORQUE], 8, rigid_bearings=True)
+    result = loaded_te(model, [TORQUE], 8, **{"effect.bearings": 0.0})
     alone = int(np.argmax(result.te[0]))
     roll = mesh.planet.r_b * (2 * math.pi / 18 * alone / 8 + mesh.planet.psi_b + mesh.alpha_wt)
     fitting = [roll + k * mesh.base_pitch for k in range(-3, 4)]

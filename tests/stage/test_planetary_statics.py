@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import pytest
 from gearfmu import cli
 from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
-from gearfmu.errors import ModelError, SimulationError
+from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
 from gearfmu.modes.linear import linearised
@@ -23,10 +22,9 @@ from gearfmu.spec.forms.expand import rewritten, with_ports
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.turning import turns
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import SetTeResult, set_te
-from gearfmu.stage.run.te import statics_of
+from gearfmu.stage.run.te import TeResult, loaded_te, statics_of
 
 TORQUE = 600.0  # N·m on the carrier, driving
 R_SUN = 1.25e-3 * 18 * math.cos(math.radians(20))  # base radius of sun and planets, m
@@ -58,8 +56,8 @@ def model(spec: Stage, parts: list[Any]) -> StageModel:
 
 
 @pytest.fixture(scope="module")
-def ideal(model: StageModel) -> SetTeResult:
-    return set_te(model, [TORQUE], POSITIONS)
+def ideal(model: StageModel) -> TeResult:
+    return loaded_te(model, [TORQUE], POSITIONS)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +93,7 @@ def test_without_coast_flanks_the_set_is_driven_through_those_that_carry(name: s
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
-def test_the_how_to_has_what_te_says(ideal: SetTeResult, at_rest: Kernel) -> None:
+def test_the_how_to_has_what_te_says(ideal: TeResult, at_rest: Kernel) -> None:
     """docs/howto-planetary.md: transmission error of a mesh at rest at level rigid to 0.01 µm, K_gamma of ideal pins
     to its digits."""
     page = (Path(__file__).parents[2] / "docs" / "howto-planetary.md").read_text(encoding="utf-8")
@@ -128,14 +126,14 @@ def test_torque_on_the_input_over_mesh_force(model: StageModel, mesh: str) -> No
     assert loaded_te(model, [TORQUE], 2, mesh=mesh).stage_stiffness.min() > 0
 
 
-def test_mean_mesh_force_holds_the_torque(ideal: SetTeResult) -> None:
+def test_mean_mesh_force_holds_the_torque(ideal: TeResult) -> None:
     """T_s/(N r_b); 1e-3: the slope of the tip relief in the arm of the torque; 2e-3 where a tip edge carries, off the
     line of action."""
     assert np.allclose(ideal.force, MEAN, rtol=2e-3)
     assert np.allclose(ideal.force.mean(axis=1), MEAN, rtol=6e-4)
 
 
-def test_planets_opposite_each_other_carry_alike(ideal: SetTeResult) -> None:
+def test_planets_opposite_each_other_carry_alike(ideal: TeResult) -> None:
     """The set is the same after half a turn, after a quarter half a mesh period later; 1e-3: mean tooth of the ring."""
     sharing = ideal.sharing[0]
     assert np.abs(sharing[:, :, :2] - sharing[:, :, 2:]).max() < 2e-4
@@ -144,13 +142,13 @@ def test_planets_opposite_each_other_carry_alike(ideal: SetTeResult) -> None:
     assert np.abs(sharing[:, :, 1] - later).max() < 3e-4
 
 
-def test_shares_of_a_mesh_period_average_to_one(ideal: SetTeResult) -> None:
+def test_shares_of_a_mesh_period_average_to_one(ideal: TeResult) -> None:
     assert np.allclose(ideal.sharing.sum(axis=3), 4, rtol=1e-12)
     assert np.abs(ideal.sharing.mean(axis=1) - 1).max() < 1e-3
     assert np.all(ideal.load_factor > 1.005) and np.all(ideal.load_factor < 1.02)
 
 
-def test_the_next_mesh_period_is_the_same(model: StageModel, ideal: SetTeResult) -> None:
+def test_the_next_mesh_period_is_the_same(model: StageModel, ideal: TeResult) -> None:
     kernel, pitch = statics_of(model), abs(place_of(model, "sun_planet1").pitch)
     for periods in (1, 8, -9):  # 9: sixty degrees of the carrier
         at = (periods + 3 / POSITIONS) * pitch
@@ -160,7 +158,7 @@ def test_the_next_mesh_period_is_the_same(model: StageModel, ideal: SetTeResult)
 
 def test_progress_is_the_part_done_and_the_torque(model: StageModel) -> None:
     told: list[tuple[float, str]] = []
-    set_te(model, [60.0, TORQUE], 1, progress=lambda part, text: told.append((part, text)))
+    loaded_te(model, [60.0, TORQUE], 1, progress=lambda part, text: told.append((part, text)))
     assert told == [(0.0, "60 N·m"), (0.5, f"{TORQUE:g} N·m")]
 
 
@@ -168,28 +166,28 @@ def test_progress_is_the_part_done_and_the_torque(model: StageModel) -> None:
 def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: Stage) -> None:
     """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
     with the torque."""
-    result = set_te(model, [0.0, 60.0, TORQUE], 2)
+    result = loaded_te(model, [0.0, 60.0, TORQUE], 2)
     assert np.allclose(
         result.te[0], -spec.written.set.backlash * math.cos(spec.written.set.pressure_angle), atol=0.15e-6
     )
     assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
-    other = set_te(model, [-TORQUE], 2)
+    other = loaded_te(model, [-TORQUE], 2)
     assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
 
 
 @pytest.mark.full
 def test_a_pin_that_stands_forward_carries_more(
-    model: StageModel, spec: Stage, parts: list[Any], ideal: SetTeResult
+    model: StageModel, spec: Stage, parts: list[Any], ideal: TeResult
 ) -> None:
     """The driving carrier presses with the planet whose pin stands ahead of its place; the sum stays, and twice the
     error shifts the load twice as far."""
-    once, twice = (set_te(assemble(with_pins(spec, pin0=(0.0, e)), parts), [TORQUE], 4) for e in (6e-6, 12e-6))
+    once, twice = (loaded_te(assemble(with_pins(spec, pin0=(0.0, e)), parts), [TORQUE], 4) for e in (6e-6, 12e-6))
     shift = [result.sharing.mean(axis=1)[0] - 1 for result in (once, twice)]
     assert np.all(shift[1][:, 0] > 0.06) and np.all(shift[1][:, [1, 3]] < -0.02)
     assert np.allclose(shift[1], 2 * shift[0], atol=2e-3)
     assert np.allclose(twice.force, MEAN, rtol=1e-3)
     assert np.all(twice.load_factor > 1.06)
-    behind = set_te(assemble(with_pins(spec, pin2=(0.0, -12e-6)), parts), [TORQUE], 4)
+    behind = loaded_te(assemble(with_pins(spec, pin2=(0.0, -12e-6)), parts), [TORQUE], 4)
     assert np.allclose(behind.sharing.mean(axis=1)[0, :, 2] - 1, -shift[1][:, 0], atol=5e-3)
 
 
@@ -269,11 +267,6 @@ def test_level_does_not_change_how_the_ring_yields_between_planets(model: StageM
 @pytest.mark.full
 def test_statics_find_their_equilibrium_at_level_fast(model: StageModel) -> None:
     statics_of(model, level=1.0).transmission(0.0, TORQUE)
-
-
-def test_a_pair_is_no_set(model: StageModel) -> None:
-    with pytest.raises(ModelError, match="is no planetary set"):
-        set_te(replace(model, stage=load_stage("fzg_c")), [TORQUE], 2)
 
 
 @pytest.mark.full

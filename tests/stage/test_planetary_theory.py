@@ -26,7 +26,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.set_te import SetTeResult, set_te
+from gearfmu.stage.run.te import TeResult, loaded_te
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02
@@ -118,9 +118,9 @@ def test_a_pin_error_excites_other_modes_too() -> None:
     assert response(RigidSet(3, pins={1: (0.0, 1e-5)})) > 1e-2
 
 
-def periods(rigid: RigidSet, torque: float) -> SetTeResult:
+def periods(rigid: RigidSet, torque: float) -> TeResult:
     """Statics over one mesh period, at a multiple of the planets' number of positions."""
-    return set_te(rigid.model(), [torque], {3: 24, 4: 24, 5: 20, 6: 24}[rigid.planets], **SPRINGS)
+    return loaded_te(rigid.model(), [torque], {3: 24, 4: 24, 5: 20, 6: 24}[rigid.planets], **SPRINGS)
 
 
 @pytest.mark.parametrize(("planets", "teeth"), [(3, (26, 34)), slow(4, (27, 33)), (5, (26, 34)), slow(6, (37, 23))])
@@ -190,7 +190,7 @@ def test_three_elastic_planets_share_alike(pins: dict[int, tuple[float, float]])
     sun = spec.written.sun.model_copy(update={"bearing": bearing})
     carrier = RigidSet(3, (18, 18), module=2.5e-3).bodies()[3]
     model = assemble(rewritten(spec, set=three, sun=sun), [*load_bodies(spec)[:3], carrier])
-    found = set_te(model, [450.0], 6)
+    found = loaded_te(model, [450.0], 6)
     print(found.sharing.mean(axis=1), found.load_factor)
     assert found.sharing.mean(axis=1).max() == pytest.approx(1.0, abs=5e-3)
 

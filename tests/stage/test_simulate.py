@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.expand import with_ports
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import StageModel, Steady, Trace, loaded_te, simulate
+from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 H = 60e-6  # s, communication step: 8, 16, 32 … internal steps of 7.5, 3.75, 1.875 … µs
@@ -203,3 +205,15 @@ def test_meta_of_a_run_needs_nobody_to_complete_it(steady: Trace, relieved: Stag
     assert abs(steady.meta["energy_residual"]) < 1e-2 and steady.meta["H"] == H
     assert [gear for gear, *_ in steady.meta["meshes"].values()] == ["pinion"]
     assert load_stage(steady.meta["stage"]) == load_stage(steady.meta["stage_path"]) == relieved.stage
+
+
+def test_a_run_is_wound_up_through_the_plays_of_its_ports(relieved: StageModel, bodies: list[Body]) -> None:
+    """Its torque is the one that was asked for, on either flank; a play that stays closed changes no force."""
+
+    def loaded(model: StageModel, torque: float) -> np.ndarray:
+        return simulate(model, Steady(model, SPEED, torque), 2.4e-3, H, {"level": FAST})["pinion.tau"]
+
+    port = relieved.stage.ports["pinion"].model_copy(update={"play": 3e-3})
+    free = assemble(with_ports(relieved.stage, {"pinion": port}), bodies)
+    for torque in (LOAD, -LOAD):
+        assert loaded(free, torque) == pytest.approx(loaded(relieved, torque), rel=1e-6)

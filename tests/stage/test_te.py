@@ -62,7 +62,7 @@ def test_overload_finds_its_equilibrium_everywhere(plain: StageModel, relieved: 
 def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageModel, rigid_bearings: bool) -> None:
     """The zero of the scale: with nothing to bend them the involutes of the pair as drawn touch at te = 0
     everywhere."""
-    result = loaded_te(plain, [0.0, 302.0], 64, rigid_bearings=rigid_bearings)
+    result = loaded_te(plain, [0.0, 302.0], 64, **{"effect.bearings": float(not rigid_bearings)})
     assert np.abs(result.te[0]).max() < 1e-11 and result.te[1].min() > 2e-5
     assert np.all(result.stage_stiffness[0] > 0.4 * result.stage_stiffness[1])
 
@@ -73,7 +73,7 @@ def test_unloaded_te_of_a_relieved_pair_is_the_gap_of_the_nearest_flanks(
     """With the axes held: te₀ = min over the pairs in reach of the relief depths at the rolls of contact, to the shift
     of these rolls by te₀ itself (slope of the relief: < 1 %)."""
     shapes, positions = pair.gears, 64
-    found = loaded_te(relieved, [0.0], positions, rigid_bearings=True, **{"effect.tip_contact": 0.0}).te[0]
+    found = loaded_te(relieved, [0.0], positions, **{"effect.bearings": 0.0, "effect.tip_contact": 0.0}).te[0]
     first = shapes[0].r_b * (shapes[0].psi_b + pair.alpha_wt)  # roll of pinion tooth 0 at position 0
     rolls = first + pair.base_pitch * (np.arange(-3, 4)[:, None] + np.arange(positions) / positions)
     depth = np.zeros(rolls.shape)
@@ -82,7 +82,7 @@ def test_unloaded_te_of_a_relieved_pair_is_the_gap_of_the_nearest_flanks(
         relief = gear.tip_relief.amount * (np.maximum(roll - start, 0) / (shape.s_a - start)) ** 2
         depth += np.where((roll < shape.s_form) | (roll > shape.s_tip), np.inf, relief)
     assert found.max() > 3e-6 and np.allclose(found, depth.min(axis=0), rtol=1e-2, atol=1e-11)
-    coast = loaded_te(relieved, [-1e-2], positions, rigid_bearings=True, **{"effect.tip_contact": 0.0}).te[0]
+    coast = loaded_te(relieved, [-1e-2], positions, **{"effect.bearings": 0.0, "effect.tip_contact": 0.0}).te[0]
     assert np.ptp(coast) == pytest.approx(np.ptp(found), rel=1e-2)  # the same relief on the other flanks
     assert coast.max() == pytest.approx(-pair.normal_backlash, abs=2e-8)
 
@@ -130,7 +130,7 @@ def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair
 def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -> None:
     """1/k of the stage = 1/k of the mesh + Σ 1/k of the bearings, where both have the same pairs in contact; the mesh
     stiffness is that of held axes."""
-    soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid) for rigid in (False, True))
+    soft, held = (loaded_te(plain, [LOAD], 16, **{"effect.bearings": on}) for on in (1.0, 0.0))
     assert np.allclose(soft.mesh_stiffness, held.stage_stiffness, rtol=1e-10, atol=0)  # other sums of the same numbers
     assert np.array_equal(held.mesh_stiffness, held.stage_stiffness)
     behind = 1 / soft.stage_stiffness - 1 / soft.mesh_stiffness
@@ -142,7 +142,9 @@ def test_bearings_add_their_compliance(plain: StageModel, spec: Stage, pair: Pai
     """Isotropic bearings: te grows by F(1/k₁ + 1/k₂); where the moved axes change which pairs carry, by up to a few
     percent more."""
     expected = LOAD / pair.gears[0].r_b * sum(1 / gear.bearing.stiffness for gear in spec.written.gears)
-    soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid).te[0] for rigid in (False, True))
+    soft, held = (
+        loaded_te(plain, [LOAD], 16, **{"effect.bearings": float(not rigid)}).te[0] for rigid in (False, True)
+    )
     more = (soft - held) / expected
     assert np.allclose(np.median(more), 1.0, atol=2e-3) and np.allclose(more, 1.0, atol=6e-2)
     assert np.mean(np.abs(more - 1) < 0.02) > 0.8

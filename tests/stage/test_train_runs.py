@@ -20,7 +20,7 @@ from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from gearfmu.stage.run.steady import Drive, steady_run
+from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5
@@ -211,7 +211,7 @@ def test_a_stage_without_input_and_output_is_refused(two_stage) -> None:
     third = stage.ports["input"].model_copy(update={"body": "intermediate_shaft"})
     crowded = stage.model_copy(update={"ports": stage.ports | {"third": third}})
     with pytest.raises(SpecError, match=r"ports\.third\.kind = .*simulate drives input and output only: make"):
-        steady_run(replace(two_stage, stage=crowded), Drive(100.0, 50.0))
+        steady_run(replace(two_stage, stage=crowded), LoadCase(100.0, 50.0))
     apart = stage.model_copy(update={"engagements": stage.engagements[:1]})
     with pytest.raises(SpecError, match="no meshes lead from the first port to the second"):
         shafts_of(apart)

@@ -50,7 +50,7 @@ def test_te_says_what_the_slices_leave_open(
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         cli.main(["te", "helical_demo", "--torque", "100 N*m", "--positions", "4", "--rigid-bearings"])
-    said = left_of_slices(helical, [100.0], rigid_bearings=True).text
+    said = left_of_slices(helical, [100.0], **{"effect.bearings": 0.0}).text
     assert not ended.value.code and said in capsys.readouterr().out and "14 slices" in said
 
 

@@ -31,6 +31,12 @@ def test_alternating_part_and_mean_apart() -> None:
     assert e.force == pytest.approx(0.1, rel=1e-9) and e.bearing == pytest.approx(0.0, abs=1e-12)
 
 
+def test_meshes_of_a_train_count_together() -> None:
+    both = np.stack([3e-6 * SINE, 4e-6 * SINE], 1)
+    found = signals(te=both + 0.5e-6 * SINE[:, None] * [0.0, 1.0])
+    assert errors(found, signals(te=both)).te == pytest.approx(0.1, rel=1e-9)
+
+
 def test_bearing_is_the_worse_of_two_vectors() -> None:
     bearing = signals().bearing.copy()
     bearing[:, 1] += 5 * SINE  # 5 of √(30² + 40²)
@@ -72,8 +78,11 @@ def test_bands_hold_the_rms_of_a_sine() -> None:
     assert np.isnan(band_error(louder, noisy, slice(0, 10)))
 
 
-def test_kept_signals_read_back(tmp_path) -> None:
-    made = signals(locked=SINE > 0, steady=False)
+@pytest.mark.parametrize("meshes", [1, 2])
+def test_kept_signals_read_back(tmp_path, meshes: int) -> None:
+    """Of a pair, and of a train with two meshes."""
+    columns = {name: np.stack([SINE] * meshes, 1).squeeze() for name in ("te", "force")}
+    made = signals(locked=SINE > 0, steady=False, **columns)
     made.trace({}).save(tmp_path / "s.h5")
     read = kept_signals(Trace.load(tmp_path / "s.h5"))
     for name in ("te", "force", "bearing", "locked"):

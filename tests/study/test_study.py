@@ -105,6 +105,15 @@ def test_a_replay_is_the_run(scene: SceneSpec) -> None:
     assert replay.kernel.get("mesh.te") == run.signals.te[-1]
 
 
+def test_a_train_is_measured_by_all_its_meshes_and_bearings() -> None:
+    scene = load_scene("clutch_closure_train").model_copy(update={"duration": 0.4e-3})
+    run = measure(scene, models_for(scene), Point("rigid", slices=1))
+    samples = len(run.signals.te)
+    assert run.signals.te.shape == run.signals.force.shape == (samples, 2), "stage1, stage2"
+    assert run.signals.bearing.shape == (samples, 12), "x and y of six bearings, without seats of gears on shafts"
+    assert run.signals.locked is not None and not run.signals.locked.any()
+
+
 def test_half_the_step_costs_about_twice(scene: SceneSpec) -> None:
     model = models_for(scene)
     whole, half = (measure(scene, model, Point("fast", h=h)) for h in (5e-6, 2.5e-6))

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.sweeps.plan import RUN, SIMULATE, TE, SweepError, plan, split
-from gearfmu.sweeps.values import key_and_values
+from gearfmu.sweeps.plan import RUN, SIMULATE, TE, SweepError, key_and_values, plan, split
 
 
 @pytest.mark.parametrize(

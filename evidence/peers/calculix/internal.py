@@ -61,7 +61,7 @@ def pair_of(work: Path) -> Pair:
     spec = load_stage(STAGE)
     bodies, mesh = reduce_bodies(spec, work / "internal"), mesh_shape(spec, spec.engagements[0])
     assert isinstance(mesh, RingMesh)
-    return Pair(spec, mesh, loaded_te(assemble(spec, bodies), TORQUES, POSITIONS, rigid_bearings=True, **FLANKS))
+    return Pair(spec, mesh, loaded_te(assemble(spec, bodies), TORQUES, POSITIONS, **{"effect.bearings": 0.0}, **FLANKS))
 
 
 def touching(mesh: RingMesh, turn: float) -> dict[int, tuple[float, float]]:

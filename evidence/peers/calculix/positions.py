@@ -64,7 +64,7 @@ def te_of_gearfmu(spec: Stage, bores: str) -> TeResult:
         bodies = set_bodies()
     else:
         bodies = load_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
-    return loaded_te(assemble(spec, bodies), TORQUES[spec.name], POSITIONS, rigid_bearings=True)
+    return loaded_te(assemble(spec, bodies), TORQUES[spec.name], POSITIONS, **{"effect.bearings": 0.0})
 
 
 def case_at(spec: Stage, pair: PairGeometry, torque: float, bores: str) -> Case:

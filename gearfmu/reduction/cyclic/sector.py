@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +14,7 @@ from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
@@ -68,7 +68,7 @@ class SectorBody:
     """
 
     def __init__(
-        self, mesh: Any, material: hex20.Material, flank: ToothFlank, points: Points, rigid_bore: bool = False
+        self, mesh: FeMesh, material: hex20.Material, flank: ToothFlank, points: Points, rigid_bore: bool = False
     ):
         self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
         stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
@@ -143,7 +143,7 @@ class SectorBody:
 
     @property
     def knows_stress(self) -> bool:
-        """Whether stresses of the spinning body can be told from its mesh, and so what its modes feel."""
+        """Whether stresses of the spinning body follow from its mesh, and so their effect on its modes."""
         return True
 
     @cached_property

@@ -86,7 +86,7 @@ def _all_diameters(
 ) -> _Diameters:
     z, found = body.teeth, []
     diameters = np.arange(2, z // 2 + 1)
-    for nu in diameters:
+    for nu in diameters.tolist():
         if progress:
             progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
         harmonic = body.spaces[index].harmonic(nu)
@@ -111,7 +111,7 @@ def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.n
     space, z = body.spaces[index], body.teeth
     diameters = np.arange(2, z // 2 + 1)
     turn = _weights(z, diameters)[:, None] * np.exp(2j * np.pi * np.multiply.outer(diameters, np.arange(z)) / z)
-    expand = [space.harmonic(nu).expand_border(cut) for nu, cut in zip(diameters, moved, strict=True)]
+    expand = [space.harmonic(nu).expand_border(cut) for nu, cut in zip(diameters.tolist(), moved, strict=True)]
     border = np.zeros((len(space.factor.schur), z))
     for shape, around in zip(expand, turn, strict=True):
         border += (shape * around).real

@@ -18,12 +18,13 @@ from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
 from gearfmu.femesh.imported import ImportedMesh, read_mesh
 from gearfmu.reduction.imported.couplings import Matrices
+from gearfmu.spec.tables.imported import FilesSpec
 
 _AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
 
 
-def sound_mesh(source: Any) -> ImportedMesh:
-    """The mesh of a FilesSpec in metres, its axis along z. MeshError lists what is wrong with it."""
+def sound_mesh(source: FilesSpec) -> ImportedMesh:
+    """The mesh of a FilesSpec in metres, its axis along z. MeshError lists its faults."""
     file = Path(source.file)
     mesh = read_mesh(file, source.length, tuple(source.ignore))
     mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])
@@ -56,7 +57,7 @@ def mesh_facts(mesh: ImportedMesh) -> dict[str, Any]:
     }
 
 
-def ready_matrices(source: Any, mesh: ImportedMesh, turn: np.ndarray, material: Material) -> Matrices | None:
+def ready_matrices(source: FilesSpec, mesh: ImportedMesh, turn: np.ndarray, material: Material) -> Matrices | None:
     """Ready-made matrices of a FilesSpec, checked against mesh and material; None without files.
 
     mesh : in the frame of the body. turn (3, 3) : from directions along z (`sound_mesh`) to those of that frame.

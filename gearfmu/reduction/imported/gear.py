@@ -22,6 +22,7 @@ from gearfmu.reduction.imported.flank import FitRange, fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
 from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.memory import MESH_COARSER, Need, ReductionSize, require_memory, sector_need, whole_need
+from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
 
 BORE = "bore"
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
@@ -63,12 +64,12 @@ class CheckedGear:
     facts: dict[str, Any]
 
 
-def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
+def checked_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> CheckedGear:
     """Read, check, fit and place the finite elements of a gear.
 
     source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, is reduced by
     cyclic symmetry; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore by the mean tooth.
-    MeshError lists what is wrong with the files.
+    MeshError lists the faults of the files.
     """
     file = Path(source.file)
     mesh = sound_mesh(source)
@@ -97,7 +98,7 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
         return CheckedGear(placed, matrices, cut, facts)
 
 
-def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
+def imported_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> ImportedGear:
     """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
     found = checked_gear(source, wanted)
     with naming(Path(source.file)):
@@ -121,7 +122,7 @@ def _need(found: CheckedGear, wanted: Wanted) -> Need:
     return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads, 1)
 
 
-def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
+def _fit(mesh: ImportedMesh, source: ImportSpec | RingImportSpec, wanted: Wanted) -> InvoluteFit:
     flank = wanted.flank
     middle = (
         mesh.nodes[mesh.node_set(source.bore)].mean(axis=0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from types import SimpleNamespace
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,6 +12,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
 from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody, turned_sum
 from gearfmu.reduction.imported.flank import tooth_loads
@@ -37,13 +37,7 @@ class ImportedSector(SectorBody):
         self.cut, self.bore, self.teeth = cut, bore, teeth
         self.flank, self.points = flank
         self.internal = self.flank.internal
-        self.mesh = SimpleNamespace(
-            nodes=cut.nodes,
-            cut_minus=cut.cut_minus,
-            cut_plus=cut.cut_plus,
-            elements=_repeated(cut.elements),
-            teeth=teeth,
-        )
+        self.mesh = FeMesh(cut.nodes, _repeated(cut.elements), {}, teeth, cut.cut_minus, cut.cut_plus)
         self.faces = solids.boundary(cut.elements)
         matrices = elastic if isinstance(elastic, tuple) else solids.assemble(cut.nodes, cut.elements, elastic)
         self.stiffness, self.mass_matrix = matrices

@@ -27,7 +27,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
-_KINDS = ("gear", "shaft", "housing", "ball", "roller", "springs", "catalogue")  # pydantic's marks of chosen classes
+_TAGS = ("springs", "catalogue")  # of classes that a table chooses without its `kind`
 _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 
@@ -43,7 +43,7 @@ SpecType = TypeVar("SpecType", bound=Spec)
 @dataclass(frozen=True)
 class Quantity:
     """Annotation of a float field: the name of its range (`gearfmu.ranges`), which says unit and limits, and words that
-    may stand instead of a number.
+    may replace a number.
 
     `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
     plain number.
@@ -165,11 +165,16 @@ def _follows(entry: Any, entries: Sequence[Any]) -> bool:
     return entry["type"] == "too_short" and any(inside)
 
 
+def _is_tag(raw: object, part: str | int) -> bool:
+    """Whether `part` of a place only names the class that a table is read as."""
+    return isinstance(raw, dict) and part not in raw and part in (raw.get("kind", "gear"), *_TAGS)
+
+
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
     for part in loc:
-        if isinstance(raw, dict) and part not in raw and part in _KINDS:
+        if _is_tag(raw, part):
             continue
         inside, label = _step(raw, part)
         path += label if label.startswith("[") or not path else f".{label}"
@@ -181,9 +186,9 @@ def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
     """Keys and positions in `raw` that lead to a place of the model."""
     path: list[Any] = []
     for part in loc:
+        if _is_tag(raw, part):
+            continue
         if isinstance(raw, dict):
-            if part not in raw and part in _KINDS:
-                continue
             key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
             raw = raw.get(key)
         else:
@@ -227,7 +232,7 @@ def _unknown_key(key: str, known: list[str]) -> str:
 
 
 def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
-    """The fields of the model that stands at `loc` inside a `kind`."""
+    """The fields of the model at `loc` inside a `kind`."""
     choices = [kind]
     for part in loc:
         if field := fields_by_key(choices[0]).get(part):
@@ -259,7 +264,7 @@ def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
 
 
 def _own_first(kind: type[BaseModel]) -> list[str]:
-    """Names of the fields, what the bases have last."""
+    """Names of the fields, those of the bases last."""
     bases = [base for base in kind.__bases__ if issubclass(base, BaseModel)]
     inherited = [name for base in bases for name in _own_first(base)]
     return [name for name in kind.model_fields if name not in inherited] + inherited

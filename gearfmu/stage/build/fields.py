@@ -146,7 +146,7 @@ def _with_places(size: dict[str, int], functions: int) -> dict[str, int]:
     return size | of_image | {"places": places, "half": half}
 
 
-def _problems(field: Field, name: str, value: Any, sizes: Mapping[str, int]) -> list[str]:
+def _problems(field: Field, name: str, value: object, sizes: Mapping[str, int]) -> list[str]:
     array = np.asarray(value)
     if array.dtype.kind not in _KINDS[field.kind]:
         return [f"{name} holds {array.dtype}, expected {field.kind}"]

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.geometry.iso1328 import Draw, Tolerances, draw, seed_of
 from gearfmu.geometry.relief import ReliefCurve, relief_depth
+from gearfmu.spec.forms.general import ToothedBody
+from gearfmu.spec.forms.shapes import GearShape
+from gearfmu.spec.tables.flanks import Eccentricity, Wobble
 from gearfmu.spec.tables.topography import Topography, read_topography
 
 ROLLS = 129  # of the grid along the flank, even between its ends
@@ -25,7 +27,7 @@ WIDTHS = 33  # across the face width, where deviations are not straight there
 class FlankField:
     """Deviations of the flanks of one gear. gear : GearSpec or RingBody; shape : its geometry."""
 
-    def __init__(self, gear: Any, shape: Any):
+    def __init__(self, gear: ToothedBody, shape: GearShape):
         self.gear, self.shape = gear, shape
 
     # ---- what is said, one by one --------------------------------------------------------------------------------
@@ -68,11 +70,11 @@ class FlankField:
             x = self._height(roll)
             material += gear.profile.slope * x / 2 - gear.profile.crowning * x**2
         if gear.tip_relief is not None and gear.tip_relief.kind != "parabolic":
-            relief = gear.tip_relief
-            material -= ReliefCurve(relief.amount, relief.start_roll, shape.s_a, relief.kind).depth(roll)
+            tip = gear.tip_relief
+            material -= ReliefCurve(tip.amount, tip.start_roll, shape.s_a, tip.kind).depth(roll)
         if gear.root_relief is not None:
-            relief = gear.root_relief
-            material -= ReliefCurve(relief.amount, relief.start_roll, shape.s_form, relief.kind).depth(roll)
+            root = gear.root_relief
+            material -= ReliefCurve(root.amount, root.start_roll, shape.s_form, root.kind).depth(roll)
         return material
 
     def _height(self, roll: np.ndarray) -> np.ndarray:
@@ -139,7 +141,7 @@ class FlankField:
         return whole + float(np.ptp(lead["lead0"]) if lead else 0.0)
 
 
-def deviation_sections(index: int, gear: Any, shape: Any) -> dict[str, np.ndarray]:
+def deviation_sections(index: int, gear: ToothedBody, shape: GearShape) -> dict[str, np.ndarray]:
     """Sections of gear `index`: depth by tooth, flank, place across the width and roll; index deviations as angles;
     lead; what does not run true. None where there is nothing to say."""
     field = FlankField(gear, shape)
@@ -155,18 +157,18 @@ def deviation_sections(index: int, gear: Any, shape: Any) -> dict[str, np.ndarra
     return sections | _lead_section(index, gear)
 
 
-def _vector(polar: Any) -> tuple[float, float]:
+def _vector(polar: Eccentricity | Wobble | None) -> tuple[float, float]:
     """x, y of an amount in a direction."""
     return (polar.amount * math.cos(polar.angle), polar.amount * math.sin(polar.angle)) if polar else (0.0, 0.0)
 
 
-def _lean(wobble: Any) -> tuple[float, float]:
+def _lean(wobble: Wobble | None) -> tuple[float, float]:
     """Rotations (rad) about x and y that lean an axis towards a direction: e_z + (x, y) is e_z turned by (−y, x)."""
     x, y = _vector(wobble)
     return -y, x
 
 
-def _lead_section(index: int, gear: Any) -> dict[str, np.ndarray]:
+def _lead_section(index: int, gear: ToothedBody) -> dict[str, np.ndarray]:
     """Depth (2 flanks, WIDTHS) m across the face width, in the transverse section; no section without modifications."""
     if gear.lead is None:
         return {}

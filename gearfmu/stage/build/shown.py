@@ -6,12 +6,13 @@ import html
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 WIDTH = 100  # columns of a terminal
 LINES = 18  # rows of a card; further ones are counted
@@ -52,7 +53,7 @@ class Card:
 
 
 class Shown:
-    """What a session shows as its `card`; a dataclass of this kind has repr=False."""
+    """Shown in a session as its `card`; a dataclass of this kind has repr=False."""
 
     @property
     def card(self) -> Card:
@@ -77,7 +78,7 @@ def grouped(names: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def plot_over(
-    across: tuple[str, np.ndarray], panels: Mapping[str, Mapping[str, np.ndarray]], figure: Any = None
+    across: tuple[str, np.ndarray], panels: Mapping[str, Mapping[str, np.ndarray]], figure: Figure | None = None
 ) -> np.ndarray:
     """Panels one below the other, each with its label and curves by name, over one axis (label, values). figure: of
     matplotlib, a new one when None. Returns the axes of the panels."""

@@ -12,7 +12,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.ranges import all_ranges
 from gearfmu.spec.forms.general import Stage, ToothedBody
 from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.run.set_te import stage_te
+from gearfmu.stage.run.te import loaded_te
 
 ORDERS, POSITIONS = 8, 20
 HEARD = 10e-9  # m: an order that changes by less, a hundredth of the form deviations of the finest flanks (ISO 1328-1,
@@ -31,7 +31,7 @@ def twice(stage: Stage, slices: int) -> int:
 
 @dataclass(frozen=True)
 class Change:
-    """What twice the slices change in orders 1 … ORDERS of the static transmission error: the largest change (m), and
+    """Change by twice the slices of orders 1 … ORDERS of the static transmission error: the largest change (m), and
     the largest in level (dB) of those that change by more than HEARD."""
 
     slices: int
@@ -49,28 +49,25 @@ def left_of_slices(
     model: StageModel,
     torques: Sequence[float],
     slices: int | None = None,
-    rigid_bearings: bool = False,
     mesh: str | None = None,
     **parameters: float,
 ) -> Change | None:
     """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
-    where a torque has no equilibrium. Bearings, mesh and parameters as `stage_te` takes them."""
+    where a torque has no equilibrium. Mesh and parameters as `loaded_te` takes them."""
     own = slices or model.stage.slices
     finer = twice(model.stage, own)
     if finer == own:
         return None
     try:
         found = [
-            stage_te(model, torques, POSITIONS, rigid_bearings, mesh, 1, slices=float(n), **parameters).harmonics(
-                ORDERS
-            )
-            for n in (own, finer)
+            loaded_te(model, torques, POSITIONS, mesh, 1, None, slices=float(n), **parameters) for n in (own, finer)
         ]
     except SimulationError:
         return None
-    length = np.abs(found[1] - found[0])
+    coarse, fine = (result.harmonics(ORDERS) for result in found)
+    length = np.abs(fine - coarse)
     if not np.isfinite(length).all():
         return None
-    level = np.abs(20 * np.log10(np.maximum(found[1], 1e-15) / np.maximum(found[0], 1e-15)))
+    level = np.abs(20 * np.log10(np.maximum(fine, 1e-15) / np.maximum(coarse, 1e-15)))
     heard = level[length > HEARD]
     return Change(finer, float(length.max()), float(heard.max()) if heard.size else 0.0)

@@ -1,4 +1,5 @@
-"""The standalone solver: a stage model driven by given inputs, recorded into a Trace like every other run."""
+"""The standalone solver: a stage model driven by given inputs, recorded into a Trace like every other run; start values
+of inputs with which a stage carries a torque from the start, for importers."""
 
 from __future__ import annotations
 
@@ -7,16 +8,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from typing_extensions import Self
 
-from gearfmu.errors import SimulationError
+from gearfmu.errors import Problem, SimulationError, SpecError
+from gearfmu.files import write_text
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 from gearfmu.spec.forms.turning import meshings, turns
+from gearfmu.stage.build.assembly import FIXED_K
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stage.run.winding import mean_winding, rubbed_away
@@ -63,7 +67,7 @@ class Steady(Wound):
     @cached_property
     def winding(self) -> float:
         """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh, and
-        the plays of its port springs. Its meshes carry the mean of what goes in and what comes out."""
+        the plays of its port springs. Its meshes carry the mean of input and output."""
         known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
         ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
         taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)
@@ -210,3 +214,39 @@ def _meta(model: StageModel, kernel: Kernel) -> dict[str, Any]:
         "hashes": {"model": model.hash, "bodies": list(model.body_hashes)},
         "warnings": [*filter(None, [kernel.warning]), *status_words(int(kernel.get("solver.status")))],
     }
+
+
+def wound_starts(model: StageModel, torque: float, speed: float = 0.0) -> dict[str, float]:
+    """Values by name, SI, with which input and output carry `torque` (N·m) and turn at `speed` (rad/s), both of the
+    input. Spring ports: angles and speeds of their outer ends, φ_in = T/k_in + winding and φ_out = −T i/k_out with the
+    ratio i. Torque ports: torques, and parameters w_start. A fixed output gives way by T i/k. SpecError for a fixed
+    input and for ports with a clutch, which decides the torque."""
+    shafts, ports = model.shafts, model.stage.ports
+    source, ends = str(model.stage.source), (ports[shafts.input], ports[shafts.output])
+    if ends[0].kind == "fixed" or any(port.chain is not None for port in ends):
+        remedy = "a start under torque needs an input that is no fixed port, and ports without a clutch"
+        raise SpecError([Problem(source, "ports", ", ".join(ports), remedy)])
+    steady, values = Steady(model, speed, torque), dict[str, float]()
+    lost = steady.lost if all(port.kind == "spring" for port in ends) else 0.0
+    for name, port, given, turn in (
+        (shafts.input, ends[0], torque, 1.0),
+        (shafts.output, ends[1], lost - torque, 1.0 / shafts.ratio),
+    ):
+        exerted = given / turn
+        if port.kind == "torque":
+            values |= {f"{name}.tau": exerted, f"{name}.w_start": turn * speed}
+        elif port.kind == "spring":
+            assert port.k is not None
+            values |= {f"{name}.phi": exerted / port.k, f"{name}.w": turn * speed}
+    if ends[0].kind == "spring":
+        given_way = torque * shafts.ratio / (ends[1].k or FIXED_K) if ends[1].kind == "fixed" else 0.0
+        values[f"{shafts.input}.phi"] += steady.winding + shafts.ratio * given_way
+    return values
+
+
+def write_starts(path: Path, model: StageModel, values: dict[str, float]) -> Path:
+    """The values as a table variable, value, unit; returns `path`."""
+    known = model.kernel().variables
+    rows = (f"{name},{value!r},{known[name].unit}" for name, value in values.items())
+    write_text(path, "\n".join(("variable,value,unit", *rows, "")))
+    return path

@@ -21,7 +21,7 @@ from gearfmu.stage.run.simulate import Inputs, Steady, simulate
 from gearfmu.stage.run.trace import Trace
 
 DURATION = 0.1  # s, of a run whose profile says none
-DRIVE_RANGES = {
+CASE_RANGES = {
     "torque": "torque",
     "speed": "speed",
     "end_speed": "speed",
@@ -44,7 +44,7 @@ PARAMETER_RANGES = {
 
 
 @dataclass(frozen=True)
-class Drive:
+class LoadCase:
     """A run of a stage alone: torque (N·m) and speed (rad/s) of the input; duration (s), None for that of the profile
     or 0.1; time between samples (s); time from which on results are taken (s); end_speed (rad/s), which the speed grows
     or falls to, None: it stays; profile: torque, speed or both over time, in their place. SpecError with all that is
@@ -59,7 +59,7 @@ class Drive:
     profile: Profile | None = None
 
     def __post_init__(self) -> None:
-        if problems := list(_drive_problems(self)):
+        if problems := list(_case_problems(self)):
             raise SpecError(problems)
 
     @property
@@ -81,29 +81,29 @@ class Drive:
 
     @property
     def scene(self) -> str:
-        """What the run is, in words."""
+        """Kind of the run, in words."""
         if self.profile is not None:
             return "torque and speed over time"
         return "constant speed and load" if self.end_speed is None else "run-up under constant torque"
 
 
-def _drive_problems(drive: Drive) -> Iterator[Problem]:
-    profile, given = drive.profile, {field: getattr(drive, field) for field in DRIVE_RANGES}
-    yield from range_problems({field: (value, range_of(DRIVE_RANGES[field])) for field, value in given.items()})
+def _case_problems(case: LoadCase) -> Iterator[Problem]:
+    profile, given = case.profile, {field: getattr(case, field) for field in CASE_RANGES}
+    yield from range_problems({field: (value, range_of(CASE_RANGES[field])) for field, value in given.items()})
     for name in ("torque", "speed"):
-        in_profile, given = profile is not None and getattr(profile, name) is not None, getattr(drive, name)
+        in_profile, given = profile is not None and getattr(profile, name) is not None, getattr(case, name)
         if given is None and not in_profile:
             remedy = f"the run needs a {name}: give it" + ("" if profile is None else ", or a column in the profile")
             yield Problem("", name, "", remedy)
         if given is not None and in_profile:
             yield Problem("", name, f"{given:g}", f"the profile has a {name} too: leave one of them away")
-    if drive.end_speed is not None and profile is not None and profile.speed is not None:
-        yield Problem("", "end_speed", f"{drive.end_speed:g} rad/s", "the profile has a speed: leave one of them away")
+    if case.end_speed is not None and profile is not None and profile.speed is not None:
+        yield Problem("", "end_speed", f"{case.end_speed:g} rad/s", "the profile has a speed: leave one of them away")
 
 
-def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
+def parameters(model: StageModel, settings: Mapping[str, object]) -> dict[str, float]:
     """Kernel parameters (docs/variables.md) as numbers, from {"level": "fast", "slices": 10, "effect.hertz": False} or
-    the same as text. ModelError, naming what there is, for a name or value that the model does not know; SpecError
+    the same as text. ModelError, naming the choices, for a name or value that the model lacks; SpecError
     with every number that is out of range, in the words in which a stage file with that number is refused."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     unknown = [name for name in settings if name not in known]
@@ -117,33 +117,33 @@ def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, floa
 
 def steady_run(
     model: StageModel,
-    drive: Drive,
+    case: LoadCase,
     settings: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trace:
-    """Trace of the model under this drive (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
+    """Trace of the model under this load (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
     numbers (`parameters`); progress is called with the part done, 0 … 1. Torque ports are driven through springs
     (`StageModel.driven_by_springs`); SpecError where that cannot be."""
     require_driven(model.stage, (model.shafts.input, model.shafts.output), "simulate")
     model = model.driven_by_springs()
-    torque, speed = drive.lines()
-    inputs = _inputs(model, drive, torque, speed)
+    torque, speed = case.lines()
+    inputs = _inputs(model, case, torque, speed)
     most, fastest = (float(max(line.values, key=abs)) for line in (torque, speed))
     with limit_named(model, most):
-        trace = simulate(model, inputs, drive.length, drive.step, settings, progress)
+        trace = simulate(model, inputs, case.length, case.step, settings, progress)
     trace.meta["warnings"] = [*beyond_limits(model, most, fastest), *trace.meta["warnings"]]
     trace.meta.update(
-        settle=drive.settle,
-        scene=drive.scene,
-        torque=drive.torque,
-        speed=drive.speed,
-        end_speed=drive.end_speed,
+        settle=case.settle,
+        scene=case.scene,
+        torque=case.torque,
+        speed=case.speed,
+        end_speed=case.end_speed,
     )
     return trace
 
 
-def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Inputs:
-    if drive.profile is not None:
+def _inputs(model: StageModel, case: LoadCase, torque: Line, speed: Line) -> Inputs:
+    if case.profile is not None:
         return Profiled(model, torque, speed)
     rate = speed.at(np.zeros(1))[1]
     return Steady(model, float(speed.values[0]), float(torque.values[0]), float(rate[0]))

@@ -1,27 +1,35 @@
-"""Quasi-static loaded transmission error of an engagement over one pitch: output held, torque on the input, by the
-contact routine of the step."""
+"""Quasi-static loaded transmission error of an engagement over one pitch, or of a planetary set over one mesh period:
+output held, torque on the input, by the contact routine of the step.
+
+In the axes of a carrier everything repeats after one mesh period: sun and ring have moved on by one tooth each, and the
+mounts of the ring are smeared round its rim. Where pins have no position errors, each planet repeats the others with a
+delay of a part of the period: its mean share over the period is 1."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from typing_extensions import Self
 
 from gearfmu.geometry.iso6336 import mesh_stiffness
+from gearfmu.geometry.planetary import set_ratio
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.spec.forms.general import GearBody, RingBody
-from gearfmu.spec.forms.shapes import face_width, mesh_shape
+from gearfmu.spec.forms.general import GearBody, RingBody, Stage
+from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape, toothed
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.shown import Card, Shown, plot_over
 from gearfmu.stage.run.limits import each_load
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.place import MeshPlace, place_of
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+GEARS = ("sun", "ring")  # central gears of a set, whose meshes with the planets share the load
 TANGENT = 1e-4
-LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
+LEAST = 1e-5  # of torque_max: for smaller torques te is extrapolated along its tangent to the unloaded pair
 SHARES = 4
 COMMON = ("position", "failed")  # of a result: not one row a torque
 SOFTER = 0.9  # of the mesh stiffness of ISO: below it the reason is given
@@ -31,54 +39,21 @@ WHY_SOFTER = (
 )
 
 
-class LoadedResult(Shown):
-    """What results of pairs and sets have in common. failed: for every torque why it has no static equilibrium, ""
-    where it has one; its rows are NaN then."""
-
-    torque: np.ndarray
-    position: np.ndarray
-    te: np.ndarray
-    failed: tuple[str, ...]
-
-    @property
-    def card(self) -> Card:
-        """How a session shows it: its size and its `rows`."""
-        positions = f"Loaded transmission error, {len(self.torque)} torques at {self.position.size} positions"
-        return Card(positions, self.rows, 2)
-
-    @property
-    def rows(self) -> list[tuple[str, str]]:
-        """For every torque its results in words."""
-        raise NotImplementedError
-
-    @property
-    def found(self) -> Self:
-        """The result without the torques that have no equilibrium."""
-        kept = np.array([not why for why in self.failed], bool)
-        rows = {name: value[kept] for name, value in vars(self).items() if np.ndim(value) and name not in COMMON}
-        return replace(self, **rows | {"failed": ("",) * int(kept.sum())})  # type: ignore[type-var]
-
-    @property
-    def pitches(self) -> int:
-        """Pitches that the positions cover."""
-        return int(self.position[-1]) + 1
-
-    def harmonics(self, count: int = 5) -> np.ndarray:
-        """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
-        return mesh_harmonics(self.te, count, self.pitches)
-
-
 @dataclass(frozen=True, repr=False)
-class TeResult(LoadedResult):
-    """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · mesh_stiffness (T, P) N/m of the
-    mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
-    N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
-    · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
-    into mesh: a pair keeps its column through the pitch, sorted by tooth number
-    · over_width (T, S): force of each slice over the mean of all slices, mean over the positions · failed (T,): why a
-    torque has no equilibrium, "" where it has one; its rows are NaN then · iso_stiffness N/m: c_γα of ISO 6336-1 times
-    the common face width.
-    """
+class TeResult(Shown):
+    """torque (T,) N·m · position (P,) in pitches, of a set in mesh periods · te (T, P) m, positive under load
+    · stage_stiffness (T, P) N/m, tangent dF/dte with shafts and bearings, F along the line of action; of a set
+    d(T_s/r_bs)/dte of all meshes with carrier and bearings · failed (T,): why a torque has no equilibrium, "" where it
+    has one; its rows are NaN then.
+
+    Of a mesh (size 0 of a set): mesh_stiffness (T, P) N/m, the same tangent of the mesh alone, bores held on their
+    axes; with rigid bearings it is the stage stiffness · shares (T, P, K): part of the mesh force that each tooth pair
+    carries, pairs in the order in which they come into mesh: a pair keeps its column through the pitch, sorted by tooth
+    number · over_width (T, S): force of each slice over the mean of all slices, mean over the positions
+    · iso_stiffness N/m: c_γα of ISO 6336-1 times the common face width.
+
+    Of a set (size 0 of a mesh), by central gear, C as `centrals`: sharing (T, P, C, N), normal force of each planet
+    over the mean of all · force (T, P, C) N, that mean."""
 
     torque: np.ndarray
     position: np.ndarray
@@ -89,43 +64,105 @@ class TeResult(LoadedResult):
     over_width: np.ndarray
     failed: tuple[str, ...]
     iso_stiffness: float = math.nan
+    sharing: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    force: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
+
+    @property
+    def card(self) -> Card:
+        """How a session shows it: its size and its `rows`."""
+        positions = f"Loaded transmission error, {len(self.torque)} torques at {self.position.size} positions"
+        return Card(positions, self.rows, 2)
+
+    @property
+    def centrals(self) -> tuple[str, ...]:
+        """Central gears by whose meshes the planets share the load; none of a mesh."""
+        return GEARS[: self.sharing.shape[2]]
+
+    @property
+    def found(self) -> TeResult:
+        """The result without the torques that have no equilibrium."""
+        kept = np.array([not why for why in self.failed], bool)
+        rows = {n: v[kept] for n, v in vars(self).items() if np.ndim(v) and len(v) and n not in COMMON}
+        return replace(self, **rows | {"failed": ("",) * int(kept.sum())})
+
+    @property
+    def pitches(self) -> int:
+        """Pitches that the positions cover."""
+        return int(self.position[-1]) + 1
+
+    @property
+    def load_factor(self) -> np.ndarray:
+        """(T, C): mesh load factor K_γ (ISO 6336-1) at every central gear, the largest share at any position."""
+        return self.sharing.max(axis=(1, 3), initial=0.0)
+
+    def harmonics(self, count: int = 5) -> np.ndarray:
+        """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
+        return mesh_harmonics(self.te, count, self.pitches)
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """For every torque its error and stiffness in words; with rigid bearings the stage has that of its mesh."""
+        """For every torque its error and stiffness in words, then K_γ at every central gear with the mean share of each
+        planet; with rigid bearings the stage has the stiffness of its mesh."""
         rows = []
-        for torque, row, mesh, stage, why in zip(
-            self.torque, self.te, self.mesh_stiffness, self.stage_stiffness, self.failed, strict=True
-        ):
-            text = why or f"{error_text(row)}, mesh stiffness {1e-6 * mesh.mean():.1f} N/µm"
-            if not why and not np.array_equal(mesh, stage):
-                text += f", stage stiffness {1e-6 * stage.mean():.1f} N/µm (with shafts and bearings)"
-            rows.append((f"{torque:.1f} N·m", text))
+        for i, (torque, why) in enumerate(zip(self.torque, self.failed, strict=True)):
+            rows.append((f"{torque:.1f} N·m", why or f"{error_text(self.te[i])}, {self._stiffness(i)}"))
+            for g, gear in enumerate(() if why else self.centrals):
+                shares = self.sharing[i].mean(axis=0)[g]
+                means = f"means of planets 1 … {len(shares)}: {' '.join(f'{share:.3f}' for share in shares)}"
+                rows.append(("", f"{gear}: K_gamma {self.load_factor[i, g]:.3f}; {means}"))
         if math.isfinite(self.iso_stiffness):
             why = WHY_SOFTER if np.nanmean(self.mesh_stiffness) < SOFTER * self.iso_stiffness else ""
             rows.append(("ISO 6336-1", f"c_gamma times face width {1e-6 * self.iso_stiffness:.1f} N/µm{why}"))
         return rows
 
-    def plot(self, figure: Any = None) -> np.ndarray:
-        """Draw transmission error about its mean and mesh stiffness over the pitch with matplotlib; returns the axes.
-        figure : of matplotlib, a new one when None."""
+    def _stiffness(self, i: int) -> str:
+        stage = f"{1e-6 * self.stage_stiffness[i].mean():.1f} N/µm"
+        if self.centrals:
+            return f"stage stiffness at the sun's base circle {stage}"
+        mesh = f"mesh stiffness {1e-6 * self.mesh_stiffness[i].mean():.1f} N/µm"
+        same = np.array_equal(self.mesh_stiffness[i], self.stage_stiffness[i])
+        return mesh if same else f"{mesh}, stage stiffness {stage} (with shafts and bearings)"
+
+    def plot(self, figure: Figure | None = None) -> np.ndarray:
+        """Draw transmission error about its mean, and mesh stiffness or shares of the planets at the largest torque,
+        over the pitch or mesh period with matplotlib; returns the axes. figure : a new one when None."""
         found = self.found
-        by_torque = zip(found.torque, 1e-6 * found.mesh_stiffness, strict=True)
-        stiffness = {f"{torque:g} N·m": row for torque, row in by_torque}
-        return plot_te(found, {"mesh stiffness in N/µm": stiffness}, figure)
+        names = [f"{torque:g} N·m" for torque in found.torque]
+        about = {
+            f"{name}: {1e6 * row.mean():.2f} µm, peak to peak {1e6 * np.ptp(row):.2f} µm": 1e6 * (row - row.mean())
+            for name, row in zip(names, found.te, strict=True)
+        }
+        panels: dict[str, Mapping[str, np.ndarray]] = {"error less its mean in µm": about}
+        for g, gear in enumerate(found.centrals):
+            most = found.sharing[np.argmax(np.abs(found.torque)), :, g].T
+            panels[f"{gear}: force over the mean"] = {f"planet {k + 1}": row for k, row in enumerate(most)}
+        if found.mesh_stiffness.size:
+            panels["mesh stiffness in N/µm"] = dict(zip(names, 1e-6 * found.mesh_stiffness, strict=True))
+        return plot_over(("position in pitches", found.position), panels, figure)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table of the result, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um,
-        stage_stiffness_N_per_um, share_1 …"""
-        found = common_columns(self)
-        for name in ("mesh_stiffness", "stage_stiffness"):
-            found[f"{name}_N_per_um"] = 1e-6 * getattr(self, name).ravel()
-        return found | {f"share_{k + 1}": self.shares[:, :, k].ravel() for k in range(self.shares.shape[2])}
+        stage_stiffness_N_per_um, share_1 …; of a set without the mesh stiffness and with sun_force_N and ring_force_N
+        of the mean planet, sun_share_1 …, ring_share_1 …"""
+        rows, positions = self.te.shape
+        found = {
+            "torque_Nm": np.repeat(self.torque, positions),
+            "position": np.tile(self.position, rows),
+            "te_um": 1e6 * self.te.ravel(),
+        }
+        if self.mesh_stiffness.size:
+            found["mesh_stiffness_N_per_um"] = 1e-6 * self.mesh_stiffness.ravel()
+        found["stage_stiffness_N_per_um"] = 1e-6 * self.stage_stiffness.ravel()
+        found |= {f"share_{k + 1}": self.shares[:, :, k].ravel() for k in range(self.shares.shape[2])}
+        found |= {f"{gear}_force_N": self.force[:, :, g].ravel() for g, gear in enumerate(self.centrals)}
+        for g, gear in enumerate(self.centrals):
+            found |= {f"{gear}_share_{k + 1}": self.sharing[:, :, g, k].ravel() for k in range(self.sharing.shape[3])}
+        return found
 
 
 def mesh_harmonics(te: np.ndarray, count: int, pitches: int = 1) -> np.ndarray:
     """(T, count), rms in the unit of te (T, P), whose P positions are even over so many pitches: harmonics of the mesh,
-    NaN from half the number of positions on, where they are not told from lower ones."""
+    NaN from half the number of positions on, where they cannot be distinguished from lower ones."""
     lines = np.abs(np.fft.rfft(te, axis=1))[:, pitches : pitches * count + 1 : pitches] * math.sqrt(2) / te.shape[1]
     lines[:, (te.shape[1] // pitches + 1) // 2 - 1 :] = np.nan
     return np.pad(lines, ((0, 0), (0, count - lines.shape[1])), constant_values=np.nan)
@@ -136,75 +173,119 @@ def error_text(te: np.ndarray) -> str:
     return f"mean {1e6 * te.mean():.3f} µm, peak to peak {1e6 * np.ptp(te):.3f} µm"
 
 
-def plot_te(result: Any, others: Mapping[str, Mapping[str, np.ndarray]], figure: Any = None) -> np.ndarray:
-    """`plot_over` of the transmission error about its mean, peak to peak in its name, and of other panels."""
-    about = {
-        f"{torque:g} N·m: {1e6 * row.mean():.2f} µm, peak to peak {1e6 * np.ptp(row):.2f} µm": 1e6 * (row - row.mean())
-        for torque, row in zip(result.torque, result.te, strict=True)
-    }
-    panels = {"error less its mean in µm": about, **others}
-    return plot_over(("position in pitches", result.position), panels, figure)
-
-
-def common_columns(result: Any) -> dict[str, np.ndarray]:
-    """Columns that pairs and sets have in common."""
-    rows, positions = result.te.shape
-    return {
-        "torque_Nm": np.repeat(result.torque, positions),
-        "position": np.tile(result.position, rows),
-        "te_um": 1e6 * result.te.ravel(),
-    }
+def set_error(stage: Stage) -> tuple[float, float]:
+    """(r_b,s, 1 + z_r/z_s) of te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), the transmission error of a planetary set; m, 1."""
+    sun, ring = (toothed(stage, name) for name in GEARS)
+    return gear_shape(sun).r_b, set_ratio(sun.teeth, ring.teeth)
 
 
 def loaded_te(
     model: StageModel,
     torques: Sequence[float],
     positions: int = 41,
-    rigid_bearings: bool = False,
     mesh: str | None = None,
     pitches: int = 1,
+    progress: Callable[[float, str], None] | None = None,
     **parameters: float,
 ) -> TeResult:
-    """te = r_bA φ_A + r_bB φ_B of an engagement at positions i/N of one of its pitches, or of more (no end point): the
-    output held so that gear A, without load, would stand at position · 2π/z_A. In a ring te = r_bA φ_A − r_bB φ_B.
+    """Transmission error at positions i/N of one pitch or mesh period, or of more (no end point), the output held.
 
-    pitches: teeth of gear A for all that differs from tooth to tooth. torques: N·m on the input (the first port;
-    `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
-    driving torque: the unloaded (kinematic) transmission error. rigid_bearings: the nodes on the axes are held. mesh:
-    name of the engagement, the first when None. parameters: of the kernel, e.g. slices=10.
+    Of an engagement te = r_bA φ_A + r_bB φ_B, in a ring r_bA φ_A − r_bB φ_B, where gear A, without load, would be at
+    position · 2π/z_A. Of a planetary set te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), angles of the bores of sun and carrier;
+    without load it is ± the mean backlash of the two meshes along the line of action.
+
+    torques: N·m on the input (the first port; `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
+    driving torque: the unloaded (kinematic) transmission error. mesh: name of the engagement; None: the first, of
+    a set all. pitches: teeth of gear A for all that differs from tooth to tooth. progress: called with the part done
+    and the torque. parameters: of the kernel, e.g. slices=10; with "effect.bearings" 0 axes are held.
+
     A torque without equilibrium is named in `failed` with its limit; SimulationError(no_equilibrium) where none has
     one.
     """
-    held = statics_of(model, **{**parameters, "effect.bearings": 0.0})
-    kernel, place = held if rigid_bearings else statics_of(model, **parameters), place_of(model, mesh)
+    planets = len(model.stage.engagements) // len(GEARS) if model.stage.carriers and mesh is None else 0
+    place = place_of(model, f"{GEARS[0]}_planet1" if planets else mesh)
+    at = _of_set(model, place, planets, parameters) if planets else _of_mesh(model, place, parameters)
     position, least = np.arange(pitches * positions) / positions, LEAST * place.most
-    te, alone, whole = np.empty((3, len(torques), position.size))
-    shares = np.zeros((len(torques), position.size, SHARES))
-    carried_by = np.zeros((len(torques), int(kernel.get("slices"))))
+    found: list[list[_Point]] = [[] for _ in torques]
 
     def solve(i: int, torque: float) -> None:
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         for j, part in enumerate(position):
-            at = -part * place.pitch
-            state = kernel.transmission(at, carried, place.number)
-            tangent = _tangent(kernel, at, carried, place.number)
-            firm = tangent if kernel is held else _tangent(held, at, carried, place.number)
-            te[i, j] = state.te + (torque - carried) / tangent
-            alone[i, j], whole[i, j] = firm / place.lever, tangent / place.lever
-            shares[i, j] = _shares(state, int(part))
-            carried_by[i] += np.sum(list(state.forces.values()), axis=0)
+            if progress:
+                progress((i + j / position.size) / len(torques), f"{torque:g} N·m")
+            point = at(part, carried)
+            found[i].append(point._replace(te=point.te + (torque - carried) / point.tangent))
 
     failed = each_load(model, torques, solve)
-    for values in (te, alone, whole, shares, carried_by):
-        values[[bool(why) for why in failed]] = np.nan
-    mean = np.maximum(np.abs(carried_by).mean(axis=1, keepdims=True), 1e-300)
-    found = te, alone, whole, shares, np.abs(carried_by) / mean
-    return TeResult(np.asarray(torques, float), position, *found, failed, _by_iso(model, mesh))
+    like = next(row[0] for row, why in zip(found, failed, strict=True) if not why)
+    missing = [_Point(*(np.full(np.shape(value), np.nan) for value in like))] * position.size
+    rows = [missing if why else row for row, why in zip(found, failed, strict=True)]
+    values = [np.array([[point[k] for point in row] for row in rows]) for k in range(len(like))]
+    te, _, alone, whole, shares, load, force = values
+    load, mean = np.abs(load.sum(axis=1)), force.mean(axis=3)
+    even = np.maximum(load.sum(axis=1, keepdims=True) / max(load.shape[1], 1), 1e-300)
+    own = te, alone, whole, shares, load / even, failed, math.nan if planets else _by_iso(model, place)
+    return TeResult(np.asarray(torques, float), position, *own, force / mean[..., None], mean)
 
 
-def _by_iso(model: StageModel, name: str | None) -> float:
+class _Point(NamedTuple):
+    """Equilibrium at a position: te m, its tangent dT/dte N; stiffness of mesh and stage N/m; share of each tooth pair
+    (K,); load of each slice (S,) N; force of each planet by central gear (C, N) N."""
+
+    te: float | np.ndarray
+    tangent: float | np.ndarray
+    alone: float | np.ndarray
+    whole: float | np.ndarray
+    shares: np.ndarray
+    load: np.ndarray
+    force: np.ndarray
+
+
+_At = Callable[[float, float], _Point]  # position in pitches, torque N·m → equilibrium
+
+
+def _of_mesh(model: StageModel, place: MeshPlace, parameters: Mapping[str, float]) -> _At:
+    held = statics_of(model, **{**parameters, "effect.bearings": 0.0})
+    kernel = statics_of(model, **parameters) if parameters.get("effect.bearings", 1.0) else held
+
+    def at(part: float, torque: float) -> _Point:
+        angle = -part * place.pitch
+        state = kernel.transmission(angle, torque, place.number)
+        tangent = _tangent(lambda load: kernel.transmission(angle, load, place.number).te, torque)
+        firm = tangent
+        if kernel is not held:
+            firm = _tangent(lambda load: held.transmission(angle, load, place.number).te, torque)
+        load = np.sum(list(state.forces.values()), axis=0)
+        stiffness = firm / place.lever, tangent / place.lever
+        return _Point(state.te, tangent, *stiffness, _shares(state, int(part)), load, np.zeros((0, 1)))
+
+    return at
+
+
+def _of_set(model: StageModel, place: MeshPlace, planets: int, parameters: Mapping[str, float]) -> _At:
+    """Forces and tangents of a position start from its equilibrium; engagements are those of the sun, then those of
+    the ring."""
+    kernel, none = statics_of(model, **parameters), np.zeros(0)
+    shafts, (r_b, ratio) = model.shafts, set_error(model.stage)
+
+    def error(angle: float, torque: float, keep: bool) -> float:
+        phi = {shafts.input: kernel.transmission(angle, torque, keep=keep).phi, shafts.output: angle}
+        return float(r_b * (phi["sun"] - ratio * phi["carrier"]))
+
+    def at(part: float, torque: float) -> _Point:
+        angle = -part * place.pitch
+        te, meshes = error(angle, torque, False), range(len(GEARS) * planets)
+        states = [kernel.transmission(angle, torque, mesh, keep=True) for mesh in meshes]
+        force = np.array([_total(state) for state in states]).reshape(len(GEARS), planets)
+        tangent = _tangent(lambda load: error(angle, load, True), torque)
+        return _Point(te, tangent, none, abs(tangent / place.lever) * planets, none, none, force)
+
+    return at
+
+
+def _by_iso(model: StageModel, place: MeshPlace) -> float:
     """`TeResult.iso_stiffness` of an engagement."""
-    mesh = model.stage.engagements[place_of(model, name).number]
+    mesh = model.stage.engagements[place.number]
     a, b = (model.stage.bodies[gear] for gear in mesh.gears)
     assert isinstance(a, (GearBody, RingBody)) and isinstance(b, (GearBody, RingBody))
     e_a, e_b = a.material.youngs_modulus, b.material.youngs_modulus
@@ -220,19 +301,23 @@ def statics_of(model: StageModel, **parameters: float) -> Kernel:
     return kernel
 
 
-def _tangent(kernel: Kernel, phi: float, torque: float, mesh: int) -> float:
-    """dT/dte (N) by a central difference of ±TANGENT·T."""
-    ends = [kernel.transmission(phi, torque * (1 + sign * TANGENT), mesh).te for sign in (-1, 1)]
+def _tangent(error: Callable[[float], float], torque: float) -> float:
+    """dT/dte (N) by a central difference of ±TANGENT·T; error: te (m) under a torque (N·m)."""
+    ends = [error(torque * (1 + sign * TANGENT)) for sign in (-1, 1)]
     return 2 * TANGENT * torque / (ends[1] - ends[0])
 
 
 def _shares(state: TeState, turned: int) -> np.ndarray:
     """Shares by tooth number of gear A: pair k of the path is tooth k − 2 …, counted from the tooth that leaves
     the mesh, which is one before for every whole pitch that it has turned."""
-    total = sum(sum(forces) for forces in state.forces.values()) or 1.0
-    shares = np.zeros(SHARES)
+    total, shares = _total(state) or 1.0, np.zeros(SHARES)
     for (_, tooth), forces in state.forces.items():
         place = tooth + turned + SHARES // 2
         if 0 <= place < SHARES:
             shares[place] += sum(forces) / total
     return shares
+
+
+def _total(state: TeState) -> float:
+    """Mesh force, N."""
+    return sum(sum(slices) for slices in state.forces.values())

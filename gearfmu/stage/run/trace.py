@@ -23,6 +23,7 @@ from gearfmu.units import quantity_text
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 
 class TraceError(GearfmuError):
@@ -48,7 +49,7 @@ class Trace(Shown):
 
     time : (n,) float64, s, strictly increasing.
     channels : name → Channel, each with (n,) finite values; integers and booleans keep their type.
-    meta : what the run was (scene, level, outcome, hashes, …); any JSON value.
+    meta : facts of the run (scene, level, outcome, hashes, …); any JSON value.
 
     Raises TraceError, naming every bad channel, when lengths, order or numbers are not so.
     """
@@ -83,7 +84,9 @@ class Trace(Shown):
         size = ("samples", f"{self.time.size}, {span}; {len(self.channels)} channels:")
         return Card("Trace: " + ", ".join(run), [size, *grouped(self.channels)])
 
-    def plot(self, *names: str, start: float | None = None, end: float = np.inf, figure: Any = None) -> np.ndarray:
+    def plot(
+        self, *names: str, start: float | None = None, end: float = np.inf, figure: Figure | None = None
+    ) -> np.ndarray:
         """Draw channels over time with matplotlib, up to four in panels of their own, more by unit; returns the axes.
 
         names : of channels, or patterns as "bearing.*.fx"; force and transmission error of the meshes when none.
@@ -194,7 +197,7 @@ def write_columns(path: str | os.PathLike[str], columns: Mapping[str, np.ndarray
         writer.writerows(zip(*plain, strict=True))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> Any:
     """Python's form of a numpy scalar or array, for JSON."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()

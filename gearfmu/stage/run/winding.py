@@ -1,4 +1,4 @@
-"""What a stage takes up under a torque and what friction takes of it: statics of a run with given parameters."""
+"""Winding of a stage under a torque and its loss to friction: statics of a run with given parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.recording import Recording
+from gearfmu.kernel.instance import Recording
 
 SECANT = 0.01  # of the torque
 
@@ -18,7 +18,7 @@ SECANT = 0.01  # of the torque
 def mean_winding(
     blob: bytes, parameters: tuple[tuple[str, float], ...], torque: float, angles: tuple[float, ...], ratio: float
 ) -> tuple[float, float]:
-    """Mean angle of the input (rad) under a torque on it (N·m), less what the output's angles (rad) turn it by, and its
+    """Mean angle of the input (rad) under a torque on it (N·m), less its rotation by the output's angles (rad), and its
     growth with the torque at the first of them, rad/(N·m)."""
     kernel = Kernel(blob, at_rest(blob, dict(parameters)))
     kernel.prepare()
@@ -29,7 +29,7 @@ def mean_winding(
 
 def at_rest(blob: bytes, parameters: Mapping[str, float]) -> dict[str, float]:
     """Parameters for the statics of a run with these, which do not depend on level, integrator and step: level rigid.
-    But level paper and contact by nodes know less compliance, and their statics are their own."""
+    But level paper and contact by nodes have less compliance and their own statics."""
     kernel = Kernel(blob, parameters)
     level, contact = (kernel.variables[name].items[int(kernel.get(name))] for name in ("level", "contact"))
     own = level == "paper" or contact == "nodal"
@@ -50,7 +50,7 @@ def rubbed_away(
     record = Recording(kernel, [*rubbed, f"{port}.tau_mean"], steps, step)
     try:
         record.advance(steps, inputs)
-    except SimulationError:  # the run itself will tell
+    except SimulationError:  # the run itself reports it
         return 0.0
     half = steps // 2
     work = step * np.sum(record.rows[half + 1 :, -1] * inputs[f"{port}.w"][half:])

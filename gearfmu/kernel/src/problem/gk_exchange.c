@@ -21,15 +21,6 @@ gk_rows gk_rows_of_sliding(const gk_setup *setup, gk_work *work, int e)
 }
 
 /* ---- reading ----------------------------------------------------------------------------------------------------- */
-/* reads displacements (or speeds) of the engagement's own part of the ground group */
-void gk_exchange_read_local(const gk_rows *rows, const double *local, double *read)
-{
-    GK_ASSERT(local && read);
-    const gk_engaged *engaged = rows->engaged;
-    for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
-    gk_times_rows(rows->ground, rows->count, engaged->local, local, read);
-}
-
 /* reads displacements (or speeds) of the ground group */
 void gk_exchange_read_ground(const gk_rows *rows, const double *ground, double *read)
 {
@@ -45,7 +36,8 @@ void gk_exchange_read_ground(const gk_rows *rows, const double *ground, double *
         } else {
             memcpy(to, ground + mesh->part[w].from, (size_t)engaged->wide[w] * sizeof *to);
         }
-    gk_exchange_read_local(rows, local, read);
+    for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
+    gk_times_rows(rows->ground, rows->count, engaged->local, local, read);
 }
 
 /* adds what contacts read of displacements y of the gear group of a side */

@@ -19,7 +19,6 @@ typedef struct gk_rows { /* of the gaps of an engagement, or of the sliding of i
 
 GK_HOT gk_rows gk_rows_of_gaps(const gk_setup *setup, gk_work *work, int e);
 GK_HOT gk_rows gk_rows_of_sliding(const gk_setup *setup, gk_work *work, int e);
-GK_HOT void gk_exchange_read_local(const gk_rows *rows, const double *local, double *read);
 GK_HOT void gk_exchange_read_ground(const gk_rows *rows, const double *ground, double *read);
 GK_HOT void gk_exchange_read_modes(const gk_rows *rows, int which, const gk_real *y, double *read);
 GK_HOT void gk_exchange_read(const gk_rows *rows, const gk_real *const y[], const double *ground, double *read);

@@ -1,6 +1,6 @@
 /* Kinds of rows (problem/gk_row_*.c, one file a kind). A problem is a list of blocks: rows of one kind that follow each
- * other, the contacts first. What a kind does goes by its verbs, what it is by its traits; a new kind is a new file, its
- * line below, and where a row of it is listed. */
+ * other, the contacts first. A kind has verbs, here, and traits (gk_system.h). A new kind is a new file, its line below
+ * and its traits, and a place where such a row is listed. */
 #ifndef GK_ROW_H
 #define GK_ROW_H
 #include "base/gk_lanes.h"
@@ -26,8 +26,8 @@ typedef struct gk_row_verbs { /* NULL: nothing is left to do */
     void (*read)(const gk_forming *f, double h, gk_system *s, const gk_row_block *b);
     /* gap at the start, and the first guess of status; returns whether forces are not those of the last step */
     int (*begin)(const gk_forming *f, gk_system *s, const gk_row_block *b);
-    /* marks the rows that contradict their status; changes the status of one */
-    void (*contradict)(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
+    /* marks the rows that contradict their status, returns how many; changes the status of one */
+    int (*contradict)(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
     void (*flip)(gk_system *s, int i);
     /* of a joint with two ends: how far its outer end is ahead of the inner one, at the end of the step */
     double (*twist)(const gk_setup *setup, const gk_system *s, int i);
@@ -39,7 +39,7 @@ typedef struct gk_row_verbs { /* NULL: nothing is left to do */
 GK_HOT void gk_row_contact_list(const gk_forming *f, double h, gk_system *s);
 GK_HOT void gk_row_contact_read(const gk_forming *f, double h, gk_system *s, const gk_row_block *b);
 GK_HOT int gk_row_contact_begin(const gk_forming *f, gk_system *s, const gk_row_block *b);
-GK_HOT void gk_row_contact_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
+GK_HOT int gk_row_contact_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
 GK_HOT void gk_row_contact_flip(gk_system *s, int i);
 GK_HOT void gk_row_contact_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, const gk_row_block *b);
 /* gk_row_joint.c: springs and given torques; what all joints have in common */
@@ -53,7 +53,7 @@ GK_HOT void gk_row_joint_keep(const gk_setup *setup, const gk_engaged *engaged, 
 /* gk_row_play.c */
 GK_HOT void gk_row_play_recall(const gk_forming *f, gk_system *s, int i);
 GK_HOT int gk_row_play_begin(const gk_forming *f, gk_system *s, const gk_row_block *b);
-GK_HOT void gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
+GK_HOT int gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
 GK_HOT void gk_row_play_flip(gk_system *s, int i);
 GK_HOT double gk_row_play_twist(const gk_setup *setup, const gk_system *s, int i);
 GK_HOT void gk_row_play_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, const gk_row_block *b);
@@ -61,7 +61,7 @@ GK_HOT void gk_row_play_keep(const gk_setup *setup, const gk_engaged *engaged, g
 GK_HOT void gk_row_clutch_recall(const gk_forming *f, gk_system *s, int i);
 GK_HOT void gk_row_clutch_read(const gk_forming *f, double h, gk_system *s, const gk_row_block *b);
 GK_HOT int gk_row_clutch_begin(const gk_forming *f, gk_system *s, const gk_row_block *b);
-GK_HOT void gk_row_clutch_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
+GK_HOT int gk_row_clutch_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong);
 GK_HOT void gk_row_clutch_flip(gk_system *s, int i);
 GK_HOT void gk_row_clutch_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, const gk_row_block *b);
 

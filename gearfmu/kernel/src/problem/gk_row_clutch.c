@@ -28,11 +28,15 @@ int gk_row_clutch_begin(const gk_forming *f, gk_system *s, const gk_row_block *b
 }
 
 /* a sticking one slips beyond its bound; friction of a slipping one must oppose the slip */
-void gk_row_clutch_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
+int gk_row_clutch_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
 {
-    for (int i = b->from; i < b->end; i++)
+    int count = 0;
+    for (int i = b->from; i < b->end; i++) {
         wrong[i] = s->active[i] ? fabs(s->z[i]) > s->joint.bound[i]
                                 : s->joint.bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0;
+        count += wrong[i];
+    }
+    return count;
 }
 
 void gk_row_clutch_flip(gk_system *s, int i)

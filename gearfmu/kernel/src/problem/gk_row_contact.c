@@ -38,8 +38,8 @@ void gk_row_contact_list(const gk_forming *f, double h, gk_system *s)
     gk_law_set(f->model, f->setup, mesh, s);
 }
 
-/* Undeformed gap at the predicted poses, which contain what the ground group moves the gears rigidly: that has been read
- * with the oscillators, and is taken away. */
+/* Undeformed gap at the predicted poses, which contain the rigid motion of the gears by the ground group: that has been
+ * read with the oscillators, and is taken away. */
 void gk_row_contact_read(const gk_forming *f, double h, gk_system *s, const gk_row_block *b)
 {
     GK_ASSERT(b->from == 0 && b->end == s->contacts);
@@ -72,14 +72,17 @@ int gk_row_contact_begin(const gk_forming *f, gk_system *s, const gk_row_block *
     return 0;
 }
 
-void gk_row_contact_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
+int gk_row_contact_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
 {
     GK_ASSERT(gk_system_is_sound(s) && wrong);
     const int films = gk_film_on(s);
-    for (int i = b->from; i < b->end; i++)
-        wrong[i] = s->active[i]
-                       ? s->force[i] < 0.0
-                       : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i) < (films ? s->film->left[i] : 0.0);
+    int count = 0;
+    for (int i = b->from; i < b->end; i++) {
+        const double touching = films ? s->film->left[i] : 0.0;
+        wrong[i] = s->active[i] ? s->force[i] < 0.0 : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i) < touching;
+        count += wrong[i];
+    }
+    return count;
 }
 
 void gk_row_contact_flip(gk_system *s, int i)

@@ -1,6 +1,6 @@
-/* Rows of a spring with play, as a spline has: within ±½ of it the shaft is free, on either side the spring takes what is
- * beyond. A closed side is a bilateral row whose gap counts from that side (joint.slip: ±½ play, joint.bound: ½ play);
- * λ there never pulls. The damper acts while the same side is closed at both ends of a step. */
+/* Rows of a spring with play, as a spline has: within ±½ of it the shaft is free, on either side the spring takes the
+ * rest. A closed side is a bilateral row whose gap counts from that side (joint.slip: ±½ play, joint.bound: ½ play); λ
+ * there never pulls. The damper acts while the same side is closed at both ends of a step. */
 #include "problem/gk_row.h"
 
 /* the side that is closed under a force */
@@ -43,10 +43,14 @@ int gk_row_play_begin(const gk_forming *f, gk_system *s, const gk_row_block *b)
 
 static double apart(const gk_system *s, int i) { return gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i); }
 
-void gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
+int gk_row_play_contradict(const gk_system *s, const gk_row_block *b, unsigned char *wrong)
 {
-    for (int i = b->from; i < b->end; i++)
+    int count = 0;
+    for (int i = b->from; i < b->end; i++) {
         wrong[i] = s->active[i] ? s->force[i] * s->joint.slip[i] > 0.0 : fabs(apart(s, i)) > s->joint.bound[i];
+        count += wrong[i];
+    }
+    return count;
 }
 
 void gk_row_play_flip(gk_system *s, int i)

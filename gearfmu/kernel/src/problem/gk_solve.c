@@ -233,16 +233,17 @@ static void newton(gk_system *s)
     gk_solve_settle(s);
 }
 
-/* how many rows contradict their status, which, and the last of them */
-static int contradictions(const gk_system *s, unsigned char *wrong, int *last)
+/* how many rows contradict their status, and which */
+static int contradictions(const gk_system *s, unsigned char *wrong)
 {
     int count = 0;
-    memset(wrong, 0, (size_t)s->n);
-    for (int b = 0; b < s->blocks; b++)
-        if (gk_verbs_of(s->block[b].kind)->contradict)
-            gk_verbs_of(s->block[b].kind)->contradict(s, &s->block[b], wrong);
-    for (int i = 0; i < s->n; i++)
-        if (wrong[i]) count++, *last = i;
+    for (const gk_row_block *b = s->block; b < s->block + s->blocks; b++) {
+        const gk_row_verbs *verbs = gk_verbs_of(b->kind);
+        if (verbs->contradict)
+            count += verbs->contradict(s, b, wrong);
+        else
+            for (int i = b->from; i < b->end; i++) wrong[i] = 0;
+    }
     return count;
 }
 
@@ -324,17 +325,14 @@ void gk_solve_contacts(gk_system *s)
     for (int round = 0; round < ROUND_LIMIT; round++) {
         newton(s);
         unsigned char wrong[MAX_ROWS];
-        int last = -1, count = contradictions(s, wrong, &last);
+        const int count = contradictions(s, wrong);
         if (count) {
             if (count < fewest)
                 fewest = count, patience = 4;
             else
                 patience--;
-            if (patience < 0)
-                flip(s, last);
-            else
-                for (int i = 0; i < s->n; i++)
-                    if (wrong[i]) flip(s, i);
+            for (int i = s->n - 1, left = patience < 0 ? 1 : s->n; i >= 0 && left; i--)
+                if (wrong[i]) flip(s, i), left--;
             gk_law_apply(s);
         } else if (dashpot_rounds-- <= 0 || !limit_dashpots(s)) {
             return;

@@ -213,16 +213,27 @@ static void gather_along(const gk_node *n, const gk_spot *p, int i)
         gk_node_blend(n, n->flank->along_low, p, n->gear->low, n->along_still + (size_t)i * n->gear->low);
 }
 
+/* what opens the coast flanks of a line of contact that rides beyond the teeth's own numbers, m */
+static double allowance_of(const gk_mesh *mesh, int flank) { return flank && mesh->rides ? mesh->allowance : 0.0; }
+
+/* length of roll on the other gear where that on this side is `own` and the gap is closed */
+static double other_roll(const gk_node *n, const gk_mesh *mesh, int flank, double own)
+{
+    const double open = allowance_of(mesh, flank);
+    if (n->e->kind != MESH_INTERNAL) return n->length + open - own;
+    return own + (n->side->which == 1 ? open - n->length : n->length - open);
+}
+
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
  * action (docs/theory.md, eq. 6, with the gap closed) */
-static double corner_roll(const gk_node *n, const gk_spot *p)
+static double corner_roll(const gk_node *n, const gk_mesh *mesh, const gk_spot *p)
 {
     const gk_engagement *e = n->e;
     const gk_gear *tip = &n->model->gear[e->gear[1 - n->side->which]];
     const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
-    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e), L = sqrt(a * a - R * R);
+    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e);
+    const double roll = other_roll(n, mesh, p->flank, p->nominal);
     const int inside = e->kind == MESH_INTERNAL, on_ring = inside && n->side->which == 1;
-    const double roll = inside ? p->nominal + (on_ring ? -L : L) : L - p->nominal;
     const int past = inside && !on_ring ? roll < tip->s_tip : roll > tip->s_tip;
     if (e->kind == MESH_FLAT || !n->setup->on.tip_contact || !past) return p->nominal;
     const double sg = p->flank ? -1.0 : 1.0, angle = sg * (roll / tip->r_b - gk_acos(R / a) - tip->corner_angle);
@@ -230,7 +241,8 @@ static double corner_roll(const gk_node *n, const gk_spot *p)
     gk_sincos(angle, &sine, &cosine);
     const double dx = tip->corner_radius * cosine + (on_ring ? a : -a), dy = tip->corner_radius * sine;
     const double l2 = dx * dx + dy * dy - n->gear->r_b * n->gear->r_b;
-    return l2 > 0.0 ? sqrt(l2) - (on_ring ? -tip->edge : tip->edge) : 0.0;
+    const double edge = tip->edge - allowance_of(mesh, p->flank);
+    return l2 > 0.0 ? sqrt(l2) - (on_ring ? -edge : edge) : 0.0;
 }
 
 /* Where a strip carries: a slice of the width, or at the nominal centre distance a part of the line of contact */
@@ -240,10 +252,9 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
     p->length = n->e->width / n->setup->slices;
     memcpy(p->width, n->weight[strip], sizeof p->width);
     if (!mesh->rides) return;
-    const int own = n->side->which, internal = n->e->kind == MESH_INTERNAL;
+    const int own = n->side->which;
     double roll[2];
-    roll[own] = p->middle;
-    roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
+    roll[own] = p->middle, roll[1 - own] = other_roll(n, mesh, p->flank, p->middle);
     const gk_line line = gk_strips_line(n->model, mesh, p->flank ? -1.0 : 1.0, roll);
     const gk_part part = gk_strips_part(n->setup, &line, strip);
     p->z = part.middle;
@@ -262,7 +273,7 @@ static void place(gk_node *n, const gk_mesh *mesh, double position, int c)
         p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : gk_node_roll(n->side, p->flank, position, p->offset);
         find_part(n, mesh, p, strip);
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * n->helix_tan;
-        p->roll = corner_roll(n, p);
+        p->roll = corner_roll(n, mesh, p);
         p->grid = gk_grid_at(n->model, n->gear, p->roll);
     }
 }

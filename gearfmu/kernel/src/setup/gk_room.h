@@ -1,5 +1,4 @@
-/* What setup makes for steps beside gk_setup, as the part of gk_work that it knows: coefficients and tables of the steps
- * in use, and scratch. */
+/* The part of gk_work that setup fills: coefficients and tables of the steps in use, and scratch. */
 #ifndef GK_ROOM_H
 #define GK_ROOM_H
 #include "base/gk_lanes.h"

@@ -1,0 +1,178 @@
+"""Figures and tables of the planets of a set side by side, by central gear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gearfmu.report import metrics
+from gearfmu.report.chart import Chart, Curve, Panel, Plot, over_time
+from gearfmu.report.names import mesh_words
+from gearfmu.report.plots import columns, pin_force
+from gearfmu.report.signals import PlanetSet, Window, mesh_speed, recorded
+from gearfmu.stage.run.trace import Trace
+
+
+def forces(trace: Trace, own: PlanetSet, window: tuple[float, float] | None = None) -> Plot:
+    """Magnitude of the mesh force of every planet, one panel for each central gear, over the run or a window (s)."""
+    part = trace if window is None else trace.window(*window)
+    file = "set_force" if window is None else "set_force_detail"
+    panels = []
+    for central, meshes in own.meshes.items():
+        curves = [Curve(part.time, 1e-3 * np.abs(part[f"{m}.force"]), f"{m}.force", "kN") for m in meshes.values()]
+        panels.append(Panel(f"mesh force at the {central} in kN", tuple(curves)))
+    names = [f"{mesh}.force" for meshes in own.meshes.values() for mesh in meshes.values()]
+    title = "Mesh forces of the planets" + ("" if window is None else ", detail")
+    chart = over_time(panels, "time" if window is None else file)
+    return Plot(file, title, _opened(part, own), chart, columns(part, names))
+
+
+def _opened(part: Trace, own: PlanetSet) -> str:
+    meshes = [mesh for group in own.meshes.values() for mesh in group.values() if f"{mesh}.contact" in part]
+    apart = {mesh: float(np.mean(part[f"{mesh}.contact"] == 0)) for mesh in meshes}
+    words = ", ".join(f"{mesh} {share:.1%}" for mesh, share in apart.items() if share)
+    return f"Magnitudes. Teeth apart in this share of the samples: {words or 'none'}."
+
+
+def shares(trace: Trace, own: PlanetSet, window: Window) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Share of every engagement in the force of its central gear, 1 where all planets carry alike: over time (n,), mean
+    over one mesh period, NaN where that would reach beyond the run; and mean over `window`."""
+    period = max(1, round(2 * np.pi / mesh_speed(trace, own) / metrics.sample_step(trace.time)))
+    inside = (trace.time >= window.start) & (trace.time <= window.end)
+    over_time, means = {}, {}
+    for meshes in own.meshes.values():
+        smooth = {mesh: _running_mean(np.abs(_force(trace, mesh)), period) for mesh in meshes.values()}
+        total = np.maximum(sum(smooth.values()), 1e-9)
+        part = {mesh: float(np.mean(np.abs(_force(trace, mesh)[inside]))) for mesh in meshes.values()}
+        for mesh, values in smooth.items():
+            over_time[mesh] = len(meshes) * values / total
+            means[mesh] = len(meshes) * part[mesh] / max(sum(part.values()), 1e-9)
+    return over_time, means
+
+
+def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+    """Share of every planet in the load of sun and ring."""
+    over_time_, means = shares(trace, own, window)
+    panels = []
+    for central, meshes in own.meshes.items():
+        curves = [Curve(trace.time, over_time_[m], f"{planet}: {means[m]:.3f}") for planet, m in meshes.items()]
+        limits = _limits([curve.y for curve in curves], LEAST_SPAN)
+        panels.append(Panel(f"share at the {central}", tuple(curves), limits=limits, height=160))
+    caption = (
+        "Mesh force over the mean of all planets, running mean over one mesh period; in the legend the mean from "
+        f"{window.start:.3g} s to {window.end:.3g} s ({window.reason})."
+    )
+    data = {"time_[s]": trace.time} | {f"{mesh}_share": values for mesh, values in over_time_.items()}
+    return Plot("sharing", "Load sharing", caption, over_time(panels), data)
+
+
+def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+    """One row a planet: its mesh forces over the last mesh periods, its shares and the force on its pin over the
+    run."""
+    shared, means = shares(trace, own, window)
+    late = trace.window(*detail_window(trace, own, window))
+    panels: list[Panel] = []
+    for planet in own.planets:
+        panels += _of_planet(
+            trace, late, planet, {c: (m, shared[m], means[m]) for c, m in _meshes_of(own, planet).items()}
+        )
+    panels = _same_limits(panels)
+    caption = (
+        "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean "
+        f"over one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force "
+        "on the pin across its axis, with its mean. Each column has one scale."
+    )
+    data = {"time_[s]": trace.time}
+    for planet in own.planets:
+        for central, mesh in _meshes_of(own, planet).items():
+            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shared[mesh]}
+        if (pressed := pin_force(trace, planet)) is not None:
+            data[f"{planet}_pin_[N]"] = pressed
+    return Plot("planets", "Planet by planet", caption, Chart(tuple(panels), across=len(COLUMNS_OF_PLANETS)), data)
+
+
+LEAST_SPAN = 0.01  # of an axis of shares
+COLUMNS_OF_PLANETS = ("mesh forces in kN", "share", "force on the pin in kN")
+
+
+def _of_planet(
+    trace: Trace, late: Trace, planet: str, meshes: Mapping[str, tuple[str, np.ndarray, float]]
+) -> list[Panel]:
+    """The row of a planet: mesh forces over the last mesh periods `late`; shares and pin force over the run. meshes: by
+    central gear its engagement, share (n,) and mean share."""
+    forces, parts = [], []
+    for central, (mesh, share, mean) in meshes.items():
+        forces.append(Curve(late.time, 1e-3 * np.abs(late[f"{mesh}.force"]), central, "kN"))
+        parts.append(Curve(trace.time, share, f"{central} {mean:.3f}"))
+    pressed = pin_force(trace, planet)
+    pin: tuple[Curve, ...] = ()
+    if pressed is not None:
+        pin = (Curve(trace.time, 1e-3 * pressed, f"mean {np.mean(pressed):.4g} N", "kN", colour=2),)
+    return [
+        Panel(f"{planet}: {label}", tuple(curves), height=130)
+        for label, curves in zip(COLUMNS_OF_PLANETS, (forces, parts, pin), strict=True)
+    ]
+
+
+def _limits(curves: Sequence[np.ndarray], least: float) -> tuple[float, float] | None:
+    """Limits round all values, at least so far apart: rounding noise is a line."""
+    values = np.concatenate([np.zeros(0), *curves])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    low, high = float(values.min()), float(values.max())
+    edge = max(0.05 * (high - low), 0.5 * (least - (high - low))) or 0.05 * abs(high) or 1.0
+    return low - edge, high + edge
+
+
+def _same_limits(panels: list[Panel]) -> list[Panel]:
+    """The panels of a column with one scale."""
+    found = []
+    for number, panel in enumerate(panels):
+        column = panels[number % len(COLUMNS_OF_PLANETS) :: len(COLUMNS_OF_PLANETS)]
+        least = LEAST_SPAN if number % len(COLUMNS_OF_PLANETS) == COLUMNS_OF_PLANETS.index("share") else 0.0
+        panel = replace(panel, limits=_limits([curve.y for other in column for curve in other.curves], least))
+        found.append(panel)
+    return found
+
+
+def _meshes_of(own: PlanetSet, planet: str) -> dict[str, str]:
+    """Engagements of a planet by central gear."""
+    return {central: meshes[planet] for central, meshes in own.meshes.items() if planet in meshes}
+
+
+def planet_results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Heading and rows of the table of planets: mean, alternating part and share of every mesh force, transmission
+    error, pin force; over `window`."""
+    part, means = trace.window(window.start, window.end), shares(trace, own, window)[1]
+    rows = []
+    for meshes in own.meshes.values():
+        for planet, mesh in meshes.items():
+            force = _force(part, mesh)
+            te = part[f"{mesh}.te"] * 1e6 if f"{mesh}.te" in part else np.array([np.nan])
+            pin = [part[name] for d in "xy" if (name := f"pin.{planet}.f{d}") in part]
+            held = float(np.mean(np.hypot(*pin))) if len(pin) == 2 else np.nan
+            numbers = (np.mean(force), np.std(force), means[mesh], np.mean(te), np.std(te), held)
+            rows.append((mesh_words(mesh), *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
+    head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
+    return head, rows
+
+
+def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float = 8) -> tuple[float, float]:
+    """The last mesh periods (s) of the run, within `window`."""
+    width = periods * 2 * np.pi / mesh_speed(trace, own)
+    return max(window.start, window.end - width), window.end
+
+
+def _force(trace: Trace, mesh: str) -> np.ndarray:
+    return trace[recorded(trace, f"{mesh}.force")]
+
+
+def _running_mean(values: np.ndarray, width: int) -> np.ndarray:
+    """(n,): mean over `width` samples around each; NaN at the ends, where there are fewer."""
+    found, width = np.full(values.size, np.nan), min(width, values.size)
+    before = (width - 1) // 2
+    found[before : before + values.size - width + 1] = np.convolve(values, np.full(width, 1.0 / width), "valid")
+    return found
