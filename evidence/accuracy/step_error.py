@@ -136,15 +136,19 @@ TABLE = (  # scene, level, effects other than by default, steps in µs
     ("relieved", "fast", (), (5.0, 10.0, 15.0)),
     ("relieved", "fast", ("friction",), (5.0, 10.0, 15.0)),
     ("relieved", "fast", ("film",), (5.0, 10.0)),
+    ("relieved", "fast", ("still",), (10.0,)),
     ("helical", "fast", (), (5.0, 10.0)),
     ("helical", "fast", ("friction",), (5.0, 10.0)),
+    ("helical", "fast", ("film",), (5.0, 10.0)),
     ("train", "fast", (), (5.0, 12.5)),
+    ("train", "fast", ("friction",), (5.0, 12.5)),
     ("set", "fast", (), (5.0, 10.0, 12.5)),
     ("set", "fast", ("friction",), (5.0, 10.0)),
     ("set", "fast", ("still",), (12.5,)),
     ("set", "standard", (), (10.0, 12.5)),
     ("frozen", "fast", (), (5.0, 10.0, 12.5)),
     ("helical_set", "fast", (), (5.0, 10.0)),
+    ("helical_set", "fast", ("friction",), (5.0, 10.0)),
 )
 
 
