@@ -52,14 +52,14 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
     gk_system s;
     memset(&s, 0, sizeof s);
     s.contacts = s.n = 1, s.stride = 4;
-    s.curvature[0] = curvature, s.force[0] = force;
-    s.width[0] = model->engagement[0].width / setup->slices;
-    s.per_width[0] = 1.0 / s.width[0];
+    s.flank.curvature[0] = curvature, s.force[0] = force;
+    s.flank.width[0] = model->engagement[0].width / setup->slices;
+    s.flank.per_width[0] = 1.0 / s.flank.width[0];
     gk_law_set(model, setup, &setup->mesh[0], &s);
     gk_law_apply(&s);
-    out[0] = s.delta[0];
-    out[1] = s.yield[0];
-    out[2] = s.potential[0];
+    out[0] = s.local.delta[0];
+    out[1] = s.local.yield[0];
+    out[2] = s.local.potential[0];
 }
 
 /* the same of a part of a line of contact; opens: what its further gaps are more than the least */
@@ -68,12 +68,12 @@ GK_API void probe_part(const gk_model *model, const gk_setup *setup, const doubl
     gk_system s;
     memset(&s, 0, sizeof s);
     s.contacts = s.n = 1, s.stride = 4;
-    s.curvature[0] = 100.0, s.force[0] = force;
-    s.width[0] = s.per_width[0] = 1.0;
-    for (int k = 0; k < GAPS - 1; k++) s.opens[k][0] = opens[k];
+    s.flank.curvature[0] = 100.0, s.force[0] = force;
+    s.flank.width[0] = s.flank.per_width[0] = 1.0;
+    for (int k = 0; k < GAPS - 1; k++) s.flank.opens[k][0] = opens[k];
     gk_law_set(model, setup, &setup->mesh[0], &s);
     gk_law_apply(&s);
-    out[0] = s.delta[0], out[1] = s.yield[0], out[2] = s.potential[0], out[3] = setup->mesh[0].yields;
+    out[0] = s.local.delta[0], out[1] = s.local.yield[0], out[2] = s.local.potential[0], out[3] = setup->mesh[0].yields;
 }
 
 /* ends of the line of contact (z) where both rolls at mid-width are these, then of every part, and the means of the
@@ -100,7 +100,7 @@ GK_API void probe_spread(const gk_model *model, const gk_setup *setup, const dou
 GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
                        double gamma)
 {
-    const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
+    const gk_coefficients *k = gk_flow_for(model, setup, &work->room, h, gamma);
     double low = 0.0, high = 16.0;
     gk_closed_keep(model, setup, work, data);
     for (int i = 0; i < 30; i++) {
