@@ -9,7 +9,7 @@ import pytest
 from refused import refused
 
 from gearfmu.spec.forms.body import expected_hash
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 HOUSED = "two_stage/stage_housed"
