@@ -81,19 +81,20 @@ static void round_lanes(const double *from, int count, gk_half *to)
     *(gk_four *)(to + whole) = __builtin_convertvector(*(const gk_quad *)(from + 8 * whole), gk_four);
 }
 
-static void fill_lanes(const slide_lanes *l, gk_real *const basis[2], const double *ground, const gk_mesh *mesh,
-                       const double (*rigid)[MAX_STRIDE], int contacts, int count, gk_half *to)
+static void fill_lanes(const slide_lanes *l, const gk_rows *rows, const double (*rigid)[MAX_STRIDE], gk_half *to)
 {
+    const gk_mesh *mesh = &rows->setup->mesh[rows->engaged->index];
+    const int contacts = rows->engaged->system.contacts;
     gk_half *lane = to;
     for (int w = 0; w < 2; lane += l->modes[w++]) {
-        const gk_half *from = (const gk_half *)basis[w];
+        const gk_half *from = (const gk_half *)rows->basis[w];
         for (int i = 0; i < contacts; i++, from += l->modes[w])
             for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = from[k];
-        for (int i = contacts; i < count; i++)
+        for (int i = contacts; i < rows->count; i++)
             for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = (gk_half){0};
     }
-    for (int i = 0; i < count; i++, lane += l->all) {
-        round_lanes(ground + (size_t)(i * mesh->local), mesh->local, lane);
+    for (int i = 0; i < rows->count; i++, lane += l->all) {
+        round_lanes(rows->ground + (size_t)(i * mesh->local), mesh->local, lane);
         lane[l->ground] = (gk_half){0};
         for (int d = 0; d < mesh->spins; d++) lane[l->ground][d] = (gk_real)rigid[d][i];
     }
@@ -129,8 +130,9 @@ void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *wo
     const slide_lanes l = lanes_of(setup, mesh, s, glide);
     fill_coefficients(&l, setup, mesh, k, (gk_half *)glide->lanes, 0);
     fill_coefficients(&l, setup, mesh, k, (gk_half *)glide->lanes + l.all, 1);
-    fill_lanes(&l, engaged->basis, engaged->ground, mesh, s->rigid, contacts, s->n, l.gaps);
-    fill_lanes(&l, glide->basis, glide->ground, mesh, glide->rigid, contacts, contacts, l.slides);
+    const gk_rows gaps = gk_rows_of_gaps(setup, work, e), sliding = gk_rows_of_sliding(setup, work, e);
+    fill_lanes(&l, &gaps, s->rigid, l.gaps);
+    fill_lanes(&l, &sliding, glide->rigid, l.slides);
     for (int j = 0; j < contacts; j++) {
         const gk_half *row = l.slides + j * l.all;
         double *const to[4] = {glide->gap_moves + j * s->stride, glide->gap_kappa + j * s->stride,

@@ -189,6 +189,10 @@ GK_HOT double gk_friction_held0(const gk_glide *glide, const gk_system *s);
 GK_HOT double gk_friction_defect(const gk_glide *glide, const gk_system *s);
 GK_HOT double gk_friction_taken(const gk_glide *glide, const gk_system *s);
 static inline double gk_friction_slid(const gk_glide *glide, int j) { return glide->slid[j] - glide->lead[j]; }
+/* gk_friction_law.c */
+GK_HOT double gk_friction_express(gk_glide *glide, const gk_system *s);
+GK_HOT void gk_friction_apply(gk_glide *glide, gk_system *s);
+GK_HOT double gk_friction_follow(gk_glide *glide, const gk_system *s);
 /* gk_friction.c */
 GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k, gk_work *work, int e);
