@@ -21,7 +21,7 @@ from fmpy import read_model_description
 from gearfmu.body import load_body
 from gearfmu.fmu import export
 from gearfmu.kernel.build import compile_program
-from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.reading.files import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 

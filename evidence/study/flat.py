@@ -12,7 +12,7 @@ from gearfmu.stage.build.assembly import MODEL_VERSION
 from gearfmu.stage.build.blob import write_blob
 from gearfmu.stage.build.compact import residual_sections
 from gearfmu.stage.build.fields import gear_numbers, order_sections
-from gearfmu.stage.build.tables import OFFSETS
+from gearfmu.stage.build.teeth import OFFSETS
 
 GRID = 4  # rolls of the tables: all equal
 OWN = 3

@@ -21,7 +21,7 @@ from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.tables import ROLLS
+from gearfmu.stage.build.teeth import ROLLS
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
 

@@ -12,8 +12,7 @@ from gearfmu.body import Body, body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.expand import with_bores, with_ports
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.changes import Changes
-from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.reading.files import Changes, model_folder
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scene import load_scene as load_scene_file
 from gearfmu.spec.stage import load_stage as load_stage_file

@@ -25,7 +25,7 @@ from gearfmu.spec.forms.body import ALGORITHMS, expected_hash
 from gearfmu.spec.forms.former import former_hash
 from gearfmu.spec.forms.general import Reduced, Stage, ToothedBody
 from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.reading.files import model_folder
 from gearfmu.spec.tables.housing import HousingBody
 
 Folder: TypeAlias = "str | os.PathLike[str] | None"

@@ -9,8 +9,20 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearfmu.body.layout import BODY, CUT, ERROR, FLANK, PICTURE, SENSORS, SHAPES, SPIN, SURFACE, TANGENT, Entry
-from gearfmu.body.packing import read_entry
+from gearfmu.body.layout import (
+    BODY,
+    CUT,
+    ERROR,
+    FLANK,
+    PICTURE,
+    SENSORS,
+    SHAPES,
+    SPIN,
+    SURFACE,
+    TANGENT,
+    Entry,
+    read_entry,
+)
 from gearfmu.reduction.full_order import COMPONENTS
 
 FORMATS = (("gearfmu-body", 3), ("gearfmu-interface-body", 1))

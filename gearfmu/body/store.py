@@ -11,8 +11,17 @@ import numpy as np
 
 from gearfmu.body.body import Body, Flank, How, Node, Sensors, Skin, Tangent
 from gearfmu.body.former import FORMATS, former_values
-from gearfmu.body.layout import BODY, FORMAT, FORMAT_VERSION, GROUPS, TEXTS, entries_of, value_of
-from gearfmu.body.packing import read_entry, write_entry
+from gearfmu.body.layout import (
+    BODY,
+    FORMAT,
+    FORMAT_VERSION,
+    GROUPS,
+    TEXTS,
+    entries_of,
+    read_entry,
+    value_of,
+    write_entry,
+)
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError

@@ -114,7 +114,7 @@ def _film(stage: Stage, mesh: EngagementSpec) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
-    from gearfmu.stage.build.oil import REACH, film_stop
+    from gearfmu.stage.build.meshes import REACH, film_stop
 
     return f"takes {1e3 * film_stop(stage, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 

@@ -77,7 +77,7 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 def _shipped(name: Path) -> Path:
     """File of a shipped scene, or of a stage as `find_stage` finds it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
-    from gearfmu.spec.reading.library import find_stage, shipped_stages
+    from gearfmu.spec.reading.files import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
 
     scenes = shipped_scenes()

@@ -57,7 +57,7 @@ def level_option(command: Callable[..., object]) -> Callable[..., object]:
 
 def stage_names(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
     """Shipped stages that begin so, for the completion of shells; files where there is none."""
-    from gearfmu.spec.reading.library import shipped_stages
+    from gearfmu.spec.reading.files import shipped_stages
 
     return _completed(shipped_stages(), begun)
 

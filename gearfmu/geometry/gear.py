@@ -1,17 +1,149 @@
-"""One external gear, spur or helical: reference data, and flank, root and cross-section of its transverse section."""
+"""One external gear, spur or helical: reference data that internal gears share (ISO 21771 symbols), and flank, root and
+cross-section of its transverse section.
+
+A helical gear is seen in its transverse section at mid-width, z = 0: circles, rolls and angles are those of that
+section, while module, pressure angle, profile shift and basic rack are given in the normal section. The section at z
+is that at mid-width turned by z·twist about +z. At β = 0 both sections are one and every number is that of the spur
+gear, to the last bit.
+
+The root is what a basic rack (ISO 53) with a rounded tip generates. That rounding is run through by the angle τ of its
+normal: τ = α where it leaves the straight rack flank (the form point of the involute) and τ = π/2 at its bottom (the
+root circle). With this parameter the curve is smooth for any height of the rounding's centre. A rack whose teeth stand
+at the helix angle β is, in the transverse section, its normal section stretched by 1/cos β along the pitch line: the
+rounding is an ellipse, and the curve it generates there is exact for a tool of rack type (hob, rack cutter)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import ReferenceGear
-from gearfmu.geometry.root import RackRounding
+
+
+@dataclass(frozen=True)
+class ReferenceGear:
+    """Teeth z, normal module m (m), normal pressure angle alpha (rad), profile-shift coefficient x, helix angle beta
+    (rad, at the reference circle, positive for a right-handed gear), and what follows from them."""
+
+    z: int
+    m: float
+    alpha: float
+    x: float
+    beta: float = field(default=0.0, kw_only=True)
+
+    @property
+    def m_t(self) -> float:
+        """Transverse module m_n / cos β, m."""
+        return self.m / math.cos(self.beta)
+
+    @property
+    def alpha_t(self) -> float:
+        """Transverse pressure angle, rad: tan α_t = tan α_n / cos β."""
+        return math.atan(math.tan(self.alpha) / math.cos(self.beta)) if self.beta else self.alpha
+
+    @property
+    def beta_b(self) -> float:
+        """Base helix angle, rad, with the sign of β: sin β_b = sin β cos α_n."""
+        return math.asin(math.sin(self.beta) * math.cos(self.alpha))
+
+    @property
+    def twist(self) -> float:
+        """Angle by which the transverse section turns about +z per metre of face width, tan β / r, rad/m."""
+        return math.tan(self.beta) / self.r
+
+    def overlap_ratio(self, face_width: float) -> float:
+        """ε_β = b sin |β| / (π m_n) of a face width b (m)."""
+        return face_width * math.sin(abs(self.beta)) / (math.pi * self.m)
+
+    @property
+    def z_virtual(self) -> float:
+        """Virtual number of teeth z_n = z / (cos² β_b cos β) of the spur gear that the normal section resembles."""
+        return self.z / (math.cos(self.beta_b) ** 2 * math.cos(self.beta))
+
+    @property
+    def r(self) -> float:
+        """Reference radius, m."""
+        return self.m_t * self.z / 2
+
+    @property
+    def r_b(self) -> float:
+        """Base radius, m."""
+        return self.r * math.cos(self.alpha_t)
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angle of a tooth and a space, π/z."""
+        return math.pi / self.z
+
+    @property
+    def psi_b(self) -> float:
+        """Half angle at the base circle, rad, of an external gear's tooth or an internal gear's space: ψ + inv α
+        (ISO 21771). In the transverse section, where s_t = s_n / cos β and m_t = m_n / cos β leave ψ as it is."""
+        return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha_t))
+
+    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Points (..., 2) in m of the flank of tooth 0, in a ring of space 0."""
+        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
+        """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
+        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
+
+
+@dataclass(frozen=True)
+class RackRounding:
+    """Rounding of the rack's tip against the gear's reference circle.
+
+    r: reference radius; alpha: rack angle; centre_depth: of the rounding's centre below the pitch line;
+    centre_offset: of that centre from the middle of the tooth space; radius: of the rounding, across the depth; all m.
+    half_pitch: half the angle of a tooth and a space, π/z, rad. stretch: half-axis along the pitch line over `radius`,
+    1/cos β; 1 is a circle. Everything but `radius` in the transverse section.
+    """
+
+    r: float
+    alpha: float
+    centre_depth: float
+    centre_offset: float
+    radius: float
+    half_pitch: float
+    stretch: float = 1.0
+
+    @property
+    def land_angle(self) -> float:
+        """Angle (rad) from the middle of the tooth space to the end of the root circle's arc."""
+        return self.centre_offset / self.r
+
+    @property
+    def form_roll(self) -> float:
+        """Roll s (m) where involute and trochoid have a common tangent. Negative: that point is on the involute's other
+        branch, and the trochoid cuts the flank above the base circle."""
+        radius = self.radius / self._slant(self.alpha)
+        return self.r * np.sin(self.alpha) - self.centre_depth / np.sin(self.alpha) - radius
+
+    def polar(self, tau: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """Radius (m) and polar angle (rad, tooth centred on +x, side sg = +1) of the trochoid at τ."""
+        tau = np.asarray(tau, float)
+        cot, radius = np.cos(tau) / np.sin(tau), self.radius / self._slant(tau)
+        across = radius * np.cos(tau) + self.centre_depth * cot
+        up = self.r - self.centre_depth - radius * np.sin(tau)
+        centre = self.centre_offset + (self.stretch**2 - 1) * radius * np.cos(tau)
+        from_space = np.arctan2(across, up) + (centre - self.centre_depth * cot) / self.r
+        return np.hypot(across, up), self.half_pitch - from_space
+
+    def _slant(self, tau: ArrayLike) -> np.ndarray:
+        """√(k² cos² τ + sin² τ), k = stretch: the ellipse's point with the normal at τ is (k² cos τ, −sin τ) times
+        radius over this."""
+        return np.sqrt(1 + (self.stretch**2 - 1) * np.cos(tau) ** 2)
+
+    def point(self, tau: ArrayLike) -> np.ndarray:
+        """Points (..., 2) in m of the trochoid beside flank sg = +1."""
+        radius, angle = self.polar(tau)
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
 
 _CLOSE = 3e-4  # of the base radius
 

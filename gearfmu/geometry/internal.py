@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.geometry.gear import ReferenceGear
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""A planetary set, spur or helical: two meshes with one centre distance, places of the planets, phases of assembly.
+"""A planetary set, spur or helical: two meshes with one centre distance, places of the planets, phases of assembly; and
+its carrier, a plate with a bore beside the planets and a bolt for each of them.
 
 Sun and planets have opposite hands, planets and ring the same: the helix angle of the set is that of the sun."""
 
@@ -6,6 +7,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
@@ -168,3 +171,51 @@ def set_ratio(sun: int, ring: int) -> float:
 def least_apart(angles: tuple[float, ...]) -> float:
     """Smallest angle (rad) between neighbours of ascending `angles`."""
     return min(b - a for a, b in zip(angles, (*angles[1:], angles[0] + 2 * math.pi), strict=True))
+
+
+@dataclass(frozen=True)
+class CarrierGeometry:
+    """Carrier in the set's frame (m): axis z, z = 0 at the planets' mid-width, bolt 0 on +x.
+
+    angles: of the bolts (rad), ascending. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the
+    plate; it lies in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their
+    seats, where the planets' bearings sit, are z ∈ [−seat/2, seat/2].
+    """
+
+    angles: tuple[float, ...]
+    a: float
+    r_bore: float
+    r_o: float
+    r_bolt: float
+    thickness: float
+    gap: float
+    seat: float
+
+    @property
+    def planets(self) -> int:
+        """Number of bolts."""
+        return len(self.angles)
+
+    @property
+    def plate_high(self) -> float:
+        return -self.seat / 2 - self.gap
+
+    @property
+    def plate_low(self) -> float:
+        return self.plate_high - self.thickness
+
+    def bolt_axis(self, bolt: int) -> np.ndarray:
+        """(3,) m, middle of the seat of a bolt: its master node."""
+        angle = self.angles[bolt]
+        return np.array([self.a * math.cos(angle), self.a * math.sin(angle), 0.0])
+
+    @property
+    def bore_centre(self) -> np.ndarray:
+        """(3,) m, middle of the bore: its master node."""
+        return np.array([0.0, 0.0, 0.5 * (self.plate_low + self.plate_high)])
+
+    @property
+    def volume(self) -> float:
+        """m³."""
+        plate = math.pi * (self.r_o**2 - self.r_bore**2) * self.thickness
+        return plate + self.planets * math.pi * self.r_bolt**2 * (self.gap + self.seat)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.reading.files import model_folder
 
 COLUMNS = (
     "scene",

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.body import Body
-from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.geometry.gear import ReferenceGear
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.reduction.display import Picture
 from gearfmu.report.packed import Pack

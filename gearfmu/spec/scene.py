@@ -12,9 +12,7 @@ from pydantic import AliasChoices, Field, SerializerFunctionWrapHandler, model_s
 
 from gearfmu.errors import Problem, SpecError, near_or_all
 from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
-from gearfmu.spec.reading.changes import Changes, changed_tables
-from gearfmu.spec.reading.layers import merged_tables
-from gearfmu.spec.reading.library import shipped_stages
+from gearfmu.spec.reading.files import Changes, changed_tables, merged_tables, shipped_stages
 from gearfmu.spec.scenes.deformation import DeformationChoice, deformation_problems
 from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
 from gearfmu.spec.scenes.parts import ClutchSpec, Drivetrain, drivetrain_problems
@@ -152,7 +150,7 @@ def shipped_scenes() -> list[str]:
 def load_scene(path_or_name: str | Path, changes: Changes | None = None) -> SceneSpec:
     """The scene in a TOML file, or the shipped one of that name. SpecError with everything that is wrong.
 
-    changes : fields that are to be other than in the file (`changes.py`), {"stage.level": "fast"}; `torque` and `speed`
+    changes : fields that are to be other than in the file (`files.py`), {"stage.level": "fast"}; `torque` and `speed`
     are short for those of the drive and of the start (`full_key`).
     """
     path = scene_path(path_or_name)

@@ -20,10 +20,8 @@ from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.forms.planetary_checks import set_problems
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.reading.base import validate
-from gearfmu.spec.reading.changes import Changes, changed_tables
+from gearfmu.spec.reading.files import Changes, Layers, changed_tables, find_stage, read_layers
 from gearfmu.spec.reading.judge import read_and_judge
-from gearfmu.spec.reading.layers import Layers, read_layers
-from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import missing_files
@@ -33,7 +31,7 @@ from gearfmu.units import to_si
 def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Stage:
     """The stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c", "fzg_c/stage_relief", "planetary54").
 
-    changes : fields that are to be other than in the file (`changes.py`), {"gears.pinion.tip_relief.amount": "20 um"};
+    changes : fields that are to be other than in the file (`files.py`), {"gears.pinion.tip_relief.amount": "20 um"};
     the file itself stays. SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that
     cannot run or carry `torque_max`.
     """

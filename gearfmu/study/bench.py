@@ -26,7 +26,7 @@ from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.build.model import integrator_of
-from gearfmu.stage.build.tables import ROLLS
+from gearfmu.stage.build.teeth import ROLLS
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed together

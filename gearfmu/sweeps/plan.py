@@ -24,9 +24,7 @@ import numpy as np
 
 from gearfmu.errors import GearfmuError
 from gearfmu.spec.reading.base import Quantity, read_toml
-from gearfmu.spec.reading.changes import quantity_at
-from gearfmu.spec.reading.layers import read_layers
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage, quantity_at, read_layers
 from gearfmu.spec.scene import SceneSpec, StageChoice, full_key, scene_path, shipped_scenes
 from gearfmu.spec.stage import stage_class
 from gearfmu.units import to_si

@@ -17,7 +17,7 @@ from gearfmu.fmu.package import write_archive
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.validate import _stage as stage_findings
 from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.reading.library import shipped_stages
+from gearfmu.spec.reading.files import shipped_stages
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.stored import restored, stored
 from gearfmu.stage.build.model import StageModel

@@ -17,7 +17,7 @@ from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
 from gearfmu.kernel.build import host_platform
-from gearfmu.spec.reading.library import model_folder
+from gearfmu.spec.reading.files import model_folder
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 

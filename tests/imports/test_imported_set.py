@@ -28,7 +28,7 @@ from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import carrier_geometry
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 BOLTS = ["PIN_A", "PIN_B", "PIN_C", "PIN_D"]

@@ -18,7 +18,7 @@ from gearfmu.body import load_bodies
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.assembly import general_sections
 from gearfmu.stage.build.ground_part import read_tables
-from gearfmu.stage.build.tables import OFFSETS
+from gearfmu.stage.build.teeth import OFFSETS
 
 ROLLS = 48
 PLACES = [((0, 0), (20, 30)), ((1, -1), (38, 9))]  # tooth numbers and grid rolls of both gears

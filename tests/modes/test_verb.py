@@ -16,7 +16,7 @@ from gearfmu.fem import solids
 from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.modes.bodies import body_modes, uncoupled_carrier_modes
 from gearfmu.spec.forms.shapes import carrier_geometry
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 

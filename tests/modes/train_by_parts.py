@@ -23,7 +23,7 @@ from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, ro
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.general import EngagementSpec, ShaftBody, Stage
 from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.stage.build.tables import resampling
+from gearfmu.stage.build.teeth import resampling
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out

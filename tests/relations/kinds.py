@@ -21,7 +21,7 @@ from gearfmu.spec.forms.general import Stage, ToothedBody
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
 from gearfmu.spec.tables.gear import BodySpec, MeshSpec
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.run.simulate import Inputs, simulate
 from gearfmu.stage.run.te import statics_of

@@ -12,7 +12,7 @@ from inner import Inner
 from kinds import COARSE, KINDS, assembled
 
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage.run.te import loaded_te
 
 TORQUE, POSITIONS = 300.0, 16  # N·m, over a pitch

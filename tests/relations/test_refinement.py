@@ -153,7 +153,7 @@ def test_one_and_a_half_times_the_mesh() -> None:
 @pytest.mark.parametrize("name", ["pair", pytest.param("helical", marks=pytest.mark.full)])
 def test_twice_the_rolls_of_the_grid(name: str) -> None:
     from gearfmu.stage import assemble
-    from gearfmu.stage.build.tables import ROLLS
+    from gearfmu.stage.build.teeth import ROLLS
 
     kind, known = KINDS[name], bodies_of(KINDS[name].file)
     finer = assemble(kind.stage, [known[body] for body in known], 2 * ROLLS)

@@ -19,8 +19,7 @@ from typing import Any
 import pytest
 from kinds import COARSE, KINDS, ROOT, assembled, bodies_of
 
-from gearfmu.spec.reading.layers import read_layers
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage, read_layers
 from gearfmu.spec.stage import load_stage
 from gearfmu.units import to_si
 

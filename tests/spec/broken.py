@@ -20,7 +20,7 @@ from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.errors import GearfmuError
 from gearfmu.hdf5 import seal
 from gearfmu.scenes import __file__ as scenes
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble

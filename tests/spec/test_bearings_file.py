@@ -9,7 +9,7 @@ import pytest
 from refused import refused
 
 from gearfmu.spec.proposals.new import new_stage
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.stored import differences, restored, stored
 

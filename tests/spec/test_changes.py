@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 

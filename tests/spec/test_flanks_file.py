@@ -9,7 +9,7 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.spec.proposals.new import new_stage
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.topography import read_topography
 

@@ -12,7 +12,7 @@ from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError
 from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.reading.base import field_path
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 TEXT = find_stage("two_stage").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from refused import refused
 
 from gearfmu.errors import SpecError
 from gearfmu.spec.forms.body import expected_hash
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 HOUSED = "two_stage/stage_housed"

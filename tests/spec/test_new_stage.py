@@ -12,7 +12,7 @@ import pytest
 from gearfmu.errors import SpecError
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.base import read_toml
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.schema import general_schema, stage_schema
 from gearfmu.spec.stage import load_stage
 

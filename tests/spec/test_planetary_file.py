@@ -12,7 +12,7 @@ from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.forms.expand import motion_problems, rewritten
 from gearfmu.spec.proposals.new import new_stage
 from gearfmu.spec.reading.base import read_toml
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.schema import set_schema
 from gearfmu.spec.stage import load_stage
 

@@ -18,7 +18,7 @@ from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.pair_checks import at_most, largest_half_width
 from gearfmu.spec.proposals.new import stage_text
 from gearfmu.spec.reading.base import read_toml
-from gearfmu.spec.reading.library import find_stage, model_folder, shipped_stages
+from gearfmu.spec.reading.files import find_stage, model_folder, shipped_stages
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.gear import Bearing
 

@@ -14,7 +14,7 @@ from gearfmu.stage.build.blob import read_blob
 from gearfmu.stage.build.compact import residual_sections
 from gearfmu.stage.build.fields import GEAR_NUMBERS, SIZES
 from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.tables import ROLLS, blend, resampling
+from gearfmu.stage.build.teeth import ROLLS, blend, resampling
 
 
 @pytest.fixture(scope="module")

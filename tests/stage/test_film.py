@@ -21,7 +21,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.ports import FilmSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.oil import REACH, film_impulse
+from gearfmu.stage.build.meshes import REACH, film_impulse
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m

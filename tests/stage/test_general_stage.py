@@ -12,7 +12,7 @@ import pytest
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage
 from gearfmu.spec.forms.shapes import gears_in_mesh, mesh_shape
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.groups import mount

@@ -16,7 +16,7 @@ from gearfmu.stage.build.compact import ground_rows
 from gearfmu.stage.build.ground_part import read_tables, turn_tables
 from gearfmu.stage.build.groups import SPIN, mount
 from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.tables import OFFSETS, blend, resampling, symmetric_functions
+from gearfmu.stage.build.teeth import OFFSETS, blend, resampling, symmetric_functions
 
 LOADS = [
     (0, 0, 5, 0),

@@ -12,7 +12,7 @@ import pytest
 from gearfmu.body import load_bodies
 from gearfmu.spec.forms.general import GearBody, Stage
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.run.simulate import simulate
 

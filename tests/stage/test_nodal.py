@@ -17,7 +17,7 @@ from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.nodal import flank_nodes, mesh_penalty
+from gearfmu.stage.build.meshes import flank_nodes, mesh_penalty
 
 PAPER, LINE, NODAL = 4, 1, 2
 SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion

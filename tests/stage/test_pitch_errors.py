@@ -19,7 +19,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.forms.body import expected_hash
 from gearfmu.spec.forms.expand import rewritten
 from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.build.blob import read_blob, write_blob
 

@@ -17,7 +17,7 @@ from gearfmu.spec.forms.general import RotorSpec, Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import shafts_of
 from gearfmu.spec.reading.base import read_toml
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
 from gearfmu.stage.run.steady import LoadCase, steady_run

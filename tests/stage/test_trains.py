@@ -13,7 +13,7 @@ from handmade import on_axis
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
 from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part, read_tables
 from gearfmu.stage.build.groups import Layout, Support, mount, node_directions
-from gearfmu.stage.build.tables import OFFSETS, resampling
+from gearfmu.stage.build.teeth import OFFSETS, resampling
 
 STEEL = Steel(206e9, 0.3, 7850.0)
 SHAFTS = [

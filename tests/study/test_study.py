@@ -16,7 +16,7 @@ from gearfmu import cli
 from gearfmu.errors import SpecError
 from gearfmu.report.study import write_chart
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.stage.build.tables import ROLLS
+from gearfmu.stage.build.teeth import ROLLS
 from gearfmu.study import Job, ReferenceRow, Row, study
 from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points

@@ -28,7 +28,7 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.nodal import mesh_penalty
+from gearfmu.stage.build.meshes import mesh_penalty
 
 HERE = Path(__file__).parent
 START = Rattle(position=0.1, speed=1.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gearfmu.spec.tables.bearings import BallBearing, Bearings, OperatingSpec, RollerBearing, RollingMount
 from gearfmu.spec.tables.gear import GearSpec
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 
 Found = Iterator[tuple[str, str, str]]
 SPRINGS = ("radial", "axial", "tilt", "torsion")

@@ -27,8 +27,7 @@ from gearfmu.spec.forms.shapes import planet_angles, set_carrier
 from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.tables.bearings import Bearing, RollingMount
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
-from gearfmu.spec.tables.ports import PortSpec
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import PortSpec, SupportSpec
 
 CARRIER = "carrier"
 

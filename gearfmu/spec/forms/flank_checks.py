@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem
-from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.geometry.gear import ReferenceGear
 from gearfmu.ranges import kernel_limits
-from gearfmu.spec.reading.layers import Layers
+from gearfmu.spec.reading.files import Layers
 from gearfmu.spec.tables.flanks import Toothing
 from gearfmu.spec.tables.topography import read_topography
 

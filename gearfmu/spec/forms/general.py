@@ -32,8 +32,7 @@ from gearfmu.spec.tables.gear import (
 )
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.lead import Misalignment
-from gearfmu.spec.tables.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, PortSpec
-from gearfmu.spec.tables.supports import Place, SupportSpec
+from gearfmu.spec.tables.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, Place, PortSpec, SupportSpec
 
 if TYPE_CHECKING:
     from gearfmu.spec.forms.pair import StageSpec

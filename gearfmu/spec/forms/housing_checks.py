@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.housing import HousingBody
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 
 Found = Iterator[tuple[str, str, str]]
 

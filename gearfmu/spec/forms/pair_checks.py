@@ -11,8 +11,8 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
+from gearfmu.geometry.gear import ReferenceGear
 from gearfmu.geometry.hertz import common_width, contact_modulus, half_width, largest_relative_radius
-from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.spec.forms.flank_checks import flank_problems
 from gearfmu.spec.forms.shapes import gear_geometry
 from gearfmu.spec.tables.flanks import TOOTHING

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import HANDS, PlanetaryGeometry, RingMesh
+from gearfmu.geometry.planetary import HANDS, CarrierGeometry, PlanetaryGeometry, RingMesh
 from gearfmu.spec.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.spec.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.spec.tables.gear import GearSpec, PairSpec

@@ -13,7 +13,7 @@ from typing import Any
 from gearfmu.files import write_text
 from gearfmu.spec.forms.general import Form, Stage
 from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage
 from gearfmu.spec.stage import load_stage
 
 FOLDER = "coarse"

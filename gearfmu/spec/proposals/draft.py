@@ -9,8 +9,7 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.spec.forms.pair_checks import rounded_up
-from gearfmu.spec.reading.layers import read_layers
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage, read_layers
 
 LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
 PITCH_SPEED = 20.0  # m/s at the pitch circle

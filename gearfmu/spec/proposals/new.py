@@ -18,8 +18,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.pair import StageSpec
 from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.reading.base import Quantity, fields_by_key, inner_model, metadata_of, model_of_table, read_toml
-from gearfmu.spec.reading.layers import read_layers
-from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.reading.files import find_stage, read_layers
 from gearfmu.spec.stage import load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")

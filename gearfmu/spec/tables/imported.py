@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.reading.base import Quantity, Spec, Text, refuse
-from gearfmu.spec.reading.layers import Layers
+from gearfmu.spec.reading.files import Layers
 
 FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 

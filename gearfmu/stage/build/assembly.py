@@ -18,8 +18,7 @@ from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.stored import stored, stored_files
 from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage.build.blob import origin, with_guid, write_blob
-from gearfmu.stage.build.compact import flank_tables, ground_tables, is_mirrored
-from gearfmu.stage.build.far import far_sections
+from gearfmu.stage.build.compact import far_sections, flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.flanks import deviation_sections
 from gearfmu.stage.build.ground_part import PartFlank
@@ -27,16 +26,13 @@ from gearfmu.stage.build.groups import SPIN, Group, Layout, RigidSupportError, f
 from gearfmu.stage.build.housed import Sensed, sensor_sections, widened
 from gearfmu.stage.build.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.build.levels import FAST, RIGID, SHARED_BELOW, STANDARD
-from gearfmu.stage.build.meshes import stage_sections, tooth_phases
+from gearfmu.stage.build.meshes import film_starts, friction_starts, nodal_sections, stage_sections, tooth_phases
 from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.build.nodal import nodal_sections
 from gearfmu.stage.build.observed import observed_number, observed_sections
-from gearfmu.stage.build.oil import film_starts, friction_starts
 from gearfmu.stage.build.rolling import Settled, Statics, Tangents, settle
 from gearfmu.stage.build.slices import smeared, smeared_tip
 from gearfmu.stage.build.spinning import turn_rates
-from gearfmu.stage.build.tables import ROLLS, stored_points
-from gearfmu.stage.build.teeth import gear_section, mismatches
+from gearfmu.stage.build.teeth import ROLLS, gear_section, mismatches, stored_points
 from gearfmu.stage.build.whirls import whirl_rows
 
 MODEL_VERSION = 5

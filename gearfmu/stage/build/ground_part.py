@@ -22,7 +22,7 @@ from gearfmu.errors import ModelError
 from gearfmu.spec.tables.ports import LevelSpec
 from gearfmu.stage.build.levels import lowest_levels
 from gearfmu.stage.build.spinning import Spinning, body_spinning
-from gearfmu.stage.build.tables import OFFSETS, blend
+from gearfmu.stage.build.teeth import OFFSETS, blend
 
 NODE_MEMBERS = np.array([1, 2, 0, 1, 2, 0])  # x, y and rx, ry are pairs, z and rz single
 NOISE = 1e-7  # of the static compliance of a carrier: smaller residuals are rounding of its Krylov vectors

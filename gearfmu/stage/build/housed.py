@@ -18,7 +18,7 @@ from gearfmu.errors import ModelError
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.tables.housing import HousingBody
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage.build.ground_part import GroundPart, ground_part
 from gearfmu.stage.build.groups import Group
 

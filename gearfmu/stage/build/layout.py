@@ -15,11 +15,11 @@ from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import ShaftBody, Stage, ToothedBody
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.tables.housing import HousingBody
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.build.groups import Layout, Support
 from gearfmu.stage.build.housed import housing_part, meetings
-from gearfmu.stage.build.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
+from gearfmu.stage.build.teeth import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
 
 SAME_PLACE = 1e-9  # m
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number

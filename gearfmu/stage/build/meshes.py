@@ -1,4 +1,6 @@
-"""The engagements of a stage for the model blob: positions, backlash, limits, and how the teeth stand at φ = 0."""
+"""The engagements of a stage for the model blob: positions, backlash, limits, how the teeth stand at φ = 0; of nodal
+contact the nodes of every gear's flanks and the penalty of every engagement; of friction and film the starts of the
+kernel's parameters, and what a film can stop."""
 
 from __future__ import annotations
 
@@ -11,9 +13,11 @@ import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.general import EngagementSpec, Stage
-from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
+from gearfmu.ranges import kernel_limits, kernel_number
+from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
+from gearfmu.spec.forms.shapes import MeshShape, face_width, mesh_shape, toothed
 
 EXTERNAL, INTERNAL = 1, -1
 LONGEST = {"pair": 7.5e-6, "helical": 5e-6, "shared": 12.5e-6}  # s: default steps (docs/decisions/kernel.md)
@@ -169,3 +173,110 @@ def _coast_shift(geometry: MeshShape) -> int:
         for shift in (-1, 0, 1)
     }
     return min(gaps, key=lambda shift: abs(gaps[shift]))
+
+
+SHARE_OF_A = {"both": 0.5, "a": 1.0, "b": 0.0}
+MOST = int(kernel_limits()["NODES"][1])  # nodes that the kernel takes along or across
+STIFFEST = kernel_limits()["PENALTY"][1]  # N/m³ that it takes
+
+
+def nodal_sections(stage: Stage) -> dict[str, Any]:
+    """Sections of nodes and penalties."""
+    numbers = [[mesh_penalty(stage, mesh), SHARE_OF_A[stage.nodal.nodes_of]] for mesh in stage.engagements]
+    nodes = {f"nodes{i}": np.array(flank_nodes(stage, gear), np.int32) for i, gear in enumerate(stage.gears)}
+    return {"nodal": np.array(numbers)} | nodes
+
+
+def flank_nodes(stage: Stage, gear: ToothedBody) -> tuple[int, int]:
+    """Nodes along a flank and across the face width: as said, or corners and middles of the edges of the gear's own
+    mesh."""
+    nodal, mesh = stage.nodal, gear.body.mesh
+    own = (2 * mesh.scaled(count) + 1 for count in (mesh.flank, mesh.width))
+    along, across = (given or min(count, MOST) for given, count in zip((nodal.along, nodal.across), own, strict=True))
+    return along, across
+
+
+def mesh_penalty(stage: Stage, mesh: EngagementSpec) -> float:
+    """Penalty stiffness (N/m³) of an engagement: as said, or of "hertz" 3 pi E*/(8 b).
+
+    An elastic foundation of that stiffness has Hertz's half-width b under the same load: that of torque_max on one
+    tooth pair at the pitch point. (Johnson, Contact Mechanics, 4.3: K/h of a line contact.)
+    """
+    if not isinstance(stage.nodal.penalty, str):
+        return stage.nodal.penalty
+    gears, shape = [toothed(stage, name) for name in mesh.gears], mesh_shape(stage, mesh)
+    a, b = (gear.material for gear in gears)
+    e_star = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
+    first = shape.path["C"]
+    second = first + shape.length if isinstance(shape, RingMesh) else shape.length - first
+    radius = first * second / shape.length / math.cos(shape.gears[0].beta_b)
+    load = mesh.torque_max / shape.gears[0].r_b / face_width(stage, mesh)
+    return min(3 * math.pi * e_star / (8 * half_width(load, radius, e_star)), STIFFEST)
+
+
+REACH = kernel_number("FILM_REACH")  # m: flanks further apart know no film
+LAWS = ("constant", "benedict_kelley", "iso_tr_14179")  # of friction, in the kernel's order
+NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
+
+
+def friction_starts(stage: Stage) -> dict[str, float]:
+    """Parameter → start. Empty where no engagement says anything about friction; else it is on, and an engagement that
+    says nothing has none."""
+    if not any(mesh.friction for mesh in stage.engagements):
+        return {}
+    starts = {"effect.friction": 1.0}
+    for mesh in stage.engagements:
+        prefix = f"{mesh.name}." if len(stage.engagements) > 1 else ""
+        own = mesh.friction
+        if own is None:
+            starts[f"{prefix}friction_coefficient"] = 0.0
+            continue
+        starts |= {
+            f"{prefix}friction_law": float(LAWS.index(own.law)),
+            f"{prefix}friction_coefficient": own.coefficient,
+            f"{prefix}oil_viscosity": own.viscosity,
+            f"{prefix}flank_roughness": own.roughness,
+        }
+    return starts
+
+
+def film_starts(stage: Stage) -> dict[str, float]:
+    """Parameter → start. Empty where no engagement says anything about a film; else it is on, and an engagement that
+    says nothing has oil of next to no viscosity.
+
+    ModelError where friction and film of an engagement name two viscosities: there is one oil."""
+    if not any(mesh.film for mesh in stage.engagements):
+        return {}
+    starts = {"effect.film": 1.0}
+    for mesh in stage.engagements:
+        prefix = f"{mesh.name}." if len(stage.engagements) > 1 else ""
+        rubs = mesh.friction is not None and mesh.friction.law != "constant"
+        if mesh.film is None:
+            if not rubs:
+                starts[f"{prefix}oil_viscosity"] = NEXT_TO_NONE
+            continue
+        if rubs and mesh.friction is not None and mesh.friction.viscosity != mesh.film.viscosity:
+            raise ModelError(
+                f"engagement {mesh.name}: friction says oil of {mesh.friction.viscosity:g} Pa·s, film of "
+                f"{mesh.film.viscosity:g} Pa·s; state the same viscosity in both"
+            )
+        starts |= {f"{prefix}oil_viscosity": mesh.film.viscosity, f"{prefix}film_roughness": mesh.film.roughness}
+    return starts
+
+
+def film_stop(stage: Stage, mesh: EngagementSpec) -> float:
+    """`film_impulse` of an engagement with a film from REACH on, spur teeth at the pitch point."""
+    assert mesh.film is not None
+    pair, internal = mesh_shape(stage, mesh), stage.internal(mesh)
+    a, b = (gear.r_b for gear in pair.gears)
+    first, second = (pair.length * r_b / (b - a if internal else a + b) for r_b in (a, b))
+    radius = first * second / (second - first if internal else first + second)
+    return film_impulse(REACH, mesh.film.viscosity, mesh.film.roughness, radius, face_width(stage, mesh))
+
+
+def film_impulse(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:
+    """∫ c dd from flanks that touch to a gap (m), N·s: momentum that the film takes on the way, docs/theory.md (8r)."""
+    gap = min(gap, REACH)
+    factor = 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5
+    far = (REACH + roughness) ** -1.5
+    return factor * (2 * roughness**-0.5 - 2 * (gap + roughness) ** -0.5 - gap * far)

@@ -26,7 +26,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import shafts_of, turns
 from gearfmu.spec.tables.bearings import BallBearing, RollerBearing
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 
 Tangents = Mapping[str, np.ndarray]
 BALL_NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "inner_groove", "outer_groove")
