@@ -100,7 +100,7 @@ def test_a_heavy_housing_on_stiff_feet_is_rigid_ground(housed: Stage) -> None:
 
 def test_the_feet_carry_the_torque_of_the_ring(housed: Stage) -> None:
     """At the start: what carrier and sun leave, 600 · 54/72 N·m, by moments about the axis; and the ring's on its seat.
-    A held housing is the set on rigid ground."""
+    Without the effect it is the set on rigid ground."""
     of = model(housed, 20.0)
     trace = run(of)
     start = {name: channel.values[0] for name, channel in trace.channels.items()}
@@ -109,7 +109,9 @@ def test_the_feet_carry_the_torque_of_the_ring(housed: Stage) -> None:
     assert abs(about) == pytest.approx(600.0 * 54 / 72, rel=2e-3)
     assert np.ptp(trace["mount.left.fy"]) > 0.0
     ground, own = housed.on_rigid_ground(), load_stage("planetary54").by_name(shipped())
-    off, bare = run(of, effect__housing=0.0), run(assemble(ground, [own[name] for name in ground.files]))
-    common = bare.channels.keys() & off.channels.keys()  # where the ring is held on the ground it tells of its motion
-    assert "sun_planet1.te" in common and "bearing.ring_seat.mz" in common
-    assert [name for name in sorted(common) if not np.array_equal(bare[name], off[name])] == []
+    plain = assemble(ground, [own[name] for name in ground.files])
+    off, bare = run(of, effect__housing=0.0, h=1e-5), run(plain, h=1e-5)
+    most = np.abs(bare["sun_planet1.force"]).max()
+    for name in sorted(bare.channels.keys() & off.channels.keys()):
+        if name.endswith((".fx", ".fy", ".fz", ".force")):
+            assert np.abs(bare[name] - off[name]).max() <= 1e-4 * most, name
