@@ -206,7 +206,9 @@ class CarrierBody(CarrierSpec):
     kind: Literal["carrier"] = Field(description="kind of body")
     circle: Annotated[float, Quantity("center_distance")] = Field(default=0.0, description="radius of the bolt circle")
     seat_length: FaceWidth = Field(default=0.0, description="length of the planets' seats")
-    bolts: tuple[float, ...] = Field(default=(), description="places of the bolts, in turns from +x")
+    bolts: tuple[Annotated[float, Quantity("bolt_place")], ...] = Field(
+        default=(), description="places of the bolts, in turns from +x"
+    )
 
 
 class PlanetarySpec(LaterFields):

@@ -15,7 +15,7 @@ from gearfmu.spec.tables.imported import FilesSpec, SourceSpec
 
 Method = Literal["krylov", "rubin", "craig_bampton", "modal"]
 Coupling = Literal["averaging", "rigid"]
-Label = Annotated[int, Strict(), Field(ge=1)]
+Label = Annotated[int, Strict(), Whole("label")]
 MOST_SENSORS = 85  # three outputs each, of 255
 LONGEST = 20  # characters of a sensor's name, with which its outputs begin
 

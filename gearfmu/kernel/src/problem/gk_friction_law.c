@@ -19,9 +19,10 @@ static void solve_small(double *a, int n, double *x, int columns)
         }
 }
 
-/* p̄ = mean + Σ by_z Δz, at the end of the step end + end_by_z Δz + end_by_mean Δp̄. At a limit the end is µ (λ₁ + f_d),
- * below it the mean makes Δs = −ε h p̄/(µ λ̄). The mean is that of both ends, p̄ = ½ (p₀ + p₁); where the contact sticks
- * its dashpot adds (τ/h) (p₁ − p₀); of gears that roll on coefficients have the mean c̄ = (1 − θ) c₀ + θ c₁. */
+/* p̄ = mean + Σ by_z Δz, at the end of the step end + end_by_z Δz + end_by_mean Δp̄. At a limit the end is
+ * µ (λ₁ + f_d), below it the mean makes Δs = −ε h p̄/(µ λ̄). The mean is that of both ends, p̄ = ½ (p₀ + p₁); where
+ * the contact sticks its dashpot adds (τ/h) (p₁ − p₀); of gears that roll on coefficients have the mean
+ * c̄ = (1 − θ) c₀ + θ c₁. */
 typedef struct laws {
     double mean[MAX_CONTACTS], end[MAX_CONTACTS]; /* of contacts below the limit 0, and the end without its mean */
     double by_z[MAX_CONTACTS], end_by_z[MAX_CONTACTS], end_by_mean[MAX_CONTACTS];
