@@ -17,7 +17,7 @@ from kinds import HOUSED, KINDS, Kind, bodies_of, channels, drawn, family, level
 
 from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.housing import HousingBody
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.build.groups import Layout
 from gearfmu.stage.build.layout import place_of, stage_layout

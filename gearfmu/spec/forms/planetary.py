@@ -32,8 +32,7 @@ from gearfmu.spec.tables.gear import (
 )
 from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
-from gearfmu.spec.tables.supports import SupportSpec
+from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec, SupportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
