@@ -72,5 +72,9 @@ def test_a_load_without_equilibrium_is_named_and_loses_no_other(name: str) -> No
     assert np.allclose(found.te[[0, 2]], alone.te, rtol=0, atol=1e-10)
     assert np.array_equal(found.found.te, found.te[[0, 2]]) and found.found.failed == ("", "")
     assert found.failed[1] in dict(found.rows).values()
+    kept, planets = found.found, found.sharing.shape[3]
+    assert {values.size for values in kept.columns().values()} == {2 * 2}
+    carried = kept.sharing.sum(axis=3) / planets if kept.centrals else kept.shares.sum(axis=2)
+    assert carried.size and np.allclose(carried, 1.0, rtol=0, atol=1e-12), "planets or tooth pairs carry all"
     with pytest.raises(SimulationError, match="no static equilibrium"):
         loaded_te(model, [broken], 2)
