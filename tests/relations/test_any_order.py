@@ -128,6 +128,7 @@ def test_the_order_of_the_tables_does_not_matter(name: str) -> None:
     compare(kind, run(kind), run(kind, everything))
 
 
+@pytest.mark.full
 def test_the_order_of_the_tables_of_a_housed_stage_does_not_matter() -> None:
     one, other = run(HOUSED), run(HOUSED, everything)
     felt = {name for name in one if name.startswith("sensor.")}

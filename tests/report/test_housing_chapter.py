@@ -70,6 +70,7 @@ def test_with_a_housing_the_chapter_is_there_and_its_sound_is_that_of_sound_powe
         assert words in page
 
 
+@pytest.mark.full
 def test_transfer_paths_add_up_to_the_recorded_sensor(closure: Trace, tmp_path: Path) -> None:
     """Forces of the run on the housing alone, its sensor: all third octaves together within .5 dB, each from 200 Hz to
     4 kHz within 3 (2.2), for what rings in the window was excited before it; .2 dB in a steady run."""
@@ -93,6 +94,7 @@ def test_transfer_paths_add_up_to_the_recorded_sensor(closure: Trace, tmp_path: 
     assert len(np.genfromtxt(tmp_path / "paths.csv", delimiter=",", names=True).dtype) == 2 + len(found.names)
 
 
+@pytest.mark.full
 def test_a_run_up_has_sound_power_over_the_speed(closure: Trace, tmp_path: Path) -> None:
     """That of `gf.sound_power` with a speed; the verb takes a start."""
     stage = gf.load("two_stage/stage_housed")

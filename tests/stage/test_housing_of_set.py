@@ -98,6 +98,7 @@ def test_a_heavy_housing_on_stiff_feet_is_rigid_ground(housed: Stage) -> None:
     assert found.te == pytest.approx(wanted.te, rel=1e-4)
 
 
+@pytest.mark.full
 def test_the_feet_carry_the_torque_of_the_ring(housed: Stage) -> None:
     """At the start: what carrier and sun leave, 600 · 54/72 N·m, by moments about the axis; and the ring's on its seat.
     Without the effect it is the set on rigid ground."""
