@@ -54,6 +54,7 @@ def closure() -> Trace:
     return gf.run(scene.model_copy(update={"duration": 0.06}), unit="kernel")
 
 
+@pytest.mark.full
 def test_with_a_housing_the_chapter_is_there_and_its_sound_is_that_of_sound_power(
     closure: Trace, tmp_path: Path
 ) -> None:

@@ -265,7 +265,8 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
         assert np.abs(long[name][1:] - mean).max() <= 1e-3 * np.abs(mean).max()
 
 
-@pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), pytest.param(True, 5e-3, marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
 def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
     """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
     Margin: at the start 1.2e-8; after 1 ms without dashpots 1.7e-5 of a sensor and 6e-8 of the forces, with them 2.3e-3
@@ -289,6 +290,7 @@ def test_the_balance_of_energy_closes_as_on_the_ground() -> None:
     assert left <= 1.5 * plain
 
 
+@pytest.mark.full
 def test_what_is_above_its_limit_is_compliance() -> None:
     """Statics stay, oscillators go."""
     soft = stage().model_copy(
