@@ -87,7 +87,7 @@ def to_body() -> list[str]:
     return walked(lambda: make(stage.by_file["pinion"]), ("fem", "geometry", "spec", "ranges.py", "units.py"))
 
 
-def signatures(names: str = "Any") -> int:
+def signatures(word: str = "Any") -> int:
     """Parameters and results of functions whose annotation has a word."""
     found = 0
     for path in PRODUCT.rglob("*.py"):
@@ -96,12 +96,7 @@ def signatures(names: str = "Any") -> int:
                 own = node.args
                 args = [*own.posonlyargs, *own.args, *own.kwonlyargs, *filter(None, (own.vararg, own.kwarg))]
                 notes = [arg.annotation for arg in args] + [node.returns]
-                found += sum(
-                    names in ast.unparse(note).replace("[", " ").split()
-                    or bool(re.search(rf"\b{names}\b", ast.unparse(note)))
-                    for note in notes
-                    if note is not None
-                )
+                found += sum(bool(re.search(rf"\b{word}\b", ast.unparse(note))) for note in notes if note is not None)
     return found
 
 

@@ -269,8 +269,8 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
 @pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
 def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
     """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
-    Margin: at the start 1.2e-8; after 1 ms without dashpots 1.7e-5 of a sensor and 6e-8 of the forces, with them 2.3e-3
-    and 4e-6; at half the step half as much."""
+    Margin: at the start 1.2e-8 (its search ends at 1e-11 m, 5e-7 of the force); after 1 ms without dashpots 1.7e-5 of a
+    sensor and 6e-8 of the forces, with them 2.3e-3 and 4e-6; at half the step half as much."""
     chosen = stage() if damped else undamped(stage())
     turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
     own, other = (run(assemble(order, [*gears(), drawn()])) for order in (chosen, turned))
