@@ -194,6 +194,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     # sets
     "position": ("", 0, 2000, "steps of 360 deg/(z_sun + z_ring), the first 0"),
     "load_sharing": ("", 1, 4, "mesh load factor of ISO 6336-1"),
+    "bolt_place": ("", -1, 1, "in turns from +x"),
     "pin_error": ("m", -1e-3, 1e-3, "some hundredths of a millimetre"),
     # limits of what a model is made for
     "torque_max": ("N*m", 1e-6, 1e9, "the largest torque the stage carries"),
@@ -201,6 +202,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "mesh_torque_max": ("N*m", 1e-10, 1e12, "the largest torque on gear A"),
     "mesh_speed_max": ("rad/s", 1e-5, 1e8, "the fastest gear A turns"),
     # finite elements and reduction
+    "label": ("", 1, 2**31 - 1, "the number of a point in the mesh file"),
     "elements": ("", 1, 200, "element counts of the shipped stages are 4 to 20"),
     "elements_two": ("", 2, 200, "element counts of the shipped stages are 4 to 20"),
     "scale": ("", 0.01, 8, "a factor on all element counts, 1 for none"),

@@ -1,6 +1,6 @@
 """Pictures of the README and docs from runs (its chart of error against time: evidence/study/cost_chart.py).
 
-    python -m evidence.pictures.reports FOLDER_OF_DEMO [FOLDER_OF_SET [COMPARISON]]
+    python -m evidence.pictures.reports FOLDER_OF_DEMO [FOLDER_OF_SET [COMPARISON [FOLDER_OF_HOUSED_RUN_UP]]]
 
 Needs Chromium.
 """
@@ -35,7 +35,7 @@ def shot(page: Path, name: str, size: tuple[int, int], element: str | None = Non
         return None
 
 
-def main(demo: Path, planets: Path | None = None, comparison: Path | None = None) -> None:
+def main(demo: Path, planets: Path | None = None, comparison: Path | None = None, housed: Path | None = None) -> None:
     """Every picture that the given runs allow."""
     shot(demo / "report.html", "report", WIDE)
     shot(demo / "report.html", "report_420", NARROW)
@@ -48,6 +48,9 @@ def main(demo: Path, planets: Path | None = None, comparison: Path | None = None
         shot(planets / "report.html", "report_set", WIDE)
     if comparison is not None:
         shot(comparison, "report_comparison", (1200, 1300))
+    if housed is not None:
+        shot(housed / "report.html", "housed_stage", WIDE, "#stage")
+        shot(housed / "report.html", "sound_waterfall", WIDE, "#housing_waterfall")
 
 
 if __name__ == "__main__":

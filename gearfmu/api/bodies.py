@@ -10,12 +10,12 @@ from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, load
 from gearfmu.api.settings import Quantity, checked
+from gearfmu.body.housing import housing_order
 from gearfmu.body.imported import imported_full_order
 from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.housing import imported_housing
 from gearfmu.reduction.judged import Judgement, judged
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
@@ -76,11 +76,12 @@ def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     if (table := spec.by_file.get(body)) is None:
         remedy = f"no body '{body}'; the stage has {', '.join(spec.files)}"
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
-    if table.imported is not None and scale is not None:
+    mine = isinstance(table, HousingBody) or table.imported is not None
+    if mine and scale is not None:
         remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave the scale away"
         raise SpecError([Problem(str(spec.source), "scale", f"{scale:g}", remedy)])
     if isinstance(table, HousingBody):
-        return imported_housing(table).full
+        return housing_order(table).full
     if isinstance(table, CarrierBody):
         return carrier_full_order(table, **factor)
     if isinstance(table, GearBody):

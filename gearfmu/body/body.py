@@ -51,7 +51,8 @@ class How:
     @classmethod
     def of(cls, table: Reduced, method: str, mesh: dict[str, Any]) -> How:
         """How a body is made from its table today."""
-        return cls(body_hash(table), method, table.material.model_dump(), mesh, {}, ALGORITHMS[table.kind])
+        material = {} if table.material is None else table.material.model_dump()
+        return cls(body_hash(table), method, material, mesh, {}, ALGORITHMS[table.kind])
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from gearfmu.body.body import Body, How
 from gearfmu.body.parts import provenance
 from gearfmu.body.whole import Read, whole_body
 from gearfmu.reduction.basis import Size
-from gearfmu.reduction.imported.housing import imported_housing
+from gearfmu.reduction.imported.housing import ImportedHousing, imported_housing
+from gearfmu.reduction.imported.superelement import superelement
 from gearfmu.reduction.transfer import Judging
 from gearfmu.spec.tables.housing import HousingBody
 
@@ -22,17 +23,23 @@ def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> B
     """The housing of a stage, reduced as its file says. Raises MeshError and BodyError."""
     started, tell = time.process_time(), progress or (lambda what, share: None)
     tell(f"{housing.name}: mesh and finite elements", 0.0)
-    found = imported_housing(housing)
-    tell(f"{housing.name}: {housing.method}, {found.full.size} unknowns", 0.1)
+    found = housing_order(housing)
+    method = "modal" if housing.reduced else housing.method  # all modes of a superelement, which are not many
+    tell(f"{housing.name}: {method}, {found.full.size} unknowns", 0.1)
     surface = found.surface
-    mesh = found.facts | {"holes_of_the_skin": surface.holes}
-    how = How.of(housing, housing.method, mesh)
-    read = Read(found.sensors, surface.points, surface.faces, found.skin)
+    mesh = found.facts | ({} if surface is None else {"holes_of_the_skin": surface.holes})
+    how = How.of(housing, method, mesh)
+    read = Read(found.sensors) if surface is None else Read(found.sensors, surface.points, surface.faces, found.skin)
     judging = Judging.over(lines=LINES, damping_ratio=housing.modal_damping)
     body = whole_body(found.full, how, Size(housing.modes), judging, read)
     return replace(
         body,
         name=housing.name,
         how=replace(how, provenance=provenance(time.process_time() - started)),
-        nodes=tuple(replace(node, span=found.spans[node.name]) for node in body.nodes),
+        nodes=tuple(replace(node, span=found.spans.get(node.name)) for node in body.nodes),
     )
+
+
+def housing_order(housing: HousingBody) -> ImportedHousing:
+    """A housing before reduction, or as it was reduced elsewhere. Raises MeshError."""
+    return superelement(housing) if housing.reduced else imported_housing(housing)

@@ -81,9 +81,7 @@ def _numbers(stage: str) -> dict[str, str]:
         "tip_contact": _listed(f"{1e3 * g.tip_edge_radius:g} mm" for g in gears)
         + f" edge radius; flanks carry alone up to {_listed(f'{torque:.3g} N·m' for torque in alone)}",
         "bearings": _listed(s.bearing or _stiffness(s.radial) for s in spec.on_rigid_ground().supports if s.to is None),
-        "housing": ", ".join(
-            f"{len(h.imported.seats)} seats, oscillators to {h.dynamic_to:g} Hz" for h in spec.housings
-        )
+        "housing": ", ".join(f"{len(h.made_of.seats)} seats, oscillators to {h.dynamic_to:g} Hz" for h in spec.housings)
         or "none: it costs nothing",
         "modal_damping": _listed(f"{g.modal_damping:g}" for g in gears) + " of critical",
         "roll_motion": "on",

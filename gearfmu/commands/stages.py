@@ -44,7 +44,8 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
         written = sector.full() if full else sector
         write_vtu(written, path)
         if deck:
-            write_deck(written, path.with_suffix(".inp"), table.material.model_dump())
+            material = None if table.material is None else table.material.model_dump()
+            write_deck(written, path.with_suffix(".inp"), material)
         click.echo(name)
         echo_pairs({**in_units(mesh_report(sector, *flank)), "written": str(path)}, "  ")
 

@@ -29,10 +29,10 @@ def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> 
     labels : (N,) node numbers of the mesh. Raises MeshError for what cannot be read, is not symmetric, or misses a
     node.
     """
-    matrix = _read(path)
-    if isinstance(matrix, Labelled):
-        unknowns, matrix = matrix.unknowns, matrix.matrix
-    matrix = _symmetric(path, matrix)
+    found = _read(path)
+    if isinstance(found, Labelled):
+        unknowns = found.unknowns
+    matrix = _symmetric(path, found.matrix if isinstance(found, Labelled) else found)
     if unknowns is None:
         if matrix.shape[0] != 3 * len(labels):
             raise MeshError(
@@ -41,11 +41,40 @@ def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> 
                 "give `unknowns` when rows were left out or sorted differently"
             )
         return matrix
-    if len(unknowns) != matrix.shape[0]:
-        raise MeshError(
-            f"{path}: {matrix.shape[0]} rows, but `unknowns` names {len(unknowns)}: they belong to other runs"
-        )
+    _as_many(path, matrix.shape[0], unknowns)
     return _sorted(path, matrix, unknowns, labels)
+
+
+def read_labelled(path: Path, unknowns: np.ndarray | None) -> Labelled:
+    """A symmetric matrix with the label of every row, in the file's units.
+
+    unknowns : (n, 2) label and component 0 … 5 of each row, −1 of a modal coordinate; None where the file says so
+    itself (DMIG). Raises MeshError for what cannot be read, is not symmetric, or has no labels."""
+    found = _read(path)
+    if isinstance(found, Labelled):
+        return Labelled(_symmetric(path, found.matrix), found.unknowns)
+    if unknowns is None:
+        raise MeshError(f"{path}: give `unknowns`: what each of its {found.shape[0]} rows is stands in no such matrix")
+    matrix = _symmetric(path, found)
+    _as_many(path, matrix.shape[0], unknowns)
+    return Labelled(matrix, unknowns)
+
+
+def read_recovery(path: Path, rows: np.ndarray, columns: int) -> sp.csr_array:
+    """A matrix (r, columns) of displacements of further points, in the file's units. rows : (r, 2) label and component
+    of each. Raises MeshError."""
+    found = _read(path)
+    if isinstance(found, Labelled):
+        raise MeshError(f"{path}: a DMIG matrix is read as square: write recovery as .op4, .mtx or .npz")
+    if found.shape != (len(rows), columns):
+        wanted = f"{len(rows)} rows as `recovered`, {columns} columns as the superelement"
+        raise MeshError(f"{path}: {found.shape[0]} rows and {found.shape[1]} columns, expected {wanted}")
+    return found
+
+
+def _as_many(path: Path, rows: int, unknowns: np.ndarray) -> None:
+    if len(unknowns) != rows:
+        raise MeshError(f"{path}: {rows} rows, but `unknowns` names {len(unknowns)}: they belong to other runs")
 
 
 def read_unknowns(path: Path) -> np.ndarray:

@@ -23,7 +23,7 @@ class Labelled:
 def read_dmig(path: Path) -> Labelled:
     """The only DMIG matrix of a file, free, small or large field. Form 6 gives one triangle. ValueError when there is
     none or more than one, or it is complex."""
-    cards = [card for card in _cards(path) if card[0].rstrip("*") == "DMIG"]
+    cards = [card for card in bulk_cards(path) if card[0].rstrip("*") == "DMIG"]
     heads = [card for card in cards if card[2] in ("0", "") and len(card) > 4]
     if len(heads) != 1:
         raise ValueError(f"expected one DMIG matrix, found {len(heads)}")
@@ -38,7 +38,7 @@ def read_dmig(path: Path) -> Labelled:
         rest = card[5:]
         for k in range(0, len(rest) - 2, 4):
             if rest[k]:
-                entries[(int(rest[k]), int(rest[k + 1] or 1) - 1), column] = _number(rest[k + 2])
+                entries[(int(rest[k]), int(rest[k + 1] or 1) - 1), column] = bulk_number(rest[k + 2])
     unknowns = sorted({key for pair in entries for key in pair})
     number = {key: k for k, key in enumerate(unknowns)}
     rows, columns = (np.array([number[pair[side]] for pair in entries]) for side in (0, 1))
@@ -51,7 +51,7 @@ def read_dmig(path: Path) -> Labelled:
     return Labelled(sp.csr_array(matrix), np.array(unknowns))
 
 
-def _cards(path: Path) -> list[list[str]]:
+def bulk_cards(path: Path) -> list[list[str]]:
     """Bulk data cards as lists of fields, continuation lines joined (eight or four fields a line)."""
     cards: list[list[str]] = []
     for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
@@ -74,7 +74,7 @@ def _cards(path: Path) -> list[list[str]]:
     return cards
 
 
-def _number(text: str) -> float:
+def bulk_number(text: str) -> float:
     """A Nastran real: 1.5, 1.5D3, 1.5+3."""
     text = text.upper().replace("D", "E")
     for sign in "+-":
@@ -144,6 +144,6 @@ def _op4_values(lines: list[str], at: int, count: int, width: int) -> tuple[list
     values: list[float] = []
     while len(values) < count:
         line = lines[at]
-        values += [_number(line[k : k + width].strip()) for k in range(0, len(line.rstrip()), width)]
+        values += [bulk_number(line[k : k + width].strip()) for k in range(0, len(line.rstrip()), width)]
         at += 1
     return values, at

@@ -89,6 +89,27 @@ def read_mesh(path: str | Path, length: float, ignore: tuple[str, ...] = ()) -> 
     return _raised(_without_loose_nodes(mesh, ignore))
 
 
+def read_surface(source: Path, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (N, 3) m, faces (F, 4) as indices, a triangle repeating its last, and labels (N,) of a surface mesh: the
+    node numbers of a .bdf, else 1, 2, … length: m per length unit. MeshError for a file that cannot be read, and for
+    one without faces."""
+    file_format = _FORMATS.get(source.suffix.lower())
+    if file_format is None:
+        raise MeshError(
+            f"{source}: '{source.suffix}' is no surface that is read here: write one of {', '.join(_FORMATS)}"
+        )
+    if file_format == "nastran" and (problem := nastran_problems(source)):
+        raise MeshError(problem)
+    mesh = _read_by_meshio(source, file_format)
+    wide = {"quad": [0, 1, 2, 3], "triangle": [0, 1, 2, 2]}
+    blocks = [block.data[:, wide[block.type]] for block in mesh.cells if block.type in wide]
+    if not blocks:
+        raise MeshError(
+            f"{source}: no quadrilaterals and no triangles of corner nodes: write the outer surface as these"
+        )
+    return length * np.asarray(mesh.points, float), np.vstack(blocks), _labels(mesh)
+
+
 def _from_deck(deck: Deck, source: Path) -> tuple:
     labels = np.array(sorted(deck.nodes), dtype=int)
     nodes = np.array([deck.nodes[label] for label in labels]).reshape(-1, 3)
@@ -139,13 +160,18 @@ def _from_meshio(source: Path, file_format: str) -> tuple:
         if block.type not in _SURFACES:
             cells.setdefault(block.type, []).append(block.data)
     points = np.asarray(mesh.points, float)
-    labels = np.asarray(getattr(mesh, "points_id", np.arange(1, len(points) + 1)), int)
+    labels = _labels(mesh)
     sets = _meshio_sets(mesh)
     if file_format == "nastran":
         order = np.argsort(labels)
         for name, members in nastran_sets(source).items():
             sets[name] = order[_numbered(np.array(members), labels[order], source, f"SET {name}")]
     return points, {kind: np.concatenate(blocks) for kind, blocks in cells.items()}, sets, labels
+
+
+def _labels(mesh: meshio.Mesh) -> np.ndarray:
+    """Node numbers of a file, or 1, 2, …"""
+    return np.asarray(getattr(mesh, "points_id", np.arange(1, len(mesh.points) + 1)), int)
 
 
 def _read_by_meshio(source: Path, file_format: str) -> meshio.Mesh:

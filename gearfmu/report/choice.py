@@ -58,7 +58,7 @@ def turning(run: Run) -> View | None:
     window = _late(run) if run.planets else detail_window(run.trace, forces[0], run.angles.get(forces[0]))
     times = np.zeros(0) if run.deformation is None else run.deformation.time
     recorded = [(gear, times) for gear in deformed_gears(run)[0]]
-    return moving_view(run.trace, run.stage, gear_bodies(run.stage, run.bodies or ()), window, recorded)
+    return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), window, recorded)
 
 
 def _late(run: Run) -> tuple[float, float]:

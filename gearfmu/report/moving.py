@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -33,6 +33,7 @@ FRAMES, CONTACTS = 160, 4
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
 STEPS = 127  # of a displacement, in the page
 BOLT_TONE = 1.45  # brighter than the plate behind it
+HOUSING_TONE = 1.75
 
 
 Contacts: TypeAlias = np.ndarray
@@ -58,7 +59,8 @@ class Drawn:
     times: np.ndarray | None = None
     frames: np.ndarray | None = None
     extra: np.ndarray | None = None  # (F,) rad: turn per unit of enlargement that keeps loaded flanks together
-    tone: float = 0.0  # of a shaft or carrier, drawn rigid: brightness; 0 of a gear
+    tone: float = 0.0  # of a shaft, carrier or housing, drawn rigid: brightness; 0 of a gear
+    inside: bool = False  # of a housing: only faces whose inner side is seen, so that it hides no gear
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,7 @@ class View:
         if self.recorded:
             text += f"of {', '.join(self.recorded)}: the sum of all recorded modes; "
         rigid = "; shafts and carrier, dark, are drawn rigid" if any(body.tone for body in self.bodies) else ""
+        rigid += ", as is the far side of the housing" if any(body.inside for body in self.bodies) else ""
         return text + (
             f"largest {1e6 * self.most:.3g} µm, enlarged {self.scale:g} times to begin with. Loaded flanks are turned "
             f"together again; local flattening is left out{rigid}. Drag to look from another side."
@@ -103,8 +106,8 @@ def moving_view(
     trace: Trace, stage: Stage, bodies: Mapping[str, Body], window: tuple[float, float],
     recorded: Sequence[tuple[DeformedGear, np.ndarray]] = (),
 ) -> View | None:  # fmt: skip
-    """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: Body
-    by gear; recorded: gears with the times (s) of their frames."""
+    """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: by name;
+    recorded: gears with the times (s) of their frames."""
     gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].picture is not None]
     time = np.linspace(*window, FRAMES)
     if not gears or any(_rotor_angle(trace, stage, stage.rotor_of(name)) is None for name in gears):
@@ -124,7 +127,7 @@ def moving_view(
         return None
     module = float(stage.gears[0].normal_module)
     scale = round_scale(SHOWN_FRACTION * module / most)
-    drawn = [*made.values(), *_structure(trace, stage, time)]
+    drawn = [*made.values(), *_structure(trace, stage, time), *_housings(stage, bodies)]
     return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
 
 
@@ -141,6 +144,20 @@ def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Drawn]:
         found.append(
             Drawn(name, *surface, AROUND, angle, (at.real, at.imag, z), tone=BOLT_TONE if "bolt" in name else 1.0)
         )
+    return found
+
+
+def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
+    """Housings by their skin, at rest."""
+    found, still = [], np.zeros(FRAMES)
+    for housing in stage.housings:
+        skin = bodies[housing.name].skin if housing.name in bodies else None
+        if skin is not None:
+            points = skin.points.astype(float)
+            x, y, z = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            ahead = np.zeros_like(skin.faces, np.int8)
+            own = Drawn(housing.name, points - [x, y, z], skin.faces, ahead, 1, still, (still + x, still + y, float(z)))
+            found.append(replace(own, tone=HOUSING_TONE, inside=True))
     return found
 
 
@@ -311,6 +328,7 @@ def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np
 def _numbers(body: Drawn, pack: Pack) -> dict[str, Any]:
     size, (x, y, z) = len(body.points) // body.teeth, body.place
     found: dict[str, Any] = {"tone": body.tone} if body.tone else {}
+    found |= {"inside": 1} if body.inside else {}
     found |= {
         "name": body.name, "teeth": body.teeth, "z": z, "size": size,
         "points": pack.add_raw(body.points[:size].astype(np.float32).ravel()),

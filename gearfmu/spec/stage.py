@@ -13,6 +13,7 @@ from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
 from gearfmu.spec.forms.general import Form, Stage
 from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
+from gearfmu.spec.forms.housing_checks import housing_problems
 from gearfmu.spec.forms.pair import StageSpec, in_order
 from gearfmu.spec.forms.pair_checks import geometry_problems
 from gearfmu.spec.forms.planetary import PlanetarySpec
@@ -22,6 +23,7 @@ from gearfmu.spec.reading.base import validate
 from gearfmu.spec.reading.files import Changes, Layers, changed_tables, find_stage, read_layers
 from gearfmu.spec.reading.judge import read_and_judge
 from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import missing_files
 from gearfmu.units import to_si
 
@@ -42,7 +44,8 @@ def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) ->
     if found is None or problems:
         raise SpecError(layers.attributed(problem) for problem in problems)
     spec = expand(found)
-    if problems := _topography_problems(spec, layers):
+    problems = [Problem(str(layers.path), *entry) for entry in housing_problems(spec)]
+    if problems := problems + _topography_problems(spec, layers):
         raise SpecError(layers.attributed(problem) for problem in problems)
     return spec
 
@@ -110,11 +113,14 @@ def _load_general(layers: Layers) -> Read:
     if spec is None or problems:
         return None, problems
     bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
-    for own in spec.housings:
-        bodies[own.name] = own.model_copy(
-            update={"imported": own.imported.located(layers, f"bodies.{own.name}.import")}
-        )
+    bodies |= {own.name: _housing_with_paths(own, layers) for own in spec.housings}
     return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies})), []
+
+
+def _housing_with_paths(housing: HousingBody, layers: Layers) -> HousingBody:
+    field = "imported" if housing.imported else "reduced"
+    located = housing.made_of.located(layers, f"bodies.{housing.name}.{housing.table}")
+    return housing.model_copy(update={field: located})
 
 
 def _topography_problems(stage: Stage, layers: Layers) -> list[Problem]:
@@ -160,6 +166,7 @@ def _set_with_paths(spec: PlanetarySpec, layers: Layers) -> PlanetarySpec:
     if spec.carrier.imported is not None:
         imported = spec.carrier.imported.located(layers, "carrier.import")
         parts["carrier"] = spec.carrier.model_copy(update={"imported": imported})
+    parts["bodies"] = {name: _housing_with_paths(own, layers) for name, own in spec.bodies.items()}
     return spec.model_copy(update=parts)
 
 

@@ -12,8 +12,8 @@ from gearfmu.spec.forms.expand import expand
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.reading.base import Spec, validate
 from gearfmu.spec.stage import stage_class
+from gearfmu.spec.tables.imported import FILES
 
-FILES_OF_IMPORT = ("file", "stiffness", "mass", "unknowns")
 FREE = ("description", "ports")  # fields in which two exports of one stage may differ
 
 
@@ -75,8 +75,8 @@ def _files(tables: Any, field: str = "") -> Iterator[tuple[dict[str, Any], str, 
     """(table, key, field) of every name of a file."""
     for key, value in tables.items() if isinstance(tables, dict) else enumerate(tables):
         place = f"{field}.{key}" if field else str(key)
-        if key == "imported" and isinstance(value, dict):
-            yield from ((value, name, f"{place}.{name}") for name in FILES_OF_IMPORT if value.get(name))
+        if key in ("imported", "reduced") and isinstance(value, dict):
+            yield from ((value, name, f"{place}.{name}") for name in FILES if value.get(name))
         elif key == "topography" and value:
             yield tables, "topography", place
         elif isinstance(value, (dict, list)):

@@ -20,12 +20,15 @@ from gearfmu.body.body import How
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.body.whole import Read, whole_body
-from gearfmu.fem import hex20
+from gearfmu.fem import hex20, solids
 from gearfmu.fem.surface import faces_within
+from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.imported.skin import enveloping_surface
 from gearfmu.reduction.transfer import Judging, direct
+from gearfmu.sound import skin_of
 from gearfmu.stage.build.ground_part import ground_part
 
 CELLS, SIZE = (4, 4, 3), (0.16, 0.12, 0.09)
@@ -121,6 +124,18 @@ def test_it_comes_back_from_its_file(body: Body, tmp_path: Path) -> None:
     assert back.name == "box" and back.how == body.how and back.sensors.names == tuple(SENSORS)
     assert [node.name for node in back.nodes] == ["seat0", "seat3", "seat1", "seat4", "foot", "seat5"]
     assert back.flank is None and back.spin is None and back.picture is None and back.error.ground == ("foot",)
+
+
+def test_without_a_named_skin_the_envelope_radiates() -> None:
+    """Of the mesh with a hole through one wall: the box round it. Its points move as boundary nodes near them."""
+    nodes, cells = mesh()
+    holed = np.delete(cells, np.abs(nodes[cells].mean(axis=1) - [SIZE[0] / 2, 0, 0]).sum(axis=1).argmin(), axis=0)
+    own = ImportedMesh(nodes, {"hexahedron20": holed}, {}, np.arange(len(nodes)), Path("box.inp"))
+    found = enveloping_surface(own, solids.boundary(own.elements))
+    around = skin_of(found.points, found.faces, np.zeros((len(found.points), 3, 0)))
+    assert around.volume == pytest.approx(np.prod(SIZE), rel=1e-9)
+    away = np.linalg.norm(found.sample @ nodes - found.points, axis=1)
+    assert np.median(away) < 0.5 * SIZE[0] / CELLS[0] and away.max() < SIZE[0] / CELLS[0]
 
 
 def test_its_skin_is_closed_and_moves_with_it(body: Body) -> None:

@@ -116,6 +116,7 @@ def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:
             assert abs(np.angle(turn)) < 1e-3 * body.flank.teeth * pitch
 
 
+@pytest.mark.full
 def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path: Path) -> None:
     code, out, _ = call("mesh", made.path, "--gear", "wheel", "--out", tmp_path)
     assert code == 0 and "scaled_jacobian_min" in out

@@ -118,6 +118,7 @@ def test_every_body_of_a_stage_has_its_need_before_the_work(spec: object) -> Non
     assert {"pinion1", "wheel1"} <= set(body_needs(load_stage("two_stage")))
 
 
+@pytest.mark.full
 def test_gears_of_a_set_are_made_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "_WORTH", 0)
     monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)

@@ -28,10 +28,10 @@ OF_A_NAME = {"stage", "hashes"}  # "planetary54/stage_pin_error" calls itself pl
 ROADS = [
     ("fzg_c", "pair_loaded"),
     ("fzg_c/stage_relief", "clutch_closure"),
-    ("two_stage/stage_housed", "clutch_closure_housed"),
     *(
         pytest.param(*case, marks=pytest.mark.full)
         for case in (
+            ("two_stage/stage_housed", "clutch_closure_housed"),
             ("helical_demo", "pair_loaded"),
             ("two_stage", "train_runup"),
             ("helical_set", "planetary_paper"),

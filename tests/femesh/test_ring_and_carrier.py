@@ -133,8 +133,8 @@ def test_carriers_with_other_numbers_of_planets_mesh(planets):
 
 def test_bolts_stand_where_unequally_spaced_planets_are():
     """72 teeth of sun and ring, five planets: two of the steps are longer than the others."""
-    uneven = SPEC.written.set.model_copy(update={"planets": 5, "positions": (0, 14, 29, 43, 58)})
-    g = carrier_geometry(SPEC.written.model_copy(update={"set": uneven}))
+    uneven = tuple(turn / 72 for turn in (0, 14, 29, 43, 58))
+    g = carrier_geometry(SPEC.bodies["carrier"].model_copy(update={"bolts": uneven}))
     sector = carrier_sector(g, CarrierMeshSpec(scale=0.5))
     mesh = whole_carrier(g, sector)
     for k, turn in enumerate((0, 14, 29, 43, 58)):

@@ -70,6 +70,7 @@ def fuzz(host: Host, folder: str, seed: int, calls: int) -> dict[str, int]:
 
 
 @pytest.mark.needs("gcc")
+@pytest.mark.full
 def test_random_calls_under_sanitizers(sanitized, unpacked_other):
     answers = fuzz(sanitized, unpacked_other, seed=1, calls=500)
     assert min(answers["ok"], answers["error"]) > 50, "the sequence reached both good and bad calls"
@@ -84,6 +85,7 @@ def test_many_random_calls_under_sanitizers(sanitized, unpacked, unpacked_other,
 
 
 @pytest.mark.needs("gcc")
+@pytest.mark.full
 def test_sanitized_and_plain_builds_give_the_same_bits(sanitized, plain, unpacked):
     runs = [host.run(unpacked, *loaded_run(unpacked)) for host in (sanitized, plain)]
     assert [run.returncode for run in runs] == [0, 0], runs[0].stderr[-3000:] + runs[1].stderr

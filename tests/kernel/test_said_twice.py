@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import parts
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
-from gearfmu.stage.build import assembly, blob, far, flanks, oil, tables
+from gearfmu.stage.build import assembly, blob, compact, flanks, meshes, teeth
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
@@ -40,9 +40,9 @@ def shape(field: str) -> list[str]:
         ("gk.h", "GK_MESSAGE", binding.MESSAGE),
         ("gk_model.c", "MODEL_VERSION", assembly.MODEL_VERSION),
         ("gk_model.h", "LEADS", flanks.WIDTHS),
-        ("gk_model.h", "OFFSETS", len(tables.OFFSETS)),
+        ("gk_model.h", "OFFSETS", len(teeth.OFFSETS)),
         ("gk_model.h", "OFFSETS", 2 * parts._OFFSETS + 1),
-        ("gk_setup.h", "FAR", far.RANK),
+        ("gk_setup.h", "FAR", compact.RANK),
         ("gk_vars.c", "INSTANCES", instance.INSTANCES),
         ("gk_data.h", "MAX_PAIRS", instance.PLACES),
         ("gk_ranges.h", "GK_HIGH_SLICES", instance.SLICES),
@@ -65,7 +65,7 @@ def test_arrays_of_the_blob_are_as_long_as_the_kernel_reads_them() -> None:
 
 
 def test_python_keeps_below_the_capacities() -> None:
-    assert said("gk_model.h", "MAX_FUNCTIONS") >= tables.MOST_FUNCTIONS
+    assert said("gk_model.h", "MAX_FUNCTIONS") >= teeth.MOST_FUNCTIONS
     assert said("gk_model.h", "MAX_FLANK_ROLLS") >= flanks.ROLLS
     assert said("gk_model.h", "MAX_FLANK_PLACES") >= flanks.WIDTHS
 
@@ -74,7 +74,7 @@ def test_laws_of_friction_are_in_one_order() -> None:
     text = next(p for p in sources() if p.name == "gk_setup.h").read_text(encoding="utf-8")
     laws = re.search(r"enum gk_friction_law \{([^}]*)\}", text)
     assert laws is not None
-    assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == oil.LAWS
+    assert tuple(law.strip().removeprefix("FRICTION_").lower() for law in laws[1].split(",")) == meshes.LAWS
 
 
 def test_a_model_knows_the_table_of_variables() -> None:

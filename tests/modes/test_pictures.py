@@ -46,6 +46,7 @@ def test_divided_faces_keep_area_and_displacement() -> None:
     assert longest < 1.3 * max(before / pictures.MOST_PIECES, pictures.LARGEST * 2 * radius)
 
 
+@pytest.mark.full
 def test_pictures_are_coloured_and_framed_alike(tmp_path: Path) -> None:
     body = pinion_modes()
     sizes = set()

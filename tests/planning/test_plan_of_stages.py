@@ -11,7 +11,7 @@ from small_stage import body
 
 import gearfmu as gf
 from gearfmu.planning.book import Plan
-from gearfmu.planning.choice import FULL_STEP_OF_SETS
+from gearfmu.planning.choice import FULL_STEP_OF_SETS, space
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
 from gearfmu.planning.table import plan_text
@@ -97,3 +97,12 @@ def test_a_shipped_scene_is_planned_in_python(scene: str, changes: dict[str, lis
     short = load_scene(scene, {"duration": "40 ms", "settle": "10 ms"} | changes)
     found = gf.plan(short, ["te"], ("1 kHz", "5 kHz"), "1 dB", fresh=True)
     assert all(segment.kept for segment in found.segments)
+
+
+def test_a_plan_keeps_a_housing_and_says_why() -> None:
+    """On a stage that has one; a train without one has no such choice."""
+    scene = load_scene("clutch_closure_housed")
+    housed, train = (space(scene, gf.assemble(name)).knobs for name in (scene.stage.name, "two_stage"))
+    (own,) = [knob for knob in housed if knob.name == "housing"]
+    assert own.kept == "without it sensors and mounts have no signal"
+    assert {knob.name for knob in housed} - {knob.name for knob in train} == {"housing"}

@@ -76,6 +76,7 @@ KINDS = {
         Kind("helical_set", "helical_set", 300.0, 60.0, duration=1e-3),
     )
 }
+HOUSED = Kind("housed", "two_stage/stage_housed", 150.0, 150.0)  # for relations that a housing may break
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
+from kinds import HOUSED, KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
 
 from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.build.groups import Layout
 from gearfmu.stage.build.layout import place_of, stage_layout
@@ -51,16 +53,26 @@ def on_the_ground(kind: Kind, out: dict[str, float]) -> tuple[np.ndarray, np.nda
     for support in stage.supports:
         if support.to is not None:
             continue
-        own = [np.array([out.get(f"bearing.{support.name}.{kind}{axis}", 0.0) for axis in "xyz"]) for kind in "fm"]
-        z = place_of(stage, support)
-        if isinstance(stage.bodies[support.body], CarrierBody):
-            node = support.node or "bore"
-            z += next(float(n.point[2]) for n in bodies_of(kind.file)[support.body].nodes if n.name == node)
-        axis = stage.rotors[stage.rotor_of(support.body)].axis
+        foot = isinstance(stage.bodies[support.body], HousingBody)
+        name = f"{'mount' if foot else 'bearing'}.{support.name}"
+        own = [np.array([out.get(f"{name}.{kind}{axis}", 0.0) for axis in "xyz"]) for kind in "fm"]
         force += own[0]
-        moment += own[1] + np.cross([*axis, z], own[0])
+        moment += own[1] + np.cross(held_at(kind, support), own[0])
     moment[2] += sum(out[f"{port}.tau"] for port in stage.ports)
     return force, moment
+
+
+def held_at(kind: Kind, support: SupportSpec) -> np.ndarray:
+    """(3,) m: where a support acts."""
+    body = kind.stage.bodies[support.body]
+    point = np.zeros(3)
+    if isinstance(body, CarrierBody | HousingBody):
+        nodes = {node.name: node.point for node in bodies_of(kind.file)[body.name].nodes}
+        point = np.asarray(nodes[support.node or "bore"])
+    if isinstance(body, HousingBody):
+        return point
+    z = place_of(kind.stage, support) + point[2]
+    return np.array([*kind.stage.rotors[kind.stage.rotor_of(support.body)].axis, z])
 
 
 def is_at_rest(kind: Kind, time: float) -> None:
@@ -76,6 +88,10 @@ def is_at_rest(kind: Kind, time: float) -> None:
 def test_a_stage_at_rest_is_held_by_its_supports_and_ports(name: str) -> None:
     """Where its input has made a third of a turn."""
     is_at_rest(KINDS[name], 2 * math.pi / 3 / KINDS[name].speed)
+
+
+def test_a_housed_stage_at_rest_is_held_by_its_feet() -> None:
+    is_at_rest(HOUSED, 0.0)
 
 
 @pytest.mark.full

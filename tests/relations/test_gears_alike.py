@@ -73,6 +73,7 @@ def test_a_vanishing_helix_angle_of_either_hand_is_a_spur_gear() -> None:
     assert np.abs(nearer - right).max() < LEAN * np.abs(spur).max()
 
 
+@pytest.mark.full
 def test_neighbouring_numbers_of_teeth_have_neighbouring_results() -> None:
     mean = np.array([transmission_error(teeth=z).mean() for z in range(22, 28)])
     assert np.all(np.diff(mean) != 0.0)

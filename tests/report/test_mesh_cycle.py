@@ -52,6 +52,7 @@ def test_forces_of_the_slices_carry_the_torque_and_lie_on_the_path_of_contact(mo
     assert found.side == 1 and found.position == pytest.approx(np.arange(8) / 8, abs=1e-6)
 
 
+@pytest.mark.full
 def test_quasi_static_mesh_cycle_of_a_set_is_that_of_a_run() -> None:
     """Both by the angle of the carrier: its plate twists its bore by another 13 µm at the base circles."""
     spec = load_stage("planetary54")

@@ -29,7 +29,7 @@ def points_of(stage: Stage) -> dict[str, np.ndarray]:
         if support.to == housing.name:
             axis = stage.rotors[stage.rotor_of(support.body)].axis
             found[str(support.node)] = np.array([*axis, stage.place(support.body, support.at)])
-    return found | {name: np.array(FEET[name]) for name in housing.imported.feet}
+    return found | {name: np.array(FEET[name]) for name in housing.made_of.feet}
 
 
 def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors: bool = True) -> Body:
@@ -51,20 +51,26 @@ def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors
             own,
             (own / (2 * np.pi * frequency) ** 2) @ rows.T,
         )
-    return _body(stage, points, felt, mass=mass, frequency=frequency, rows=rows, static=static)
+    return _body(stage.housings[0].name, points, felt, mass=mass, frequency=frequency, rows=rows, static=static)
 
 
-def _body(stage: Stage, points: dict[str, np.ndarray], sensors: Sensors | None, **own: Any) -> Body:
-    (housing,) = stage.housings
+def rigid_block(name: str, mass: float, points: dict[str, tuple[float, float, float]]) -> Body:
+    """A rigid housing of that mass with these points."""
+    size, places = 6 * len(points), {own: np.array(point) for own, point in points.items()}
+    rigid = {"frequency": np.zeros(0), "rows": np.zeros((size, 0)), "static": np.zeros((size, size))}
+    return _body(name, places, None, mass=mass, **rigid)
+
+
+def _body(name: str, points: dict[str, np.ndarray], sensors: Sensors | None, **own: Any) -> Body:
     centre, mass = np.array([0.1, 0.06, 0.07]), own.pop("mass")
     fields, spin = np.eye(6), mass * 0.3**2 / 6 * np.eye(3)
     fields[:3] = rigid_fields(centre)
     inertia = fields.T @ np.block([[mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), spin]]) @ fields
     return Body(
-        name=housing.name,
-        how=How("0" * 64, "drawn", housing.material.model_dump()),
+        name=name,
+        how=How("0" * 64, "drawn"),
         mass=inertia,
-        nodes=tuple(Node(name, "rigid", COMPONENTS, p, (p[2] - 0.01, p[2] + 0.01)) for name, p in points.items()),
+        nodes=tuple(Node(at, "rigid", COMPONENTS, p, (p[2] - 0.01, p[2] + 0.01)) for at, p in points.items()),
         damping_ratio=np.full(len(own["frequency"]), 0.01),
         error=FrfError.of(np.array([50.0, 1e4]), np.zeros(2), (50.0, 1e4), 0.4, ()),
         sensors=sensors,

@@ -325,6 +325,7 @@ def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: Stage, bodies: 
     assert 0.98 < found.efficiency < 1.0
 
 
+@pytest.mark.full
 def test_efficiency_of_a_set_counts_the_power_that_rolls() -> None:
     """Of a held ring the sun rolls under ω_s − ω_c: (z_r/(z_s + z_r)) P through all sun meshes, and as much through
     those of the ring. The torque ports of the set are driven through springs."""

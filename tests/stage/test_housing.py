@@ -11,7 +11,8 @@ from housings import housing_of
 
 from gearfmu.body import load_bodies
 from gearfmu.body.body import Body, Node, rigid_rows
-from gearfmu.errors import ModelError
+from gearfmu.errors import ModelError, SpecError
+from gearfmu.modes.housing import placed_housing
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.stage import load_stage
@@ -61,6 +62,12 @@ def with_feet(chosen: Stage, **springs: float) -> Stage:
     """The stage with other springs under every foot."""
     feet = (s.model_copy(update=springs) if s.body == "housing" else s for s in chosen.supports)
     return chosen.model_copy(update={"supports": tuple(feet)})
+
+
+def undamped(chosen: Stage) -> Stage:
+    """The stage without dashpots at its supports."""
+    supports = tuple(s.model_copy(update={"damping_ratio": 0.0}) for s in chosen.supports)
+    return chosen.model_copy(update={"supports": supports})
 
 
 def block(name: str, mass: float) -> GroundPart:
@@ -202,6 +209,19 @@ def test_a_bearing_beside_the_middle_of_its_seat_acts_with_a_rigid_arm() -> None
     assert np.allclose(np.abs(one.node_rows(last, 11, 0)), np.abs(other.node_rows(last, 11, 0)), rtol=0, atol=1e-6)
 
 
+def test_a_free_rigid_housing_yields_by_its_mass() -> None:
+    """Without feet, as `gearfmu house` puts it under a finished run: seats answer by R M⁻¹ Rᵀ."""
+    free = stage().model_copy(update={"supports": tuple(s for s in stage().supports if s.body != "housing")})
+    body, omega = housing_of(stage(), 13.5), 2 * np.pi * 100.0
+    placed = placed_housing(free, [*gears(), body])
+    answers = placed.housing.answers(np.array([omega]))
+    assert placed.feet == () and answers.mounts.shape[1] == 0
+    rows = placed.housing.seats[:, :6]
+    assert np.allclose(answers.seats[0], -(rows @ np.linalg.solve(body.mass, rows.T)) / omega**2, rtol=1e-12)
+    with pytest.raises(SpecError, match="reaction torque"):
+        assemble(free, [*gears(), body])
+
+
 def test_without_its_housing_it_is_the_stage_on_the_ground_bit_for_bit() -> None:
     """And with the bearings held; sensors and mounts then read nothing."""
     for effect in ("effect__housing", "effect__bearings"):
@@ -245,17 +265,22 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
         assert np.abs(long[name][1:] - mean).max() <= 1e-3 * np.abs(mean).max()
 
 
-def test_the_order_of_supports_changes_nothing() -> None:
-    """Margin: at the start 1e-9; after 1 ms the solver's tolerance leaves 0.01 N of 5700, and 0.04 of 6.6 m/s²."""
-    turned = assemble(stage().model_copy(update={"supports": stage().supports[::-1]}), [*gears(), drawn()])
-    own, other = run(housed()), run(turned)
+@pytest.mark.full
+@pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
+def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
+    """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
+    Margin: at the start 1.2e-8 (its search ends at 1e-11 m, 5e-7 of the force); after 1 ms without dashpots 1.7e-5 of a
+    sensor and 6e-8 of the forces, with them 2.3e-3 and 4e-6; at half the step half as much."""
+    chosen = stage() if damped else undamped(stage())
+    turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
+    own, other = (run(assemble(order, [*gears(), drawn()])) for order in (chosen, turned))
     for name in own.channels:
         differ = np.abs(own[name] - other[name]).max()
         if name.startswith("sensor."):
-            assert differ <= 0.02 * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
+            assert differ <= sensors * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
         elif name.endswith((".fx", ".fy", ".fz", ".force")):
             assert differ <= 1e-5 * np.abs(own["stage1.force"]).max(), name
-            assert abs(own[name][0] - other[name][0]) <= 1e-9 * np.abs(own["stage1.force"]).max(), name
+            assert abs(own[name][0] - other[name][0]) <= 5e-8 * np.abs(own["stage1.force"]).max(), name
 
 
 def test_the_balance_of_energy_closes_as_on_the_ground() -> None:
@@ -265,6 +290,7 @@ def test_the_balance_of_energy_closes_as_on_the_ground() -> None:
     assert left <= 1.5 * plain
 
 
+@pytest.mark.full
 def test_what_is_above_its_limit_is_compliance() -> None:
     """Statics stay, oscillators go."""
     soft = stage().model_copy(

@@ -27,7 +27,7 @@ from gearfmu.spec.reading.base import Quantity, Spec, Whole, metadata_of, valida
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.spec.tables.profile import read_profile
-from gearfmu.stage.run.steady import DRIVE_RANGES, PARAMETER_RANGES
+from gearfmu.stage.run.steady import CASE_RANGES, PARAMETER_RANGES
 
 Annotation = Quantity | Whole
 FILE = "some.toml"
@@ -125,7 +125,7 @@ def test_every_number_of_every_table_has_a_range() -> None:
     assert len(NUMBERS) > 250 and len({number.kind for number in NUMBERS}) > 40
     used = {number.annotation.name for number in NUMBERS if number.annotation is not None}
     assert used <= set(all_ranges())
-    unused = set(all_ranges()) - used - set(DRIVE_RANGES.values()) - set(PARAMETER_RANGES.values())
+    unused = set(all_ranges()) - used - set(CASE_RANGES.values()) - set(PARAMETER_RANGES.values())
     assert not unused, f"ranges of nothing: {unused}"
     assert all(0 < len(own.remedy) < 150 and own.low < own.high for own in all_ranges().values())
 

@@ -20,6 +20,7 @@ from gearfmu.stage.run.te import statics_of
 
 STEP, SETTLES, PITCHES, POSITIONS = 2e-5, 5e-3, 2, 64
 RIGID = {"effect.elastic": 0.0, "level": 0.0}
+FINE = {"slices": 20.0}
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def in_motion(model: StageModel, case: Case) -> list[float]:
     "case",
     [
         Case("helical_demo", 150.0, 20.0, ("mesh",)),
-        pytest.param(Case("two_stage", 150.0, 20.0, ("stage1", "stage2")), marks=pytest.mark.full),
+        pytest.param(Case("two_stage", 150.0, 20.0, ("stage1", "stage2"), parameters=FINE), marks=pytest.mark.full),
         pytest.param(Case("planetary54", 600.0, 30.0, ("sun_planet1", "ring_planet1")), marks=pytest.mark.full),
         pytest.param(
             Case("planetary54", 600.0, 30.0, ("sun_planet1", "ring_planet1"), 0.05, RIGID), marks=pytest.mark.full
@@ -109,9 +110,10 @@ def in_motion(model: StageModel, case: Case) -> list[float]:
     ids=["helical", "train", "set", "rigid set"],
 )
 def test_gears_lose_the_integral_over_the_path(case: Case) -> None:
-    """Within 0.5 %; the second mesh of the train carries on coast flanks. The coefficient is so small that planets
-    hardly swing where friction changes sides. Between rigid gears it may be five times that; an elastic ring would
-    stick around the pitch point until twice the friction has bent it back, and lose 2 to 5 % less."""
+    """Within 0.5 %; the second mesh of the train carries on coast flanks. The two ways differ by .78 % of a train cut
+    into 5 slices, .36 % with 14, .28 % with 20, whatever the step. The coefficient is so small that planets hardly
+    swing where friction changes sides. Between rigid gears it may be five times that; an elastic ring would stick
+    around the pitch point until twice the friction has bent it back, and lose 2 to 5 % less."""
     model = gf.assemble(case.name)
     for mesh, power in zip(case.engagements, in_motion(model, case), strict=True):
         path = by_the_path(model, case, mesh)

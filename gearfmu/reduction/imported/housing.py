@@ -32,20 +32,22 @@ HOUSING_FACTORS = 5  # of K, with the interfaces held, and at the reference's th
 class ImportedHousing:
     """An imported housing before reduction. full: seats and feet are its interfaces; spans: of every interface the
     lowest and highest z of its nodes, m; sensors: interfaces of three components that nothing loads; surface: its skin,
-    the convex envelope where the file names none, and skin (3P, N): displacement of its points by the unknowns."""
+    the convex envelope where the file names none, None of a superelement without one, and skin (3P, N): displacement of
+    its points by the unknowns."""
 
     full: FullOrder
     facts: dict[str, object]
     spans: dict[str, tuple[float, float]]
     sensors: tuple[Interface, ...]
-    surface: Surface
-    skin: sp.csr_array
+    surface: Surface | None
+    skin: sp.csr_array | None
 
 
 def imported_housing(housing: HousingBody) -> ImportedHousing:
     """The finite elements of a housing. MeshError for sets that are missing, no circle or no surface, for holes in
     the skin, and as of every import."""
     source = housing.imported
+    assert source is not None and housing.material is not None
     mesh = sound_mesh(source)
     with naming(Path(source.file)):
         require_memory(whole_need(mesh.nodes.size, 3 * housing.modes, HOUSING_FACTORS), MESH_COARSER)

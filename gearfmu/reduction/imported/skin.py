@@ -7,7 +7,7 @@ its edges and one more point, the mean of its corners, which moves as their mean
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,16 +38,21 @@ def closed_surface(mesh: ImportedMesh, faces: solids.Faces, name: str) -> Surfac
     if not len(corners):
         raise MeshError(f"skin '{name}': no boundary face has all its nodes in this set: name the outer surface")
     used, local = np.unique(corners, return_inverse=True)
-    local = local.reshape(corners.shape)
-    loops = _loops(local, name)
-    caps, rows = [], []
+    surface = enclosed(mesh.nodes[used], local.reshape(corners.shape), name)
+    chosen = sp.csr_array((np.ones(len(used)), (np.arange(len(used)), used)), (len(used), len(mesh.nodes)))
+    return replace(surface, sample=sp.csr_array(surface.sample @ chosen))
+
+
+def enclosed(nodes: np.ndarray, faces: np.ndarray, name: str) -> Surface:
+    """The surface of `faces` (F, 4), numbers of nodes (N, 3) m, with its holes closed. MeshError for edges of more than
+    two faces, for holes that are not simple, and where it encloses nothing."""
+    loops = _loops(faces, name)
+    caps = []
     for k, loop in enumerate(loops):
-        middle = np.full(len(loop), len(used) + k)
+        middle = np.full(len(loop), len(nodes) + k)
         caps.append(np.column_stack([np.roll(loop, -1), loop, middle, middle]))
-        rows.append(loop)
-    closed = np.vstack([local, *caps])
-    sample = _sample(used, rows, len(mesh.nodes))
-    points = sample @ mesh.nodes
+    closed, sample = np.vstack([faces, *caps]), _sample(len(nodes), loops)
+    points = sample @ nodes
     if _volume(points, closed) <= 0:
         raise MeshError(f"skin '{name}' encloses no volume: name the outer surface, all of it, and not the inner one")
     return Surface(points, closed, sample, len(loops))
@@ -89,12 +94,13 @@ def _loops(faces: np.ndarray, name: str) -> list[np.ndarray]:
     return loops
 
 
-def _sample(used: np.ndarray, loops: list[np.ndarray], nodes: int) -> sp.csr_array:
-    rows = [np.arange(len(used)), *(np.full(len(loop), len(used) + k) for k, loop in enumerate(loops))]
-    columns = [used, *(used[loop] for loop in loops)]
-    values = [np.ones(len(used)), *(np.full(len(loop), 1 / len(loop)) for loop in loops)]
+def _sample(count: int, loops: list[np.ndarray]) -> sp.csr_array:
+    """Points from the nodes: themselves, and the mean of every loop."""
+    rows = [np.arange(count), *(np.full(len(loop), count + k) for k, loop in enumerate(loops))]
+    columns = [np.arange(count), *loops]
+    values = [np.ones(count), *(np.full(len(loop), 1 / len(loop)) for loop in loops)]
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sp.csr_array(entries, shape=(len(used) + len(loops), nodes))
+    return sp.csr_array(entries, shape=(count + len(loops), count))
 
 
 def _volume(points: np.ndarray, faces: np.ndarray) -> float:

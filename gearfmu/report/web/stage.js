@@ -122,6 +122,8 @@ window.gearfmuStage = (stage, array, colour) => {
       gl.uniform3f(at("origin"), between(array(body.own.x), k, part) - centre[0], between(array(body.own.y), k, part) - centre[1], body.own.z - middle);
       gl.uniform1f(at("enlarge"), state.scale);
       gl.uniform1f(at("tone"), body.own.tone || 0);
+      gl[body.own.inside ? "enable" : "disable"](gl.CULL_FACE);
+      gl.cullFace(gl.FRONT);
       gl.bindBuffer(gl.ARRAY_BUFFER, body.bases);
       gl.enableVertexAttribArray(BASE);
       gl.vertexAttribPointer(BASE, 3, gl.FLOAT, false, 0, 0);

@@ -10,6 +10,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.general import Reduced, Stage
 from gearfmu.spec.forms.planetary import CarrierBody
 from gearfmu.spec.tables.flanks import TOOTHING
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import import_inputs
 
 ALGORITHMS = {"gear": 3, "ring": 3, "carrier": 3, "housing": 3}  # raised when the numbers of such bodies change
@@ -27,7 +28,7 @@ def body_inputs(table: Reduced) -> dict[str, Any]:
     The addendum of a gear's rack is left out: the tip diameter says where the tooth ends. With finite elements made
     elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
     """
-    inputs = table.model_dump(exclude={*NOT_OF_BODY[table.kind], "imported"}, exclude_none=True)
+    inputs = table.model_dump(exclude={*NOT_OF_BODY[table.kind], "imported", "reduced"}, exclude_none=True)
     if "rack" in inputs:
         inputs["rack"].pop("addendum")
     if isinstance(table, CarrierBody):
@@ -36,6 +37,8 @@ def body_inputs(table: Reduced) -> dict[str, Any]:
     if table.imported is not None:
         inputs.get("body", inputs).pop("mesh", None)
         inputs["import"] = import_inputs(table.imported)
+    if isinstance(table, HousingBody) and table.reduced is not None:
+        inputs["reduced"] = import_inputs(table.reduced)
     return inputs
 
 
@@ -46,11 +49,13 @@ def body_hash(table: Reduced) -> str:
 
 def expected_hash(stage: Stage, name: str) -> str:
     """`body_hash` of the body whose file is `name`. SpecError names the field in the stage file."""
+    table = stage.by_file[name]
     try:
-        return body_hash(stage.by_file[name])
+        return body_hash(table)
     except SpecError as error:
-        place, file = stage.table_of(name), str(stage.source)
-        found = [Problem(file, f"{place}.import.{p.field}", p.value, p.remedy) for p in error.problems]
+        key = table.table if isinstance(table, HousingBody) else "import"
+        place, file = f"{stage.table_of(name)}.{key}", str(stage.source)
+        found = [Problem(file, f"{place}.{p.field}", p.value, p.remedy) for p in error.problems]
         raise SpecError(found) from error
 
 

@@ -106,7 +106,8 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
     carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
     springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
-    its own the ring turns in them, held by the port.
+    its own the ring turns in them, held by the port. A housing stands in the axes of the ground: it holds the ring in
+    the two directions that are the same in both, along and about its axis.
 
     What a set needs to move and does not say is 0 or left out, and refused by `Stage.require_motion`.
     """
@@ -119,6 +120,7 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     bodies["ring"] = RingBody(
         **_fields(RingSpec, spec.ring) | {"mounts": None}, kind="ring", **_angles(spec.set, HANDS["ring"])
     )
+    bodies |= spec.bodies
     bodies[CARRIER] = set_carrier(spec)
     own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
@@ -209,19 +211,26 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
     if not (sun and pin and carrier and mounts):
         return ()
     all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
+    torsion = None if "ring" in spec.ports else all_mounts * radius**2
+    ring = SupportSpec(
+        name="ring",
+        body="ring",
+        radial=all_mounts,
+        axial=all_mounts,
+        tilt=all_mounts * radius**2 / 2,
+        torsion=torsion,
+        damping_ratio=mounts.damping_ratio,
+    )
+    along = {"name": "ring_seat", "to": mounts.to, "node": mounts.node, "radial": None, "tilt": None}
+    held = [ring]
+    if mounts.to is not None:
+        held = [ring.model_copy(update={"axial": None, "torsion": None}), ring.model_copy(update=along)]
     return (
         _held("sun", sun),
         *(_held(name, pin, to="carrier", node=f"bolt{k}") for k, name in enumerate(planets)),
         _held("carrier", carrier, node="bore"),
-        SupportSpec(
-            name="ring",
-            body="ring",
-            radial=all_mounts,
-            axial=all_mounts,
-            tilt=all_mounts * radius**2 / 2,
-            torsion=None if "ring" in spec.ports else all_mounts * radius**2,
-            damping_ratio=mounts.damping_ratio,
-        ),
+        *held,
+        *spec.supports,
     )
 
 

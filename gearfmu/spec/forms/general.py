@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
-from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables, refuse
 from gearfmu.spec.tables.bearings import Bearings, LaterFields, OperatingSpec
 from gearfmu.spec.tables.gear import (
     Backlash,
@@ -236,13 +236,8 @@ class Stage(LaterFields):
 
     @field_validator("bodies", mode="before")
     @classmethod
-    def _named(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        return {
-            name: {"kind": "gear"} | body | {"name": name} if isinstance(body, dict) else body
-            for name, body in value.items()
-        }
+    def _named(cls, value: object) -> object:
+        return named_tables(value, kind="gear")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Stage:
         """A copy with other fields; where the file of a pair or set could not say them, a general stage without it.
@@ -283,9 +278,12 @@ class Stage(LaterFields):
         return self._origin.load_sharing
 
     def require_motion(self) -> None:
-        """SpecError with everything that a set needs to move and does not say."""
-        if self._origin.missing:
-            raise SpecError(self._origin.missing)
+        """SpecError with everything that a set needs to move and does not say, and for a housing that nothing holds."""
+        held, file = {support.body for support in self.supports}, str(self.source)
+        free = [own for own in self.housings if own.name not in held]
+        loose = [Problem(file, f"bodies.{own.name}", "no feet", own.hanging) for own in free]
+        if problems := [*self._origin.missing, *loose]:
+            raise SpecError(problems)
 
     def file_of(self, body: str) -> str:
         """Name of the reduced body of a toothed body or carrier: planets of a set share one."""

@@ -1,5 +1,5 @@
-"""Does a housing fit the stage that it carries? One housing, seats that exist, feet that hold it. Where seats lie is
-known from its mesh (stage/build/housed.py)."""
+"""Does a housing fit the stage that it carries? One housing, seats and feet that exist. Where seats lie is known from
+its mesh (stage/build/housed.py); what hangs freely is refused by `Stage.require_motion`."""
 
 from __future__ import annotations
 
@@ -20,14 +20,7 @@ def housing_problems(stage: Stage) -> Found:
         yield from _alone(stage, housing)
         for support in stage.supports:
             if housing.name in (support.body, support.to):
-                yield from _support(housing, support)
-        if not any(s.body == housing.name for s in stage.supports):
-            feet = ", ".join(housing.imported.feet) or "none in its import: name node sets in feet = {…}"
-            remedy = (
-                f'nothing holds it: write [[supports]] with body = "{housing.name}" and node one of its feet ({feet}); '
-                'one that hangs freely has soft ones, e.g. radial = "1e4 N/m"'
-            )
-            yield f"bodies.{housing.name}", "no feet", remedy
+                yield from _support(stage, housing, support)
 
 
 def _alone(stage: Stage, housing: HousingBody) -> Found:
@@ -39,9 +32,9 @@ def _alone(stage: Stage, housing: HousingBody) -> Found:
             yield f"ports.{name}.body", housing.name, "a housing does not turn: name a shaft or a gear"
 
 
-def _support(housing: HousingBody, support: SupportSpec) -> Found:
+def _support(stage: Stage, housing: HousingBody, support: SupportSpec) -> Found:
     place, foot = f"supports.{support.name}", support.body == housing.name
-    known, what = (housing.imported.feet, "feet") if foot else (housing.imported.seats, "seats")
+    known, what = (housing.made_of.feet, "feet") if foot else (housing.made_of.seats, "seats")
     if foot and support.to is not None:
         yield f"{place}.to", support.to, f"a foot of {housing.name} stands on the ground: leave `to` away"
     if foot and support.bearing is not None:
@@ -49,7 +42,8 @@ def _support(housing: HousingBody, support: SupportSpec) -> Found:
     if foot and support.at is not None:
         yield f"{place}.at", f"{support.at:g}", "its node set says where a foot lies: leave it away"
     if support.node not in known:
-        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or 'not named in its import'}"
+        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or f'not named in its {housing.table}'}"
         yield f"{place}.node", support.node or "missing", remedy
-    if not foot and support.torsion is not None:
+    spins = not foot and support.body in stage.bodies and not stage.rotors[stage.rotor_of(support.body)].stands
+    if spins and support.torsion is not None:
         yield f"{place}.torsion", f"{support.torsion}", "a bearing on a housing cannot hold a spin: leave it away"

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, field_validator
 
-from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole
+from gearfmu.spec.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables
+from gearfmu.spec.tables.bearings import LaterFields
 from gearfmu.spec.tables.flanks import Eccentricity, Toothing
 from gearfmu.spec.tables.gear import (
     Backlash,
@@ -29,8 +30,9 @@ from gearfmu.spec.tables.gear import (
     TipDiameter,
     TipEdge,
 )
+from gearfmu.spec.tables.housing import HousingBody
 from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
+from gearfmu.spec.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec, SupportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
@@ -100,8 +102,10 @@ class SetGearSpec(Toothing):
     )
 
 
-class MountsSpec(Spec):
-    """Elastic mounting of the ring: springs between equal patches of its rim and the ground."""
+class MountsSpec(LaterFields):
+    """Elastic mounting of the ring: springs between equal patches of its rim and the ground, or a housing."""
+
+    later = ("to", "node")
 
     points: Annotated[Count, Whole("mounts")] = Field(
         description="number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
@@ -110,6 +114,10 @@ class MountsSpec(Spec):
         description="stiffness of one mount, the same in all three directions"
     )
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m), of all mounts together")
+    to: Name | None = Field(
+        default=None, description="housing that holds the ring along and about its axis; the ground when absent"
+    )
+    node: Name | None = Field(default=None, description="seat of that housing")
 
 
 class RingSpec(Toothing):
@@ -198,11 +206,15 @@ class CarrierBody(CarrierSpec):
     kind: Literal["carrier"] = Field(description="kind of body")
     circle: Annotated[float, Quantity("center_distance")] = Field(default=0.0, description="radius of the bolt circle")
     seat_length: FaceWidth = Field(default=0.0, description="length of the planets' seats")
-    bolts: tuple[float, ...] = Field(default=(), description="places of the bolts, in turns from +x")
+    bolts: tuple[Annotated[float, Quantity("bolt_place")], ...] = Field(
+        default=(), description="places of the bolts, in turns from +x"
+    )
 
 
-class PlanetarySpec(Spec):
+class PlanetarySpec(LaterFields):
     """A planetary set as its file gives it; SI floats. `source` is that file."""
+
+    later = ("bodies", "supports")
 
     name: Name = Field(description="name of the stage")
     description: Text = Field(default="", description="one line about the stage")
@@ -225,6 +237,13 @@ class PlanetarySpec(Spec):
         description="ports: carrier and sun, input first; a third, ring, holds the ring, which stands without it",
     )
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+    bodies: dict[Name, HousingBody] = Field(default={}, description="a housing on which the ring stands, by its name")
+    supports: tuple[SupportSpec, ...] = Field(default=(), description="feet of the housing")
+
+    @field_validator("bodies", mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        return named_tables(value)
 
     @property
     def limits(self) -> Limits:

@@ -245,6 +245,14 @@ def _mounts(spec: PlanetarySpec) -> Found:
     mounts = spec.ring.mounts
     if mounts is not None and mounts.points > spec.ring.teeth:
         yield "ring.mounts.points", str(mounts.points), f"at most one a tooth space: up to {spec.ring.teeth}"
+    if mounts is not None and mounts.to is not None and mounts.to not in spec.bodies:
+        known = ", ".join(spec.bodies) or "none: write [bodies.housing]"
+        yield "ring.mounts.to", mounts.to, f"no housing of this set: {known}"
+    if mounts is not None and mounts.to is not None and "ring" in spec.ports:
+        yield "ring.mounts.to", mounts.to, "a ring with a port turns: it stands on no housing; leave the port away"
+    for support in spec.supports:
+        if support.body not in spec.bodies:
+            yield f"supports.{support.name}.body", support.body, "here are feet of a housing alone"
 
 
 def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:

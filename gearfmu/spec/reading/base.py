@@ -133,6 +133,15 @@ def refuse(remedy: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{remedy}", {"remedy": remedy})
 
 
+def named_tables(tables: object, **common: object) -> object:
+    """Tables by name with that name in them, and fields that they have in common before their own."""
+    if not isinstance(tables, dict):
+        return tables
+    return {
+        name: common | table | {"name": name} if isinstance(table, dict) else table for name, table in tables.items()
+    }
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file. SpecError when it is missing, not UTF-8 or not TOML."""
     try:

@@ -30,7 +30,7 @@ class LaterFields(Spec):
     @model_serializer(mode="wrap")
     def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
         tables: dict[str, object] = handler(self)
-        return {key: value for key, value in tables.items() if key not in self.later or value not in (None, {})}
+        return {key: value for key, value in tables.items() if key not in self.later or value not in (None, {}, (), [])}
 
 
 class OperatingSpec(Spec):

@@ -14,21 +14,19 @@ from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.reading.base import Quantity, Spec, Text, refuse
 from gearfmu.spec.reading.files import Layers
 
-_FILES = ("file", "stiffness", "mass", "unknowns")
+FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 
-Files = TypeVar("Files", bound="FilesSpec")
+Files = TypeVar("Files", bound="SourceSpec")
 
 
-class FilesSpec(Spec):
-    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says
-    so."""
+class SourceSpec(Spec):
+    """What every import names: where its nodes lie, its units, and ready-made matrices; paths relative to the file that
+    says so."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("length_unit")] = Field(
         description='one length unit of the file, "1 mm" for a mesh in millimetres'
     )
-    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
-    ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
     stiffness: Text = Field(default="", description="ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch")
     mass: Text = Field(default="", description="ready-made mass matrix, with stiffness")
     unknowns: Text = Field(
@@ -42,7 +40,7 @@ class FilesSpec(Spec):
     )
 
     @model_validator(mode="after")
-    def _both_matrices(self) -> FilesSpec:
+    def _both_matrices(self: Files) -> Files:
         if bool(self.stiffness) != bool(self.mass):
             raise refuse("stiffness and mass come together: give both files or none")
         if self.unknowns and not self.stiffness:
@@ -52,9 +50,16 @@ class FilesSpec(Spec):
     def located(self: Files, layers: Layers, place: str) -> Files:
         """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
         section, "gears.pinion.import"."""
-        named = [field for field in _FILES if getattr(self, field)]
+        named = [field for field in FILES if getattr(self, field, "")]
         files = {field: str(_path(layers, f"{place}.{field}", getattr(self, field))) for field in named}
         return self.model_copy(update=files)
+
+
+class FilesSpec(SourceSpec):
+    """Mesh of a body, its units, and, where they are ready-made, its matrices."""
+
+    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
+    ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
 
 
 class ImportSpec(FilesSpec):
@@ -98,12 +103,12 @@ class CarrierImportSpec(FilesSpec):
 
 
 def missing_files(layers: Layers) -> list[Problem]:
-    """A problem for every file that a section `import` names and that is not there, whatever else is wrong with the
-    stage file."""
+    """A problem for every file that a section `import` or `reduced` names and that is not there, whatever else is wrong
+    with the stage file."""
     return [
         Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
         for place, section in _sections(layers.tables).items()
-        for field in _FILES
+        for field in FILES
         if isinstance(name := section.get(field), str) and name
         if not (path := _path(layers, f"{place}.{field}", name)).is_file()
     ]
@@ -114,25 +119,30 @@ def _path(layers: Layers, field: str, name: str) -> Path:
 
 
 def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The tables `import` of a stage file by their place."""
+    """The tables `import` and `reduced` of a stage file by their place."""
     bodies = {
         f"{group}.{name}": table
         for group in ("gears", "bodies")
         for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
     }
     bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
-    found = {f"{place}.import": table.get("import") for place, table in bodies.items() if isinstance(table, dict)}
+    found = {
+        f"{place}.{key}": table.get(key)
+        for place, table in bodies.items()
+        if isinstance(table, dict)
+        for key in ("import", "reduced")
+    }
     return {place: section for place, section in found.items() if isinstance(section, dict)}
 
 
-def import_inputs(spec: FilesSpec) -> dict[str, Any]:
+def import_inputs(spec: SourceSpec) -> dict[str, Any]:
     """What the import contributes to the hash of a body: its fields, with the SHA-256 of each file for its name.
 
     spec : its files as they can be opened (`located`). SpecError for every file that is not there, by its field alone.
     """
     values, problems = spec.model_dump(exclude_none=True), []
-    for field in _FILES:
-        if not getattr(spec, field):
+    for field in FILES:
+        if not getattr(spec, field, ""):
             continue
         path = Path(getattr(spec, field))
         try:

@@ -24,6 +24,7 @@ from gearfmu.stage.build.groups import Group
 
 AXES = "xyz"
 OFF_AXIS = 1e-3  # of the housing's size: how far a seat may lie from its shaft's axis
+ALONG = 0.05  # the same along the axis, for the seat of a superelement, whose surface is not known
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,10 @@ def _acts_at(stage: Stage, support: SupportSpec) -> np.ndarray:
 
 def _misplaced(stage: Stage, support: SupportSpec, body: Body, seat: Node) -> list[str]:
     """What is wrong with the place of a seat: its master point, and from where to where it reaches along z."""
-    assert body.error is not None and seat.span is not None
-    point, (low, high), far = seat.point, seat.span, OFF_AXIS * body.error.length
+    assert body.error is not None
+    point, far = seat.point, OFF_AXIS * body.error.length
+    reach = ALONG * body.error.length
+    low, high = seat.span or (point[2] - reach, point[2] + reach)
     wanted = _acts_at(stage, support)
     whose = f"seat {support.node} of {body.name} and the bearing {support.name}"
     if np.linalg.norm(point[:2] - wanted[:2]) > far:

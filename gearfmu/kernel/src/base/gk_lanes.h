@@ -222,8 +222,11 @@ static inline void gk_multiply_rows(const gk_half *row, const gk_half *rows, int
     int i = 0;
     for (; i + 4 <= count; i += 4, rows += 4 * width) {
         gk_half sum[4] = {{0}};
-        for (int k = 0; k < halves; k++)
-            for (int l = 0; l < 4; l++) sum[l] += row[k] * rows[l * width + k];
+        int k = 0;
+        for (; k + 2 <= halves; k += 2)
+            for (int l = 0; l < 4; l++)
+                sum[l] = (sum[l] + row[k] * rows[l * width + k]) + row[k + 1] * rows[l * width + k + 1];
+        for (int l = 0; l < 4 && k < halves; l++) sum[l] += row[k] * rows[l * width + k];
         for (int l = 0; l < 4; l++) to[i + l] += gk_across(&sum[l]);
     }
     for (; i < count; i++, rows += width) {

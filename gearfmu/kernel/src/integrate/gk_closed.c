@@ -234,7 +234,8 @@ static int form_block(const island *of, const gk_coefficients *k, int e, motion 
     if (slides == STICKING) {
         if (!factorise_along(s, glide->yields, T)) return 0;
         add_stuck(s, glide->gap_yields, T, -1.0, C), add_stuck(s, glide->gap_yields, T, -1.0, K);
-        gk_glide_moves(of->setup, k, of->work, e); /* C_nt − K_nt, C_tt − K_tt */
+        gk_glide_moves(of->setup, k, of->work, e);
+        gk_glide_yields(s, glide); /* C_nt − K_nt, C_tt − K_tt */
         if (!factorise_along(s, glide->yields, T)) return 0;
         add_stuck(s, glide->gap_yields, T, 1.0, K);
         return 1;
@@ -243,6 +244,7 @@ static int form_block(const island *of, const gk_coefficients *k, int e, motion 
     friction_of(of->model, of->setup, engaged, e, share);
     add_symmetric(s, glide->gap_yields, share, sign, C), add_symmetric(s, glide->gap_yields, share, sign, K);
     gk_glide_moves(of->setup, k, of->work, e);
+    gk_glide_yields(s, glide);
     add_symmetric(s, glide->gap_yields, share, -sign, K);
     return 1;
 }

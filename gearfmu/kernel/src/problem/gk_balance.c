@@ -314,9 +314,8 @@ static void aim(const gk_island *island, int jumps)
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
  * quasi-static part's energy change equal its work and the invariant's jump: on contacts; then without the jump; then
  * on bearings too; then on contacts to the tolerance of a step without change, because contacts that change with α let
- * the defect jump across zero. Contacts
- * that hardly move cannot repay what the steps before left: then the defect waits, as it does in a step without change
- * of status. */
+ * the defect jump across zero. Contacts that hardly move cannot repay what the steps before left: then the defect
+ * waits, as it does in a step without change of status. */
 void gk_balance_solve(const gk_island *island)
 {
     GK_ASSERT(island->count >= 0 && island->count <= MAX_ENGAGEMENTS);

@@ -69,12 +69,12 @@ static void part_all(const gk_coupled *c)
 
 /* contacts and friction of an engagement once; returns how much friction has changed. Where it is at its limits is
  * found without the scalar of the step's energy. */
-static double solve_own(const gk_coupled *c, int e, int round)
+static double solve_own(const gk_coupled *c, int e, int round, double enough)
 {
     gk_engaged *engaged = &c->work->engaged[e];
     engaged->system.dashpot.stand = round >= SETTLED;
     if (GK_ON(c->setup, friction))
-        return gk_friction_solve(engaged->glide, &engaged->system, round, engaged->system.alpha != 0.0);
+        return gk_friction_solve(engaged->glide, &engaged->system, round, engaged->system.alpha != 0.0, enough);
     gk_solve_contacts(&engaged->system);
     return 0.0;
 }
@@ -93,13 +93,21 @@ static int hardly_rubs(const gk_coupled *c)
     return moved < FRICTION_TOLERANCE * largest;
 }
 
+static void account_all(const gk_coupled *c)
+{
+    for (int e = 0; e < c->model->engagements && GK_ON(c->setup, friction); e++)
+        if (gk_is_within(c, e)) gk_friction_account(c->work->engaged[e].glide, &c->work->engaged[e].system);
+}
+
 /* an engagement that is alone: normal forces and friction in turns */
 static void rub(const gk_island *island)
 {
     gk_coupled *c = island->context;
     const int e = (int)c->alone;
     double change = INFINITY;
-    for (int round = 0; round < PASSES && !(change < FRICTION_TOLERANCE); round++) change = solve_own(c, e, round);
+    for (int round = 0; round < PASSES && !(change < FRICTION_TOLERANCE); round++)
+        change = solve_own(c, e, round, 0.5 * FRICTION_TOLERANCE);
+    account_all(c);
     island->member[0]->dashpot.stand = 0;
     if (!(change < FRICTION_TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
 }
@@ -124,7 +132,7 @@ static double solve_each(gk_coupled *c, int round, int in_turn, double *gaps)
         *gaps = gk_max(*gaps, taken);
         if (!GK_ON(c->setup, friction))
             c->work->engaged[e].system.others.bends = gk_clamp(BENT * taken, 0.1 * enough, ROUGHLY);
-        change = gk_max(change, solve_own(c, e, round));
+        change = gk_max(change, solve_own(c, e, round, 0.0));
     }
     return change;
 }
@@ -155,6 +163,7 @@ static void sweep(const gk_island *island)
         gk_pass(c, 0, 1);
         part_all(c);
     }
+    account_all(c);
     if (!(next < enough) && !(gaps < enough && hardly_rubs(c))) island->member[0]->limit_reached = 1;
 }
 

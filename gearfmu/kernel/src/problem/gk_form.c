@@ -136,7 +136,8 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     read_gaps(&f, k->h, s);
     const int coupled = setup->mesh[e].coupled;
     if (coupled) form_rest(setup, k, work, e);
-    if (coupled && work->by_tables && recall_own(engaged)) return;
+    engaged->kept.again = coupled && work->by_tables && recall_own(engaged);
+    if (engaged->kept.again) return;
     gk_compliance_form(setup, k, work, e, tables ? BY_TABLES : BY_ROWS);
     gk_ground_add(model, setup, k, work, e, tables);
     gk_compliance_mirror(s);

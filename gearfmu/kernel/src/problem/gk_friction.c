@@ -101,12 +101,14 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     gk_glide *glide = engaged->glide;
     gk_system *s = &engaged->system;
     memcpy(glide->gap, s->g, (size_t)s->stride * sizeof *s->g);
+    glide->expressed = glide->anew = 0;
     gk_glide_rows(setup, work, e);
     memcpy(glide->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
     recall_friction(engaged, &GK_OF(data, meshing)[e], glide);
     gk_glide_freely(setup, data, work, k->h, e);
     find_coefficients(model, setup, data, k->h, e, engaged);
-    gk_glide_moves(setup, k, work, e);
+    if (!engaged->kept.again) gk_glide_moves(setup, k, work, e);
+    gk_glide_yields(s, glide);
     const gk_mesh *mesh = &setup->mesh[e];
     const int follows = glide->rolls && (mesh->rides || mesh->coupled); /* a spur pair alone gains nothing by it */
     for (int i = 0; i < s->contacts; i++) {
@@ -122,106 +124,18 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
 /* sliding in the step */
 static void find_sliding(gk_glide *glide, const gk_system *s)
 {
-    for (int k = 0; k < s->contacts; k++) {
-        const double *moved = glide->gap_moves + k * s->stride, *yielded = glide->gap_yields + k * s->stride;
-        double sum = glide->free[k] + glide->others[k] - glide->others_start[k];
-        for (int i = 0; i < s->n; i++)
-            sum += moved[i] * s->z[i] +
-                   yielded[i] * (s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i]);
-        glide->slid[k] = sum;
-    }
+    const int quads = s->stride / 4, across = (s->contacts + 3) / 4;
+    double late[MAX_STRIDE];
+    for (int i = 0; i < s->stride; i++)
+        late[i] = i < s->n ? s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i] : 0.0;
+    for (int k = 0; k < s->contacts; k++)
+        glide->slid[k] = glide->free[k] + glide->others[k] - glide->others_start[k] +
+                         (gk_dot_quads(glide->gap_moves + k * s->stride, s->z, quads) +
+                          gk_dot_quads(glide->gap_yields + k * s->stride, late, quads));
     for (int j = 0; j < s->contacts; j++) {
-        const double *moved = glide->moves + j * s->stride, *yielded = glide->yields + j * s->stride;
-        const double step = glide->step[j], more = glide->end[j] - glide->start_end[j];
-        for (int k = 0; k < s->contacts; k++) glide->slid[k] += moved[k] * step + yielded[k] * more;
-    }
-}
-
-/* x ← a⁻¹ x, both (n, width) by rows, a close to symmetric positive definite: no pivoting */
-static void solve_small(double *a, double *x, int width, int n)
-{
-    for (int k = 0; k < n; k++)
-        for (int i = k + 1; i < n; i++) {
-            const double f = a[i * width + k] / a[k * width + k];
-            if (f == 0.0) continue;
-            for (int j = k; j < n; j++) a[i * width + j] -= f * a[k * width + j];
-            for (int c = 0; c < width; c++) x[i * width + c] -= f * x[k * width + c];
-        }
-    for (int k = n - 1; k >= 0; k--)
-        for (int c = 0; c < width; c++) {
-            for (int j = k + 1; j < n; j++) x[k * width + c] -= a[k * width + j] * x[j * width + c];
-            x[k * width + c] /= a[k * width + k];
-        }
-}
-
-/* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
- * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
- * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears
- * that roll on coefficients have the mean c̄ = (1 − θ) c₀ + θ c₁. What forces at the end of the step are more than z is
- * taken from the last round. */
-/* would the mean of both ends push along the sliding? Then there is none. */
-static int turns_round(const gk_glide *glide, int j)
-{
-    return glide->limit[j] && !glide->rolls && glide->limit[j] * glide->start_end[j] < -glide->most_end[j];
-}
-
-static void express_limits(gk_glide *glide, const gk_system *s)
-{
-    memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
-    for (int j = 0; j < s->contacts; j++) {
-        const int touches = glide->most_force[j] > 0.0;
-        glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
-        if (!glide->held[j]) glide->full[j] = 0;
-        const double ratio = glide->limit[j] * glide->most[j], last = ratio + glide->full[j] * glide->most[j];
-        const double present = s->force[j] + s->dashpot.end[j], by_z = s->dashpot.hold[j] ? 0.0 : last;
-        const double end = last * present - by_z * s->z[j];
-        const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
-        const int free = glide->held[j] && !glide->full[j];
-        glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
-        glide->end_by_z[j] = by_z;
-        glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
-                          : glide->rolls                      ? 0.5 * ratio * s->force0[j]
-                                                              : 0.5 * (glide->start_end[j] + end);
-        const double by_mean = glide->rolls ? glide->share[j] / glide->by_end[j] : 1.0 / (0.5 + glide->damps[j]);
-        const double from_start = glide->rolls ? (1.0 - 1.0 / glide->by_end[j]) * glide->ratio[j] * present
-                                               : (glide->damps[j] - 0.5) * by_mean * glide->start_end[j];
-        glide->end_fixed[j] = free ? from_start : end;
-        glide->end_by_mean[j] = free ? by_mean : 0.0;
-    }
-}
-
-static void express_friction(gk_glide *glide, const gk_system *s)
-{
-    const int width = s->n + 1;
-    double *const all_a = glide->small, *const all_x = all_a + s->contacts * width;
-    int held[MAX_CONTACTS], n = 0;
-    express_limits(glide, s);
-    for (int j = 0; j < s->contacts; j++) held[n] = j, n += glide->held[j] != 0;
-    for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
-        const int i = held[k];
-        const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = gk_friction_slid(glide, i), *a = all_a + k * width, *x = all_x + k * width;
-        for (int r = 0; r < s->n; r++) {
-            const double each = moved[r] + yielded[r];
-            rest -= each * s->z[r], x[r] = -each;
-        }
-        for (int j = 0; j < s->contacts; j++) {
-            const int at = j * s->stride + i;
-            const double moves = 2.0 * glide->moves[at], yields = glide->yields[at];
-            rest += moves * (glide->fixed[j] - glide->mean[j]) + yields * (glide->end_fixed[j] - glide->end[j]);
-            x[j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
-        }
-        x[s->n] = -rest;
-        for (int j = 0; j < n; j++) {
-            const int at = held[j] * s->stride + i;
-            a[j] = 2.0 * glide->moves[at] + glide->end_by_mean[held[j]] * glide->yields[at];
-        }
-        a[k] += glide->creep[i] / glide->most_force[i];
-    }
-    solve_small(all_a, all_x, width, n);
-    for (int k = 0; k < n; k++) {
-        glide->fixed[held[k]] = all_x[k * width + s->n];
-        memcpy(glide->by_z + held[k] * s->stride, all_x + k * width, (size_t)s->n * sizeof(double));
+        const double more = glide->end[j] - glide->start_end[j];
+        if (glide->step[j] != 0.0) gk_axpy(glide->step[j], glide->moves + j * s->stride, glide->slid, 0, across);
+        if (more != 0.0) gk_axpy(more, glide->yields + j * s->stride, glide->slid, 0, across);
     }
 }
 
@@ -232,22 +146,6 @@ static void guess_end(gk_glide *glide, const gk_system *s)
         glide->end[j] = glide->limit[j] ? glide->limit[j] * glide->most[j] * (s->force[j] + s->dashpot.end[j])
                         : glide->rolls  ? glide->share[j] * glide->mean[j]
                                         : glide->start_end[j];
-}
-
-/* Mean friction by the present forces, and the sliding with it; returns the largest change */
-static double follow(gk_glide *glide, const gk_system *s)
-{
-    double largest = 0.0;
-    for (int j = 0; j < s->contacts; j++) {
-        const double *by_z = glide->by_z + j * s->stride, before = glide->mean[j], end = glide->end[j];
-        glide->mean[j] = glide->fixed[j];
-        for (int r = 0; r < s->n; r++) glide->mean[j] += by_z[r] * s->z[r];
-        glide->step[j] = 2.0 * glide->mean[j] - glide->start[j];
-        glide->end[j] = glide->end_fixed[j] + glide->end_by_z[j] * s->z[j] + glide->end_by_mean[j] * glide->mean[j];
-        largest = gk_max(largest, gk_max(fabs(glide->mean[j] - before), fabs(glide->end[j] - end)));
-    }
-    find_sliding(glide, s);
-    return largest;
 }
 
 /* what friction may be, in the step and at its end, and how much of its mean is there then where gears roll; returns
@@ -304,44 +202,35 @@ static int change_status(gk_glide *glide, const gk_system *s, int patient)
     return count;
 }
 
-/* D and gaps with friction as a function of the forces in the step */
-static void apply(const gk_glide *glide, gk_system *s)
-{
-    memcpy(s->g, glide->gap, (size_t)s->stride * sizeof *s->g);
-    memcpy(s->D, glide->D, (size_t)(s->n * s->stride) * sizeof *s->D);
-    for (int j = 0; j < s->contacts; j++) {
-        const double *moved = glide->gap_moves + j * s->stride, *yielded = glide->gap_yields + j * s->stride;
-        const double *by_z = glide->by_z + j * s->stride, by_mean = glide->end_by_mean[j];
-        double each[MAX_STRIDE];
-        for (int i = 0; i < s->stride; i++) each[i] = 2.0 * moved[i] + by_mean * yielded[i];
-        gk_axpy(glide->fixed[j], each, s->g, 0, s->stride / 4);
-        gk_axpy(-glide->start[j], moved, s->g, 0, s->stride / 4);
-        gk_axpy(glide->end_fixed[j], yielded, s->g, 0, s->stride / 4);
-        gk_axpy(glide->end_by_z[j], yielded, s->D + j * s->stride, 0, s->stride / 4);
-        for (int r = 0; r < s->n; r++)
-            if (by_z[r] != 0.0) gk_axpy(by_z[r], each, s->D + r * s->stride, 0, s->stride / 4);
-    }
-}
-
 /* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
- * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
-double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
+ * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. What is
+ * less than `enough` is not solved again. */
+double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands, double enough)
 {
     GK_ASSERT(glide && round >= 0);
     GK_ASSERT(gk_system_is_sound(s));
-    find_limits(glide, s);
+    const double largest = find_limits(glide, s);
     if (!round) guess_end(glide, s);
     find_sliding(glide, s);
     const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
-    express_friction(glide, s);
-    apply(glide, s);
-    gk_solve_settle(s);
+    glide->moved = gk_friction_express(glide, s);
+    if (round && !changed && !(glide->moved > enough * largest)) return glide->moved / largest;
+    gk_friction_apply(glide, s);
     gk_solve_contacts(s);
-    glide->moved = follow(glide, s);
-    s->energy.rubbing = gk_friction_defect(glide, s);
-    s->energy.rubbed = gk_friction_taken(glide, s);
+    glide->moved = gk_friction_follow(glide, s);
     if (changed || (!stands && !round)) return 1.0;
     return glide->moved / find_limits(glide, s);
+}
+
+/* what friction leaves and takes of energy, for the scalar of the step's energy */
+void gk_friction_account(gk_glide *glide, gk_system *s)
+{
+    GK_ASSERT(glide);
+    GK_ASSERT(gk_system_is_sound(s));
+    find_sliding(glide, s);
+    for (int j = 0; j < s->stride; j++) glide->grown[j] = j < s->contacts ? glide->end[j] - glide->start_end[j] : 0.0;
+    s->energy.rubbing = gk_friction_defect(glide, s);
+    s->energy.rubbed = gk_friction_taken(glide, s);
 }
 
 /* the speed of gear A as a mean over the last millisecond */
@@ -362,7 +251,6 @@ double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide);
     GK_ASSERT(gk_system_is_sound(s));
-    find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double end = s->force[j] + s->dashpot.end[j];
         glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;

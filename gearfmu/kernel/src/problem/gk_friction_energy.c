@@ -6,13 +6,16 @@
 static double held(const gk_glide *glide, const gk_system *s, const double *force, const double *more,
                    const double *friction)
 {
-    double sum = 0.0;
-    for (int j = 0; j < s->contacts; j++) {
-        double deflection = 0.0;
-        for (int i = 0; i < s->n; i++) deflection += glide->gap_yields[j * s->stride + i] * (force[i] + more[i]);
-        for (int i = 0; i < s->contacts; i++) deflection += 0.5 * glide->yields[j * s->stride + i] * friction[i];
-        sum += friction[j] * deflection;
+    const int quads = s->stride / 4, across = (s->contacts + 3) / 4;
+    double sum = 0.0, normal[MAX_STRIDE], half[MAX_STRIDE];
+    for (int i = 0; i < s->stride; i++) {
+        normal[i] = i < s->n ? force[i] + more[i] : 0.0;
+        half[i] = i < s->contacts ? 0.5 * friction[i] : 0.0;
     }
+    for (int j = 0; j < s->contacts; j++)
+        if (friction[j] != 0.0)
+            sum += friction[j] * (gk_dot_quads(glide->gap_yields + j * s->stride, normal, quads) +
+                                  gk_dot_quads(glide->yields + j * s->stride, half, across));
     return sum;
 }
 
@@ -34,9 +37,8 @@ static double faded(const gk_glide *glide, const gk_system *s)
 {
     double sum = 0.0;
     for (int j = 0; j < s->contacts; j++) {
-        const double *own = glide->yields + j * s->stride;
         const double off = 0.5 * (glide->start_end[j] + glide->end[j]) - glide->mean[j];
-        for (int k = 0; k < s->contacts && off != 0.0; k++) sum += off * own[k] * (glide->end[k] - glide->start_end[k]);
+        if (off != 0.0) sum += off * gk_dot_quads(glide->yields + j * s->stride, glide->grown, (s->contacts + 3) / 4);
     }
     return gk_min(sum, 0.0);
 }
@@ -46,14 +48,18 @@ static double faded(const gk_glide *glide, const gk_system *s)
 double gk_friction_defect(const gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide && s);
-    double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
+    const int quads = s->stride / 4, across = (s->contacts + 3) / 4;
+    double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s), mean[MAX_STRIDE], more[MAX_STRIDE];
+    for (int i = 0; i < s->stride; i++) {
+        mean[i] = i < s->n ? gk_solve_static_mean(s, i) : 0.0;
+        more[i] = i < s->n ? s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i] : 0.0;
+    }
     for (int j = 0; j < s->contacts; j++) {
-        const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
-        const double moved = glide->end[j] - glide->start_end[j];
-        for (int i = 0; i < s->n; i++)
-            sum -= gap[i] * (gk_solve_static_mean(s, i) * moved +
-                             glide->mean[j] * (s->force[i] + s->dashpot.end[i] - s->force0[i] - s->dashpot.end0[i]));
-        for (int k = 0; k < s->contacts; k++) sum -= glide->mean[k] * own[k] * moved;
+        const double *gap = glide->gap_yields + j * s->stride;
+        if (glide->grown[j] != 0.0) sum -= glide->grown[j] * gk_dot_quads(gap, mean, quads);
+        if (glide->mean[j] != 0.0)
+            sum -= glide->mean[j] *
+                   (gk_dot_quads(gap, more, quads) + gk_dot_quads(glide->yields + j * s->stride, glide->grown, across));
     }
     return sum;
 }

@@ -4,143 +4,199 @@
 #include "problem/gk_exchange.h"
 #include "problem/gk_rows.h"
 
-/* adds what is not dynamic, from the tables of a side, linear between nodes */
-static void slide_residual(const gk_engaged *engaged, const gk_side *side, gk_glide *glide)
+/* of a side in a step: its two nodes, linear between them */
+typedef struct slide_nodes {
+    const gk_real *normal, *own;
+    size_t columns, next;
+    double part;
+    int candidate[MAX_PAIRS];
+} slide_nodes;
+
+static slide_nodes nodes_of(const gk_engaged *engaged, const gk_side *side)
 {
-    const gk_system *s = &engaged->system;
     const gk_position *at = &engaged->position[side->which];
-    const int strips = GK_STRIPS(s);
-    const size_t columns = (size_t)side->columns, next = (size_t)(side->candidates * strips) * columns;
-    const size_t node = (size_t)at->node * next;
-    for (int i = 0; i < s->contacts; i++)
-        for (int j = 0; j < s->contacts; j++) {
-            const gk_place *p = &engaged->place[s->flank.place_of[i]], *q = &engaged->place[s->flank.place_of[j]];
-            const size_t row = (size_t)(p->candidate[side->which] * strips + i % strips);
-            const size_t cell = node + row * columns + (size_t)(q->candidate[side->which] * strips + j % strips);
-            const gk_real *normal = side->along.normal + cell, *own = side->along.own + cell;
-            glide->gap_yields[j * s->stride + i] += normal[0] + at->part * ((double)normal[next] - normal[0]);
-            glide->yields[j * s->stride + i] += own[0] + at->part * ((double)own[next] - own[0]);
+    slide_nodes n = {.columns = (size_t)side->columns, .part = at->part};
+    n.next = (size_t)(side->candidates * GK_STRIPS(&engaged->system)) * n.columns;
+    n.normal = side->along.normal + (size_t)at->node * n.next, n.own = side->along.own + (size_t)at->node * n.next;
+    for (int p = 0; p < engaged->places; p++) n.candidate[p] = engaged->place[p].candidate[side->which];
+    return n;
+}
+
+GK_INLINE double slid_between(const gk_real *low, size_t next, double part)
+{
+    return low[0] + part * ((double)low[next] - low[0]);
+}
+
+/* what friction yields that is not dynamic, from the tables of both sides */
+GK_INLINE void slide_residual(const slide_nodes side[2], int places, int stride, gk_glide *glide, const int strips)
+{
+    const size_t next[2] = {side[0].next, side[1].next};
+    const double part[2] = {side[0].part, side[1].part};
+    for (int p = 0, i = 0; p < places; p++)
+        for (int a = 0; a < strips; a++, i++) {
+            double *gap = glide->gap_yields + i, *own = glide->yields + i;
+            for (int q = 0; q < places; q++) {
+                size_t at[2];
+                for (int w = 0; w < 2; w++)
+                    at[w] = (size_t)(side[w].candidate[p] * strips + a) * side[w].columns +
+                            (size_t)(side[w].candidate[q] * strips);
+                const gk_real *const normal[2] = {side[0].normal + at[0], side[1].normal + at[1]};
+                const gk_real *const along[2] = {side[0].own + at[0], side[1].own + at[1]};
+                for (int b = 0; b < strips; b++, gap += stride, own += stride) {
+                    *gap = slid_between(normal[0] + b, next[0], part[0]) +
+                           slid_between(normal[1] + b, next[1], part[1]);
+                    *own = slid_between(along[0] + b, next[0], part[0]) + slid_between(along[1] + b, next[1], part[1]);
+                }
+            }
         }
 }
 
-/* adds the modes of a gear group */
-static void slide_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int which)
+/* rows of gaps and sliding on all lanes: modes of both gears, ground group, spins; in halves */
+typedef struct slide_lanes {
+    int modes[2], ground, all;
+    gk_half *gaps, *slides, *moves, *yields; /* (rows, all), (contacts, all); of a row times mobility, −κ */
+    const gk_half *mobility, *kappa;
+} slide_lanes;
+
+static slide_lanes lanes_of(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, const gk_glide *glide)
 {
-    const int g = setup->mesh[e].side[which].gear, width = GK_LANES(setup, g) * 2 / LANES, half = width / 2;
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    gk_glide *glide = engaged->glide;
-    const gk_flow *flow = &k->flow[g];
-    const gk_half *mobility = (const gk_half *)flow->mobility, *kappa = (const gk_half *)flow->kappa;
-    const gk_half *gaps = (const gk_half *)engaged->basis[which], *slides = (const gk_half *)glide->basis[which];
-    gk_half *scaled = (gk_half *)work->scaled;
-    const int lanes = 2 * flow->yields / LANES;
-    for (int j = 0; j < s->contacts && width; j++) {
-        const gk_half *row = slides + (size_t)(j * width);
-        const int at = j * s->stride;
-        for (int l = 0; l < width; l++) scaled[l] = row[l] * mobility[l];
-        gk_multiply_rows(scaled, gaps, s->contacts, width, width, glide->gap_moves + at);
-        gk_multiply_rows(scaled, slides, s->contacts, width, width, glide->moves + at);
-        for (int first = 0; first < width && lanes; first += half) { /* κ is 0 beyond */
-            for (int l = first; l < first + lanes; l++) scaled[l] = -row[l] * kappa[l];
-            gk_multiply_rows(scaled + first, gaps + first, s->contacts, width, lanes, glide->gap_yields + at);
-            gk_multiply_rows(scaled + first, slides + first, s->contacts, width, lanes, glide->yields + at);
-        }
+    slide_lanes l = {.ground = gk_halves(mesh->local)};
+    for (int w = 0; w < 2; w++) l.modes[w] = GK_LANES(setup, mesh->side[w].gear) * 2 / LANES;
+    l.all = l.modes[0] + l.modes[1] + l.ground + gk_halves(MAX_LOCAL);
+    l.moves = (gk_half *)glide->lanes + 2 * l.all;
+    l.yields = l.moves + l.all;
+    l.gaps = l.yields + l.all;
+    l.slides = l.gaps + s->n * l.all;
+    l.mobility = (const gk_half *)glide->lanes, l.kappa = l.mobility + l.all;
+    return l;
+}
+
+/* doubles in whole halves; their count is a multiple of four */
+static void round_lanes(const double *from, int count, gk_half *to)
+{
+    const int whole = count / 8;
+    for (int k = 0; k < whole; k++) to[k] = GK_ROUNDED(((const gk_eight *)from)[k]);
+    if (count % 8 == 0) return;
+    to[whole] = (gk_half){0};
+    *(gk_four *)(to + whole) = __builtin_convertvector(*(const gk_quad *)(from + 8 * whole), gk_four);
+}
+
+static void fill_lanes(const slide_lanes *l, const gk_rows *rows, const double (*rigid)[MAX_STRIDE], gk_half *to)
+{
+    const gk_mesh *mesh = &rows->setup->mesh[rows->engaged->index];
+    const int contacts = rows->engaged->system.contacts;
+    gk_half *lane = to;
+    for (int w = 0; w < 2; lane += l->modes[w++]) {
+        const gk_half *from = (const gk_half *)rows->basis[w];
+        for (int i = 0; i < contacts; i++, from += l->modes[w])
+            for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = from[k];
+        for (int i = contacts; i < rows->count; i++)
+            for (int k = 0; k < l->modes[w]; k++) lane[i * l->all + k] = (gk_half){0};
+    }
+    for (int i = 0; i < rows->count; i++, lane += l->all) {
+        round_lanes(rows->ground + (size_t)(i * mesh->local), mesh->local, lane);
+        lane[l->ground] = (gk_half){0};
+        for (int d = 0; d < mesh->spins; d++) lane[l->ground][d] = (gk_real)rigid[d][i];
     }
 }
 
-/* adds the ground group */
-static void slide_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e)
+/* mobility and κ of all lanes */
+static void fill_coefficients(const slide_lanes *l, const gk_setup *setup, const gk_mesh *mesh,
+                              const gk_coefficients *k, gk_half *to, int kappa)
 {
+    double ground[MAX_GROUND + 4 * MAX_ROTORS];
+    gk_local_gather(mesh, kappa ? k->ground.kappa : k->ground.mobility, ground);
+    for (int w = 0; w < 2; to += l->modes[w++]) {
+        const gk_flow *flow = &k->flow[mesh->side[w].gear];
+        memcpy(to, kappa ? flow->kappa : flow->mobility, (size_t)l->modes[w] * sizeof *to);
+    }
+    round_lanes(ground, mesh->local, to);
+    to[l->ground] = (gk_half){0};
+    for (int d = 0; d < mesh->spins; d++)
+        to[l->ground][d] = (gk_real)((kappa ? k->rigid_kappa : k->rigid_mobility) *
+                                     setup->inverse_inertia[mesh->spin[d]]);
+}
+
+/* What friction does through oscillators and spins in the step k: (contacts, stride) of the gaps and, symmetric, of the
+ * sliding */
+void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e)
+{
+    GK_ASSERT(gk_is_mesh(setup, e) && work->engaged[e].glide);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
     gk_glide *glide = engaged->glide;
-    const int width = mesh->local;
-    double mobility[MAX_GROUND + 4 * MAX_ROTORS], kappa[MAX_GROUND + 4 * MAX_ROTORS];
-    double *moves = work->ground_scaled, *yields = moves + width;
-    gk_local_gather(mesh, k->ground.mobility, mobility);
-    gk_local_gather(mesh, k->ground.kappa, kappa);
-    for (int j = 0; j < s->contacts && width; j++) {
-        const double *row = glide->ground + (size_t)(j * width);
-        const int at = j * s->stride;
-        for (int l = 0; l < width; l++) moves[l] = row[l] * mobility[l], yields[l] = -row[l] * kappa[l];
-        gk_times_rows(engaged->ground, s->n, width, moves, glide->gap_moves + at);
-        gk_times_rows(engaged->ground, s->n, width, yields, glide->gap_yields + at);
-        gk_times_rows(glide->ground, s->contacts, width, moves, glide->moves + at);
-        gk_times_rows(glide->ground, s->contacts, width, yields, glide->yields + at);
+    const int contacts = s->contacts, quads = s->stride / 4;
+    const slide_lanes l = lanes_of(setup, mesh, s, glide);
+    fill_coefficients(&l, setup, mesh, k, (gk_half *)glide->lanes, 0);
+    fill_coefficients(&l, setup, mesh, k, (gk_half *)glide->lanes + l.all, 1);
+    const gk_rows gaps = gk_rows_of_gaps(setup, work, e), sliding = gk_rows_of_sliding(setup, work, e);
+    fill_lanes(&l, &gaps, s->rigid, l.gaps);
+    fill_lanes(&l, &sliding, glide->rigid, l.slides);
+    for (int j = 0; j < contacts; j++) {
+        const gk_half *row = l.slides + j * l.all;
+        double *const to[4] = {glide->gap_moves + j * s->stride, glide->gap_kappa + j * s->stride,
+                               glide->moves + j * s->stride, glide->kappa + j * s->stride};
+        for (int i = 0; i < l.all; i++) l.moves[i] = row[i] * l.mobility[i], l.yields[i] = -row[i] * l.kappa[i];
+        for (int m = 0; m < 4; m++) gk_clear(to[m], quads);
+        gk_multiply_rows(l.moves, l.gaps, s->n, l.all, l.all, to[0]);
+        gk_multiply_rows(l.yields, l.gaps, s->n, l.all, l.all, to[1]);
+        gk_multiply_rows(l.moves, row, contacts - j, l.all, l.all, to[2] + j);
+        gk_multiply_rows(l.yields, row, contacts - j, l.all, l.all, to[3] + j);
+        for (int i = 0; i < j; i++)
+            to[2][i] = glide->moves[i * s->stride + j], to[3][i] = glide->kappa[i * s->stride + j];
+        for (int i = s->n - s->joint.clutches; i < s->n; i++)
+            to[1][i] = 0.0; /* a row of speeds: nothing yields at once */
     }
 }
 
-/* adds the spins */
-static void slide_spins(const gk_setup *setup, const gk_coefficients *k, const gk_mesh *mesh, const gk_system *s,
-                        gk_glide *glide)
-{
-    for (int l = 0; l < mesh->spins; l++) {
-        const double inverse = setup->inverse_inertia[mesh->spin[l]];
-        for (int j = 0; j < s->contacts; j++) {
-            const double moves = k->rigid_mobility * inverse * glide->rigid[l][j];
-            const double yields = k->rigid_kappa * inverse * glide->rigid[l][j];
-            for (int i = 0; i < s->n && moves != 0.0; i++) {
-                const int at = j * s->stride + i;
-                glide->gap_moves[at] += moves * s->rigid[l][i], glide->gap_yields[at] -= yields * s->rigid[l][i];
-                if (i >= s->contacts) continue;
-                glide->moves[at] += moves * glide->rigid[l][i], glide->yields[at] -= yields * glide->rigid[l][i];
-            }
-        }
-    }
-}
-
-/* Rows along the profile, and what friction yields at the gaps and along itself without the oscillators: C_nt, C_tt */
+/* rows along the profile, and what friction yields at the gaps and along itself without the oscillators: C_nt, C_tt */
 void gk_glide_rows(const gk_setup *setup, gk_work *work, int e)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
     GK_ASSERT(gk_system_is_sound(&work->engaged[e].system) && work->engaged[e].glide);
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
-    const size_t size = (size_t)(engaged->system.contacts * engaged->system.stride);
-    double **matrix[] = {&glide->gap_moves, &glide->gap_yields, &glide->moves, &glide->yields,
-                         &glide->by_z,      &glide->gap_rests,  &glide->rests, &glide->D}; /* D is the largest */
+    const int stride = engaged->system.stride;
+    const size_t size = (size_t)(engaged->system.contacts * stride);
+    double **matrix[] = {&glide->gap_moves,  &glide->gap_kappa, &glide->moves, &glide->kappa,
+                         &glide->gap_yields, &glide->yields,    &glide->by_z,  &glide->D}; /* D is the largest */
     for (size_t i = 0; i < 8; i++) *matrix[i] = glide->matrix + i * size;
-    memset(glide->matrix, 0, 4 * size * sizeof(double));
+    for (size_t i = 0; i < size; i += 4) gk_clear(glide->gap_yields + i, 1), gk_clear(glide->yields + i, 1);
     gk_rows_form_along(setup, work, e);
-    for (int w = 0; w < 2 && GK_ON(setup, residual); w++) slide_residual(engaged, &setup->mesh[e].side[w], glide);
-    memcpy(glide->gap_rests, glide->gap_yields, size * sizeof(double));
-    memcpy(glide->rests, glide->yields, size * sizeof(double));
+    if (!GK_ON(setup, residual)) return;
+    const slide_nodes side[2] = {nodes_of(engaged, &setup->mesh[e].side[0]),
+                                 nodes_of(engaged, &setup->mesh[e].side[1])};
+    GK_STRIPPED(GK_STRIPS(setup), slide_residual, side, engaged->places, stride, glide)
 }
 
-/* What forces of an engagement itself do through the oscillators: of friction to its gaps, added; of all to the sliding
- * of its contacts. Before its local yield is in `yields`, or without it. */
+/* adds what oscillators and spins yield */
+void gk_glide_yields(const gk_system *s, gk_glide *glide)
+{
+    GK_ASSERT(gk_system_is_sound(s) && glide);
+    const int quads = s->contacts * s->stride / 4;
+    gk_axpy(1.0, glide->gap_kappa, glide->gap_yields, 0, quads);
+    gk_axpy(1.0, glide->kappa, glide->yields, 0, quads);
+}
+
+/* What forces of an engagement itself do through the oscillators, by its matrices: of friction to its gaps, added; of
+ * all to the sliding of its contacts */
 void gk_glide_own(const gk_glide *glide, const gk_system *s, const gk_forces *f, double *gaps, double *along)
 {
     GK_ASSERT(glide && gaps && along);
-    gk_clear(along, s->stride / 4);
+    const int quads = s->stride / 4;
+    gk_clear(along, quads);
     for (int j = 0; j < s->contacts; j++) {
         const int at = j * s->stride;
         const double step = f->along[STEP][j], once = f->along[ONCE][j];
-        for (int i = 0; i < s->n; i++) {
-            const double yields = glide->gap_yields[at + i] - glide->gap_rests[at + i];
-            gaps[i] += step * glide->gap_moves[at + i] + once * yields;
-            along[j] += f->of[STEP][i] * glide->gap_moves[at + i] + f->of[ONCE][i] * yields;
-        }
-        for (int i = 0; i < s->contacts; i++) {
-            const double local = i == j ? gk_friction_local_yield(s, i) : 0.0;
-            along[i] += step * glide->moves[at + i] + once * (glide->yields[at + i] - local - glide->rests[at + i]);
-        }
+        gk_axpy(step, glide->gap_moves + at, gaps, 0, quads);
+        gk_axpy(once, glide->gap_kappa + at, gaps, 0, quads);
+        gk_axpy(step, glide->moves + at, along, 0, quads);
+        gk_axpy(once, glide->kappa + at, along, 0, quads);
     }
-}
-
-/* Adds what the oscillators and spins do in the step k */
-void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e)
-{
-    GK_ASSERT(gk_is_mesh(setup, e) && work->engaged[e].glide);
-    const gk_system *s = &work->engaged[e].system;
-    gk_glide *glide = work->engaged[e].glide;
-    for (int w = 0; w < 2; w++) slide_modes(setup, work, k, e, w);
-    slide_ground(setup, work, k, e);
-    slide_spins(setup, k, &setup->mesh[e], s, glide);
-    for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
-        for (int i = s->n - s->joint.clutches; i < s->n; i++) glide->gap_yields[j * s->stride + i] = 0.0;
+    for (int j = 0; j < s->contacts; j++)
+        along[j] += gk_dot_quads(glide->gap_moves + j * s->stride, f->of[STEP], quads) +
+                    gk_dot_quads(glide->gap_kappa + j * s->stride, f->of[ONCE], quads);
 }
 
 /* sliding in the step of length h without its forces */

@@ -29,6 +29,9 @@ static void lay_out_engaged(gk_bump *b, const gk_model *model, const gk_setup *s
     of->near = gk_bump_reals(b, model->engagements > 1 ? rows * ((size_t)setup->base.n + 2 * LANES) : 0);
     of->matrix = gk_bump_doubles(b, 8 * rows * rows);
     of->small = gk_bump_doubles(b, 2 * rows * rows);
+    size_t lanes = (size_t)setup->base.n + 2 * LANES; /* ground group, spins */
+    for (int w = 0; w < 2; w++) lanes += (size_t)setup->modal[setup->mesh[e].side[w].gear].n;
+    of->lanes = gk_bump_reals(b, (2 * rows + 4) * lanes);
 }
 
 /* pairs of teeth that may feel each other as far teeth, at most */

@@ -93,7 +93,7 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-enum { ADD, WRITE, ADD_ALONG }; /* rows of the gaps, added or written; of the sliding */
+enum { ADD, WRITE, ADD_ALONG, WRITE_ALONG }; /* rows of the gaps, added or written; of the sliding */
 
 typedef struct ground_fill { /* rows of the contacts on the part of the ground group that one gear reads */
     const gk_base *base;
@@ -113,7 +113,7 @@ GK_INLINE void ground_rows_of(const ground_fill *f, const int motions, const int
     const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
     const int *motion = base->motion[side->gear];
     const size_t local = f->local;
-    const gk_quad *const table = (const gk_quad *)(what == ADD_ALONG ? side->along.ground : side->ground);
+    const gk_quad *const table = (const gk_quad *)(what >= ADD_ALONG ? side->along.ground : side->ground);
     const gk_quad *const node = table + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
@@ -122,7 +122,7 @@ GK_INLINE void ground_rows_of(const ground_fill *f, const int motions, const int
         gk_quad *to = (gk_quad *)f->out + (size_t)(p * strips) * local;
         for (int first = 0; first < strips; first += each) {
             const gk_point *point = &place->point[first];
-            const double *gradient = (what == ADD_ALONG ? point->slide : point->gradient) + SPACE * side->which;
+            const double *gradient = (what >= ADD_ALONG ? point->slide : point->gradient) + SPACE * side->which;
             double g[SPACE];
             const gk_quad *moved[SPACE];
             for (int m = 0; m < motions; m++)
@@ -133,7 +133,7 @@ GK_INLINE void ground_rows_of(const ground_fill *f, const int motions, const int
                 for (int i = first; i < first + each; i++) {
                     const gk_quad here = low[i * quads + q];
                     const gk_quad row = rigid - (here + at->part * (high[i * quads + q] - here));
-                    if (what == WRITE)
+                    if (what == WRITE || what == WRITE_ALONG)
                         to[(size_t)i * local + q] = row;
                     else
                         to[(size_t)i * local + q] += row;
@@ -162,6 +162,17 @@ static int fills(const gk_base *base, const gk_mesh *mesh)
     int width = 0;
     for (int w = 0; w < 2; w++) width += base->width[mesh->side[w].gear];
     return !mesh->joined && width == mesh->local;
+}
+
+/* clears the rows of the contacts beside what the first gear writes of them */
+static void clear_beside(const gk_base *base, const gk_mesh *mesh, gk_engaged *engaged)
+{
+    const int at = mesh->at[0], end = at + base->width[mesh->side[0].gear];
+    double *row = engaged->ground;
+    for (int i = 0; i < engaged->system.contacts; i++, row += engaged->local) {
+        memset(row, 0, (size_t)at * sizeof *row);
+        memset(row + end, 0, (size_t)(engaged->local - end) * sizeof *row);
+    }
 }
 
 /* rows of the joints at bores on the oscillators that a side reads */
@@ -203,8 +214,11 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     gk_felt_plan(setup, work, engaged);
     const int local = engaged->local;
     if (!local) return;
-    const int afresh = fills(base, mesh);
-    if (!afresh) memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
+    const int afresh = fills(base, mesh), alone = !engaged->by_patterns[0] && !engaged->by_patterns[1];
+    if (!afresh && alone)
+        clear_beside(base, mesh, engaged);
+    else if (!afresh)
+        memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &mesh->side[w];
         const int at = engaged->by_patterns[0] && w ? engaged->wide[0] : mesh->at[w];
@@ -213,7 +227,7 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
             gk_felt_rows(setup, work, e, w);
             continue;
         }
-        if (afresh) {
+        if (afresh || (alone && !w)) {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, WRITE)
         } else {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, ADD)
@@ -232,14 +246,19 @@ void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
     const int strips = GK_STRIPS(setup), contacts = engaged->system.contacts;
-    memset(glide->rigid, 0, sizeof glide->rigid);
-    memset(glide->ground, 0, (size_t)(contacts * mesh->local) * sizeof *glide->ground);
+    const int afresh = fills(&setup->base, mesh);
+    for (int d = 0; d < mesh->spins; d++) gk_clear(glide->rigid[d], engaged->system.stride / 4);
+    if (!afresh) memset(glide->ground, 0, (size_t)(contacts * mesh->local) * sizeof *glide->ground);
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &mesh->side[w];
         if (GK_LANES(setup, side->gear)) contact_rows(setup, side, side->along.rows, engaged, glide->basis[w]);
         const ground_fill f = {&setup->base, side, engaged, glide->ground + mesh->at[w], (size_t)mesh->local / 4};
-        if (mesh->local)
-            ground_rows_of(&f, setup->base.motions[side->gear], setup->spatial ? 1 : strips, strips, ADD_ALONG);
+        if (!mesh->local) continue;
+        if (afresh) {
+            GK_STRIPPED(strips, ground_rows, &f, setup->spatial, WRITE_ALONG)
+        } else {
+            GK_STRIPPED(strips, ground_rows, &f, setup->spatial, ADD_ALONG)
+        }
     }
     if (mesh->coupled) round_rows(engaged, glide->ground, contacts, glide->near);
     for (int i = 0; i < contacts; i++) {

@@ -229,7 +229,7 @@ static void newton(gk_system *s)
         }
         last = change;
     }
-    s->factored = s->others.coupled && !films && !s->rubs;
+    s->factored = (s->others.coupled || s->rubs) && !films;
     gk_solve_settle(s);
 }
 

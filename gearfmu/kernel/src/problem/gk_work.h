@@ -38,7 +38,8 @@ typedef struct gk_glide {
     double free[MAX_STRIDE], begin[MAX_STRIDE]; /* sliding in the step by the forces of the last one alone; by the
                                                    speed at its start */
     double moved_along[MAX_STRIDE];             /* as read in a pass, of all engagements */
-    double *gap_rests, *rests;                  /* of gap_yields and yields what is not dynamic */
+    double *gap_kappa, *kappa;                  /* of gap_yields and yields what is dynamic */
+    gk_real *lanes;                             /* gk_glide.c: rows on all lanes and their coefficients */
     double others[MAX_STRIDE],                  /* by other engagements; */
         others_start[MAX_STRIDE];               /* at once at the start of the step */
     double most[MAX_STRIDE];                    /* coefficient of friction */
@@ -46,18 +47,21 @@ typedef struct gk_glide {
         most_end[MAX_STRIDE];                   /* the one at the end */
     double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
     double by_end[MAX_STRIDE];                  /* weight of the end of the step in the mean coefficient */
-    signed char limit[MAX_STRIDE], held[MAX_STRIDE];    /* ±1: at that limit; 1: below it */
-    signed char full[MAX_STRIDE];                       /* ±1: at the limit at the end alone, where the gears roll */
-    int rolls;                                          /* the gears do: friction fades, it does not stick */
-    double moved;                                       /* by the last round, N */
-    double fixed[MAX_STRIDE], *by_z;                    /* mean friction as a function of z, (contacts, stride) */
-    double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE], /* friction at the end as a function of z and its mean */
+    signed char limit[MAX_STRIDE], held[MAX_STRIDE];       /* ±1: at that limit; 1: below it */
+    signed char full[MAX_STRIDE];                          /* ±1: at the limit at the end alone, where the gears roll */
+    int rolls;                                             /* the gears do: friction fades, it does not stick */
+    double moved;                                          /* by the last round, N */
+    double fixed[MAX_STRIDE], by_own_z[MAX_STRIDE], *by_z; /* mean friction as a function of z, (contacts, stride): of
+                                                           contacts below the limit, else of their own z */
+    double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE],    /* friction at the end as a function of z and its mean */
         end_by_mean[MAX_STRIDE];
+    int expressed, anew;                             /* these slopes are known; D does not yet contain them */
     double *D;                                       /* D without friction */
     double creep[MAX_STRIDE];                        /* sliding in the step below which friction is less than that */
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
     double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
     double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
+    double grown[MAX_STRIDE];                                   /* end less start_end; 0 beyond the contacts */
     double slid[MAX_STRIDE], lead[MAX_STRIDE]; /* sliding in the step by the rows at its end; what that is more than by
                                                   rows that move */
     double damps[MAX_STRIDE];                  /* relaxation time of a contact that sticks over h */
@@ -88,6 +92,7 @@ typedef struct gk_far_pair { /* a tooth that feels another of its gear */
 typedef struct gk_kept { /* D and K = Q − A of an engagement as of some steps ago, between the rows of that time */
     double *D, *K;
     int n, places, age; /* n −1: none */
+    int again;          /* this step takes them */
     gk_key key[MAX_PAIRS];
 } gk_kept;
 
@@ -172,6 +177,7 @@ GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, con
 /* gk_glide.c */
 GK_HOT void gk_glide_rows(const gk_setup *setup, gk_work *work, int e);
 GK_HOT void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e);
+GK_HOT void gk_glide_yields(const gk_system *s, gk_glide *glide);
 GK_HOT void gk_glide_own(const gk_glide *glide, const gk_system *s, const gk_forces *f, double *gaps, double *along);
 GK_HOT void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e);
 GK_HOT double gk_glide_lead(const gk_mesh *mesh, const gk_point *point, const double speed[2], double h);
@@ -183,10 +189,15 @@ GK_HOT double gk_friction_held0(const gk_glide *glide, const gk_system *s);
 GK_HOT double gk_friction_defect(const gk_glide *glide, const gk_system *s);
 GK_HOT double gk_friction_taken(const gk_glide *glide, const gk_system *s);
 static inline double gk_friction_slid(const gk_glide *glide, int j) { return glide->slid[j] - glide->lead[j]; }
+/* gk_friction_law.c */
+GK_HOT double gk_friction_express(gk_glide *glide, const gk_system *s);
+GK_HOT void gk_friction_apply(gk_glide *glide, gk_system *s);
+GK_HOT double gk_friction_follow(gk_glide *glide, const gk_system *s);
 /* gk_friction.c */
 GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k, gk_work *work, int e);
-GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
+GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands, double enough);
+GK_HOT void gk_friction_account(gk_glide *glide, gk_system *s);
 GK_HOT double gk_friction_local_yield(const gk_system *s, int i);
 GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
 GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);

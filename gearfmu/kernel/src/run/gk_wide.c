@@ -51,6 +51,7 @@
 #include "problem/gk_balance.c"
 #include "problem/gk_glide.c"
 #include "problem/gk_friction_energy.c"
+#include "problem/gk_friction_law.c"
 #include "problem/gk_friction.c"
 #include "problem/gk_felt.c"
 #include "problem/gk_far.c"
