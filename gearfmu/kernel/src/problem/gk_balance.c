@@ -46,9 +46,9 @@ static int takes_part(const gk_system *s, int i)
  * add up */
 static balance defect(const gk_system *s)
 {
-    const gk_account *energy = &s->energy;
-    const double owed = energy->correction + energy->rubbing + energy->shift0 - energy->shift;
-    balance b = {owed - energy->stored0, 0.0, 0.0, fabs(energy->stored0), 0.0};
+    const gk_account *was = &s->energy;
+    const double owed = was->correction + was->rubbing + was->shift0 - was->shift;
+    balance b = {owed - was->stored0, 0.0, 0.0, fabs(was->stored0), 0.0};
     if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
