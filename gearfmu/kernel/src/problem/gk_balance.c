@@ -156,6 +156,13 @@ static void solve_members(const gk_island *island)
         gk_solve_contacts(island->member[0]);
 }
 
+static int all_solved(const gk_island *island)
+{
+    for (int m = 0; m < island->count; m++)
+        if (island->member[m]->limit_reached) return 0;
+    return 1;
+}
+
 /* Contacts alone, without the scalar: η is the dampers' */
 void gk_balance_plain(const gk_island *island)
 {
@@ -213,7 +220,8 @@ static double secant(double alpha, double defect, double last, double last_defec
     return slope * newton * defect < 0.0 ? -defect / slope : newton;
 }
 
-/* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
+/* α by Newton on the quadratic; 0 when the limit of iterations is reached, here or in the contacts, as where friction
+ * changes sides for ever, or no direction is left */
 static int find_alpha(const gk_island *island, balance b, double tolerance)
 {
     double p[MAX_STRIDE], damper[MAX_STRIDE], last = 0.0, last_defect = 0.0;
@@ -242,7 +250,7 @@ static int find_alpha(const gk_island *island, balance b, double tolerance)
         }
         solve_members(island);
         b = defect_of_all(island);
-        if (!open_balance(&b, tolerance)) return leave(island, &b);
+        if (!open_balance(&b, tolerance)) return all_solved(island) && leave(island, &b);
     }
     return 0;
 }
