@@ -117,6 +117,7 @@ def compare(
     assert found[worst] < tolerance, (worst, found[worst])
 
 
+SHARED = ("train", "set", "helical_set")  # engagements share gears
 DEAR = [pytest.param(name, marks=pytest.mark.full) if name == "helical_set" else name for name in KINDS]
 
 
@@ -153,7 +154,7 @@ def test_the_order_of_the_tables_of_a_drawn_stage_does_not_matter(seed: int) -> 
 
 
 @pytest.mark.parametrize("effect", ["friction", "film"])
-@pytest.mark.parametrize("name", ["helical", pytest.param("train", marks=pytest.mark.full)])
+@pytest.mark.parametrize("name", ["helical", *(pytest.param(n, marks=pytest.mark.full) for n in SHARED)])
 def test_the_order_of_the_tables_does_not_matter_to_lubricated_flanks(name: str, effect: str) -> None:
     kind, on = KINDS[name], {f"effect.{effect}": 1.0}
     compare(kind, run(kind, **on), run(kind, everything, **on))
