@@ -15,9 +15,9 @@ from slices import by_functions_alone
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.te import TeResult, loaded_te
+from gearfmu.stagefile.stage import load_stage
 
 BETA, TORQUE, SLICES, WIDTH, STEEL = math.radians(20), 300.0, 6, 30e-3, 2.06e11
 SUPPORTS = ("bearing.sun", "bearing.ring", "bearing.carrier")
