@@ -16,8 +16,8 @@ from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
 from gearfmu.body import Body
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Steady, simulate
+from gearfmu.stagefile.forms.general import Stage
 
 FAST = 1
 LOAD = 302.0

@@ -17,14 +17,14 @@ from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pa
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import FrictionSpec, PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.fields import GEAR_NUMBERS
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.fields import GEAR_NUMBERS
 from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import FrictionSpec, PortSpec
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
 EM = 1.0

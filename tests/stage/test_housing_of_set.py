@@ -11,14 +11,14 @@ from housings import rigid_block
 
 from gearfmu.body import load_bodies
 from gearfmu.body.body import Body
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.reading.files import find_stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import PlanetarySpec
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 FEET = {"left": (-0.1, -0.12, 0.0), "right": (0.1, -0.12, 0.0)}
 TABLE = """

@@ -12,11 +12,11 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stage.build.meshes import direction_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 STEP, SETTLES, PITCHES, POSITIONS = 2e-5, 5e-3, 2, 64
 RIGID = {"effect.elastic": 0.0, "level": 0.0}
