@@ -53,6 +53,5 @@ def test_a_step_with_friction_has_one_solution(name: str) -> None:
         found = np.array([[kernel.get(force) for force in forces] for kernel in (shipped, other)])
         largest = max(largest, float(np.abs(found[0]).max()))
         worst = max(worst, float(np.abs(found[1] - found[0]).max()) if i >= STARTS else 0.0)
-    print(name, worst / largest, shipped.get("solver.status"), other.get("solver.status"))
     assert worst < TOLERANCE * largest
     assert shipped.get("solver.status") == other.get("solver.status") == 0
