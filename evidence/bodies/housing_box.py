@@ -1,6 +1,6 @@
 """Mesh of the housing of two_stage: a closed box with a bore for every bearing, and four feet.
 
-    python evidence/bodies/housing_box.py [FILE]        # reduced_models/two_stage/housing.inp when none is named
+    python -m evidence.bodies.housing_box [FILE]      # reduced_models/two_stage/housing.inp when none is named
 
 A plane mesh of quadrilaterals across the shafts, drawn out along them: end walls take all of it, side walls its outer
 ring, bosses the rings round the bores. Millimetres; 8-node hexahedra, which the import makes quadratic.
@@ -9,13 +9,12 @@ ring, bosses the rings round the bores. Millimetres; 8-node hexahedra, which the
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-SHIPPED = Path(__file__).resolve().parents[2] / "reduced_models" / "two_stage" / "housing.inp"
+from evidence.bodies import deck
+
 LINES = (  # from, to, cells: the first and last are side walls
     ((-60, -50, 1), (-50, 50, 6), (50, 114, 4), (114, 156, 3), (156, 234, 5), (234, 290, 3), (290, 300, 1)),
     ((-90, -80, 1), (-80, -53, 2), (-53, 53, 6), (53, 63, 1), (63, 183, 7), (183, 240, 3), (240, 250, 1)),
@@ -111,10 +110,7 @@ def hexahedra(plane: Plane) -> np.ndarray:
 
 def outside(cells: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Nodes of the outer surface: of boundary faces that neither a bore's surface nor the inside of the box has."""
-    faces = cells[:, [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]]
-    faces = faces.reshape(-1, 4)
-    _, index, number = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    faces = faces[index[number == 1]]
+    faces = deck.boundary(cells)
     x, y, z = (nodes[faces][..., k] for k in range(3))
     (left, right), (bottom, top) = ((parts[0][0], parts[-1][1]) for parts in LINES)
     flat = [np.ptp(x, axis=1) == 0, np.ptp(y, axis=1) == 0, np.ptp(z, axis=1) == 0]
@@ -146,26 +142,15 @@ def node_sets(plane: Plane, cells: np.ndarray, nodes: np.ndarray) -> dict[str, n
     return found | {"outside": skin}
 
 
-def deck() -> str:
+def text() -> str:
     """The mesh as an Abaqus deck."""
     plane = Plane()
     cells = hexahedra(plane)
     flat = np.array(plane.points)
     nodes = np.vstack([np.column_stack([flat, np.full(len(flat), float(z))]) for z in LEVELS])
-    sets, used = node_sets(plane, cells, nodes), np.unique(cells)
-    number = np.zeros(len(nodes), int)
-    number[used] = np.arange(1, len(used) + 1)
-    lines = ["*HEADING", "housing of two_stage, millimetres (evidence/bodies/housing_box.py)", "*NODE"]
-    lines += [f"{number[n]},{nodes[n, 0]:.7g},{nodes[n, 1]:.7g},{nodes[n, 2]:.7g}" for n in used]
-    lines += ["*ELEMENT, TYPE=C3D8, ELSET=ALL"]
-    lines += [f"{k},{','.join(str(number[n]) for n in cell)}" for k, cell in enumerate(cells, start=1)]
-    for name, own in sets.items():
-        lines.append(f"*NSET, NSET={name.upper()}")
-        lines += [",".join(str(number[n]) for n in own[k : k + 16]) for k in range(0, len(own), 16)]
-    return "\n".join(lines) + "\n"
+    heading = "housing of two_stage, millimetres (evidence/bodies/housing_box.py)"
+    return deck.abaqus(heading, nodes, cells, node_sets(plane, cells, nodes))
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1]) if sys.argv[1:] else SHIPPED
-    target.write_text(deck(), encoding="utf-8")
-    print(f"{target}: {target.stat().st_size / 1e3:.0f} kB")
+    deck.write(text(), "two_stage")
