@@ -15,6 +15,7 @@ import numpy as np
 
 from evidence.bodies import deck
 
+Line = tuple[tuple[float, float, int], ...]
 LINES = (  # from, to, cells: the first and last are side walls
     ((-60, -50, 1), (-50, 50, 6), (50, 114, 4), (114, 156, 3), (156, 234, 5), (234, 290, 3), (290, 300, 1)),
     ((-90, -80, 1), (-80, -53, 2), (-53, 53, 6), (53, 63, 1), (63, 183, 7), (183, 240, 3), (240, 250, 1)),
@@ -31,7 +32,7 @@ class Bore:
     name: str
     axis: tuple[float, float]
     block: tuple[float, float, float, float]
-    radii: tuple[float, float]
+    radii: tuple[float, ...]
     bosses: tuple[tuple[int, int], tuple[int, int]]
     seats: tuple[tuple[int, int], tuple[int, int]]
 
@@ -44,27 +45,28 @@ BORES = (
 
 
 class Plane:
-    """Quadrilaterals across the shafts. points; quads (F, 4); ring: of the side walls; boss: number of the bore, −1."""
+    """Quadrilaterals across the shafts, of lines along x and y, with bores. points; quads (F, 4); ring: of the side
+    walls; boss: number of the bore, −1."""
 
-    def __init__(self) -> None:
+    def __init__(self, lines: tuple[Line, Line], bores: tuple[Bore, ...]) -> None:
         self.points: list[tuple[float, float]] = []
         self.quads: list[list[int]] = []
         self.ring: list[bool] = []
         self.boss: list[int] = []
         self._known: dict[tuple[float, float], int] = {}
-        x, y = (_line(parts) for parts in LINES)
+        x, y = (_line(parts) for parts in lines)
         for i in range(len(x) - 1):
             for j in range(len(y) - 1):
                 middle = 0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])
-                if not any(b.block[0] < middle[0] < b.block[1] and b.block[2] < middle[1] < b.block[3] for b in BORES):
+                if not any(b.block[0] < middle[0] < b.block[1] and b.block[2] < middle[1] < b.block[3] for b in bores):
                     corners = [(x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])]
                     edge = i in (0, len(x) - 2) or j in (0, len(y) - 2)
                     self._add(corners, edge, -1)
-        for number, bore in enumerate(BORES):
+        for number, bore in enumerate(bores):
             self._rings(number, bore, x, y)
 
     def _rings(self, number: int, bore: Bore, x: np.ndarray, y: np.ndarray) -> None:
-        """Two rings between a block's edge and the bore: to the boss, and the boss."""
+        """Rings between a block's edge and the bore, by its radii: to the boss, and the boss."""
         low, high, bottom, top = bore.block
         across, along = x[(x >= low) & (x <= high)], y[(y >= bottom) & (y <= top)]
         edge = [(v, bottom) for v in across[:-1]] + [(high, v) for v in along[:-1]]
@@ -91,7 +93,7 @@ class Plane:
         return self._known[key]
 
 
-def _line(parts: tuple[tuple[float, float, int], ...]) -> np.ndarray:
+def _line(parts: Line) -> np.ndarray:
     return np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in parts] + [[parts[-1][1]]])
 
 
@@ -144,7 +146,7 @@ def node_sets(plane: Plane, cells: np.ndarray, nodes: np.ndarray) -> dict[str, n
 
 def text() -> str:
     """The mesh as an Abaqus deck."""
-    plane = Plane()
+    plane = Plane(LINES, BORES)
     cells = hexahedra(plane)
     flat = np.array(plane.points)
     nodes = np.vstack([np.column_stack([flat, np.full(len(flat), float(z))]) for z in LEVELS])

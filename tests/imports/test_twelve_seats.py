@@ -1,0 +1,105 @@
+"""A housing with twelve seats, four on every shaft: more directions of supports than the kernel once held."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bored import BORES, SENSORS, block
+from decks import write_deck
+
+from gearfmu.body import load_bodies, reduce_body
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.reading.files import find_stage
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage.run.trace import Trace
+
+LEVELS = (12, 40, 80, 110)  # mm; a seat is where a bore meets one
+SEATS = {f"{bore}{k}": (bore, z) for bore in BORES for k, z in enumerate(LEVELS)}
+HOUSING = """[bodies.housing]
+kind = "housing"
+modes = 120
+dynamic_to = "6 kHz"
+material = {{ youngs_modulus = "72 GPa", poisson_ratio = 0.33, density = "2700 kg/m^3" }}
+[bodies.housing.import]
+file = "housing.inp"
+length = "1 mm"
+seats = {{ {seats} }}
+feet = {{ {feet} }}
+sensors = {{ {sensors} }}
+
+"""
+BEARING = """
+[[supports]]
+name = "{name}"
+body = "{bore}_shaft"
+at = "{z} mm"
+to = "housing"
+node = "{name}"
+radial = "1e8 N/m"
+axial = "3e7 N/m"
+tilt = "5e3 N*m/rad"
+damping_ratio = 0.0
+"""
+
+
+def stage(folder: Path, seats: list[str]) -> Stage:
+    """two_stage with the seats, and their bearings, in this order; nothing damps its supports."""
+
+    def named(names: list[str]) -> str:
+        return ", ".join(f'{name} = "{name.upper()}"' for name in names)
+
+    text = re.sub(r"damping_ratio = .*", "damping_ratio = 0.0", find_stage("two_stage/stage_housed").read_text("utf-8"))
+    head, tables = text[: text.index("[bodies.housing]")], re.split(r"(?=\[\[supports\]\])", text)[1:]
+    kept = [table for table in tables if 'to = "housing"' not in table]
+    feet = re.findall(r'node = "(foot\d)"', "".join(kept))
+    housing = HOUSING.format(seats=named(seats), feet=named(feet), sensors=named(list(SENSORS)))
+    bearings = [BEARING.format(name=name, bore=SEATS[name][0], z=SEATS[name][1]) for name in seats]
+    base = f'base = "{find_stage("two_stage").as_posix()}"'
+    path = folder / "stage.toml"
+    made = block(LEVELS, {name: (bore, z, z) for name, (bore, z) in SEATS.items()})
+    sets = {name.upper(): own for name, own in made.sets.items()}
+    write_deck(folder / "housing.inp", made.nodes, {"hexahedron20": made.cells}, sets)
+    path.write_text(head.replace('base = "stage.toml"', base) + housing + "".join([*kept, *bearings]), encoding="utf-8")
+    return load_stage(path)
+
+
+def model(folder: Path, seats: list[str]) -> StageModel:
+    chosen = stage(folder, seats)
+    return assemble(chosen, [*load_bodies(load_stage("two_stage")), reduce_body(chosen, "housing")])
+
+
+def run(of: StageModel) -> Trace:
+    return simulate(of, Steady(of, 150.0, 150.0), 4e-4, 2e-5, {"level": 1.0})
+
+
+@pytest.fixture(scope="module")
+def trace(tmp_path_factory: pytest.TempPathFactory) -> Trace:
+    return run(model(tmp_path_factory.mktemp("seats"), list(SEATS)))
+
+
+def test_its_feet_carry_what_its_seats_take(trace: Trace) -> None:
+    """At rest, along x, y and z."""
+    start = {name: channel.values[0] for name, channel in trace.channels.items()}
+    for axis in "xyz":
+        seats = [start[f"bearing.{name}.f{axis}"] for name in SEATS]
+        feet = [start[f"mount.foot{k}.f{axis}"] for k in range(4)]
+        print(axis, sum(seats), sum(feet), np.abs(seats).max())
+        assert abs(sum(seats)) == pytest.approx(abs(sum(feet)), abs=1e-6 * np.abs(seats).max())
+
+
+def test_the_order_of_its_seats_and_bearings_changes_nothing(trace: Trace, tmp_path: Path) -> None:
+    """Reduced anew from the other order of the table. Margin:"""
+    other = run(model(tmp_path, list(SEATS)[::-1]))
+    assert set(trace.channels) == set(other.channels)
+    felt = max(np.abs(trace[name]).max() for name in trace.channels if name.startswith("sensor."))
+    for name in trace.channels:
+        if name.startswith("sensor."):
+            print(name, np.abs(trace[name] - other[name]).max() / felt)
+            assert np.abs(trace[name] - other[name]).max() <= 1e-4 * felt, name
+        elif name.endswith((".fx", ".fy", ".fz", ".force")):
+            print(name, np.abs(trace[name] - other[name]).max() / np.abs(trace["stage1.force"]).max())
+            assert np.abs(trace[name] - other[name]).max() <= 1e-5 * np.abs(trace["stage1.force"]).max(), name
