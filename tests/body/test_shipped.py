@@ -10,9 +10,9 @@ from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body import body_path, load_bodies, reduce_bodies
 from gearfmu.body.sound import kept_radiation, sound_path
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.reading.files import library_roots, shipped_stages
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.reading.files import library_roots, shipped_stages
+from gearfmu.stagefile.stage import load_stage
 
 LARGEST = 1.4e6  # bytes of a file: surface in all modes, rows along the profile and own-tooth tables included
 LIBRARY = 15e6  # bytes of all of them

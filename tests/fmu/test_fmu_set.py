@@ -17,8 +17,8 @@ from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export
 from gearfmu.fmu.description import shafts
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.stage import load_stage
 
 STEPS, H, RIGID = 10, 1e-4, 0
 START = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}

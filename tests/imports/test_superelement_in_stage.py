@@ -18,8 +18,8 @@ from decks import write_deck
 import gearfmu as gf
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.matrices import read_unknowns
-from gearfmu.spec.reading.files import find_stage
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.reading.files import find_stage
 
 HOUSED = "two_stage/stage_housed"
 SEATS = {f"{bore}_{side}": (bore, *band) for bore in ("input", "intermediate", "output")

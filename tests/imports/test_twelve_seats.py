@@ -11,11 +11,11 @@ from bored import BORES, SENSORS, block
 from decks import write_deck
 
 from gearfmu.body import load_bodies, reduce_body
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.files import find_stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 LEVELS = (12, 40, 80, 110)  # mm; a seat is where a bore meets one
 SEATS = {f"{bore}{k}": (bore, z) for bore in BORES for k, z in enumerate(LEVELS)}

@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import parts
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
-from gearfmu.stage.build import assembly, blob, compact, flanks, meshes, teeth
+from gearfmu.stage.assembly import assembly, blob, compact, flanks, meshes, teeth
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)

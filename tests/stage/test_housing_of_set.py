@@ -9,13 +9,13 @@ from housings import rigid_block
 import gearfmu as gf
 from gearfmu.body import load_bodies
 from gearfmu.body.body import Body
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import PlanetarySpec
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import PlanetarySpec
+from gearfmu.stagefile.stage import load_stage
 
 SET, HOUSED = "planetary54", "planetary54/stage_housed"
 

@@ -26,7 +26,7 @@ from gearfmu.femesh.points import read_points
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.housing import ImportedHousing
 from gearfmu.reduction.imported.skin import Surface, enclosed
-from gearfmu.spec.tables.housing import HousingBody, HousingReducedSpec
+from gearfmu.stagefile.tables.housing import HousingBody, HousingReducedSpec
 
 MOST = 3000  # unknowns: matrices are full
 RIGID = 1e-5  # largest force of a rigid motion, relative to that of the single stiffnesses in it
