@@ -120,7 +120,7 @@ def run(folder: Path, name: str, housing: str) -> tuple[Trace, Path, float]:
 @pytest.mark.full
 @pytest.mark.needs("ccx")
 def test_a_train_in_a_housing_of_calculix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forces, accelerations, report and sound power. Margin: MARGIN."""
+    """Forces, accelerations, report and sound power. Bounds: the files have ten digits or more."""
     monkeypatch.setattr("gearfmu.body.sound.PATCHES", 150)
     library = find_stage("two_stage").parent
     shutil.copy(library / "stage.toml", tmp_path / "base.toml")
