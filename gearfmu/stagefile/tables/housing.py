@@ -64,7 +64,9 @@ class HousingReducedSpec(SourceSpec):
     )
     recovered: Text = Field(default="", description='point and direction of each row of recovery, lines such as "42.3"')
     surface: Text = Field(
-        default="", description="mesh of the outer surface, which radiates: .bdf or .vtu; its points are in recovery"
+        default="",
+        description="mesh of the outer surface, which radiates: .bdf or .vtu; its points are of the superelement or of "
+        "its recovery",
     )
 
     @model_validator(mode="after")
@@ -74,8 +76,6 @@ class HousingReducedSpec(SourceSpec):
             raise refuse("a superelement is its matrices: give stiffness and mass")
         if bool(self.recovery) != bool(self.recovered):
             raise refuse("recovery and recovered come together: a matrix, and the points of its rows")
-        if self.surface and not self.recovery:
-            raise refuse("the points of the surface move by recovery: give it, or leave surface away")
         if strange := sorted(set(self.rotations) - set(self.seats) - set(self.feet)):
             raise refuse(f"rotations names {strange[0]}, which is no seat and no foot")
         return self
