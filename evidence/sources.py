@@ -28,10 +28,11 @@ import numpy as np
 
 from evidence.pages_made import MARK
 from gearfmu.cli import VERBS
-from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.assembly.blob import read_blob
 
 KERNEL = "gearfmu/kernel/src"
-UPSTREAM = ("spec", "geometry", "fem", "femesh", "reduction", "body", "stage/build")  # from a stage file to its model
+# from a stage file to its model
+UPSTREAM = ("stagefile", "geometry", "fem", "femesh", "reduction", "body", "stage/assembly")
 # names for users, and what carries numbers without changing them
 PLUMBING = ("__init__.py", "api", "errors.py", "extras.py", "files.py", "hdf5.py", "ranges.py", "units.py")
 BARRIERS = tuple(f"gearfmu/{part}" for part in (*UPSTREAM, *PLUMBING))
@@ -64,8 +65,8 @@ def short(content: bytes) -> str:
 def stage_hash(name: str) -> str:
     """Hash of the assembled model of a shipped stage, the same on every machine."""
     from gearfmu.body import load_bodies
-    from gearfmu.spec.stage import load_stage
     from gearfmu.stage import assemble
+    from gearfmu.stagefile.stage import load_stage
 
     spec = load_stage(name)
     return rounded_hash(assemble(spec, load_bodies(spec)).blob)

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import gearfmu as gf
-from gearfmu.spec.proposals.new import new_stage
+from gearfmu.stagefile.proposals.new import new_stage
 
 TORQUE = 302.0  # N·m on the pinion
 CHANGES = {

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from gearfmu.api.stages import bearings, effects, efficiency, new
     from gearfmu.errors import GearfmuError
     from gearfmu.fmu.validate import validate
-    from gearfmu.stage.build.model import StageModel
+    from gearfmu.stage.assembly.model import StageModel
     from gearfmu.stage.run.te import TeResult
     from gearfmu.stage.run.trace import Channel, Trace
     from gearfmu.sweeps.table import SweepTable
@@ -86,7 +86,7 @@ _HOMES = {
     "api.stages": ("bearings", "effects", "efficiency", "new"),
     "errors": ("GearfmuError",),
     "fmu.validate": ("validate",),
-    "stage.build.model": ("StageModel",),
+    "stage.assembly.model": ("StageModel",),
     "stage.run.te": ("TeResult",),
     "stage.run.trace": ("Channel", "Trace"),
     "sweeps.table": ("SweepTable",),

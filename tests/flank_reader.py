@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gearfmu.stage.build.fields import SIZES
-from gearfmu.stage.build.ground_part import turn_tables
+from gearfmu.stage.assembly.fields import SIZES
+from gearfmu.stage.assembly.ground_part import turn_tables
 
 
 def full_tables(sections: Mapping[str, np.ndarray], gear: int, rolls: int, number: int = 0) -> SimpleNamespace:

@@ -24,7 +24,7 @@ def matches(pattern: str, paths: Iterable[Path]) -> int:
 
 def counts() -> dict[str, int]:
     """Every count by its name."""
-    product, spec = sorted((ROOT / "gearfmu").rglob("*.py")), ROOT / "gearfmu" / "spec"
+    product, spec = sorted((ROOT / "gearfmu").rglob("*.py")), ROOT / "gearfmu" / "stagefile"
     tests = [path for path in sorted((ROOT / "tests").rglob("*.py")) if path != Path(__file__)]
     return {
         "Any": matches(r"\bAny\b(?!,|$)", product),

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import gearfmu.body.bodies as bodies
-import gearfmu.stage.build.assembly as assembly
+import gearfmu.stage.assembly.assemble as assembly
 from gearfmu.kernel import instance
 
 SHIPPED = Path(__file__).resolve().parents[1] / "reduced_models"

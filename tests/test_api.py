@@ -17,7 +17,7 @@ import pytest
 
 import gearfmu as gf
 from gearfmu import cli
-from gearfmu.spec.proposals.new import new_stage
+from gearfmu.stagefile.proposals.new import new_stage
 
 SMALL = {"modes": 12, "roll_points": 8, "width_functions": 3, "mesh.scale": 0.4}
 ROOT = Path(__file__).resolve().parents[1]

@@ -12,8 +12,8 @@ import pytest
 from verbs import call, example
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[1]
 BASE_RADIUS = 0.5 * 4.5e-3 * 16 * 0.9396926207859084  # m, pinion of fzg_c

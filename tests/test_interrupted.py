@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from gearfmu.body import load_body
-from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
+from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
 
 GEARFMU = [sys.executable, "-m", "gearfmu.cli"]
 INTERRUPTED = "gearfmu: interrupted; files that were being written are as they were before"

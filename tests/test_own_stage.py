@@ -10,8 +10,8 @@ import pytest
 from verbs import call
 
 from gearfmu import cli
-from gearfmu.spec.proposals.coarse import coarse_stage
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
+from gearfmu.stagefile.proposals.coarse import coarse_stage
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto-own-stage.md"
 TINY = {"modes": 40, "roll_points": 8, "width_functions": 3, "flank": 6, "thickness": 2, "width": 2}

@@ -22,8 +22,8 @@ LARGER = {  # files that may be, up to 1.4 MB: tests/body/test_shipped.py
     "reduced_models/two_stage/pinion2.h5",
 }
 INSIDE = {  # sub-packages of a package in reading order; "" are its own files
-    "spec": ("reading", "tables", "forms", "scenes", "", "proposals"),
-    "stage": ("build", "run", ""),
+    "stagefile": ("reading", "tables", "forms", "", "proposals"),
+    "stage": ("assembly", "run", ""),
     "reduction": ("cyclic", "imported"),
 }
 KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
@@ -89,8 +89,8 @@ def test_imports_inside_a_package_point_upward_only() -> None:
 
 def test_every_way_to_write_an_import_is_seen() -> None:
     text = "from gearfmu import report\ndef f():\n    from ..stage import trace\nimport gearfmu.cli\nimport numpy"
-    assert imported(text, ["gearfmu", "spec"]) == {"gearfmu.report", "gearfmu.stage", "gearfmu.cli"}
-    assert ORDER["errors"] < ORDER["spec"] < ORDER["stage"] < ORDER["report"] < ORDER["cli"]
+    assert imported(text, ["gearfmu", "stagefile"]) == {"gearfmu.report", "gearfmu.stage", "gearfmu.cli"}
+    assert ORDER["errors"] < ORDER["stagefile"] < ORDER["stage"] < ORDER["report"] < ORDER["cli"]
 
 
 def functions(path: Path) -> list[tuple[str, int, int]]:

@@ -15,9 +15,9 @@ import pytest
 from evidence.fmu_probes.everything import findings
 from gearfmu.body import reduce_bodies
 from gearfmu.fmu import export
-from gearfmu.spec.proposals.new import new_stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, loaded_te
+from gearfmu.stagefile.proposals.new import new_stage
+from gearfmu.stagefile.stage import load_stage
 
 LOAD, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 STEP = 1e-4

@@ -13,7 +13,7 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.api.settings import Integrator, Level, RunSettings
-from gearfmu.stage.build.shown import LINES, WIDTH
+from gearfmu.stage.assembly.shown import LINES, WIDTH
 from gearfmu.stage.run.trace import TraceError
 
 matplotlib.use("Agg")

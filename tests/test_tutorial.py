@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
+from gearfmu.stagefile.stage import load_stage
 
 PAGE = Path(__file__).parents[1] / "docs" / "tutorial.md"
 

@@ -56,8 +56,8 @@ def stays(walk: list[str]) -> tuple[int, int]:
 def to_model(name: str) -> list[str]:
     """From stage.toml to its model, with stored bodies."""
     from gearfmu.body import load_bodies
-    from gearfmu.spec.stage import load_stage
     from gearfmu.stage import assemble
+    from gearfmu.stagefile.stage import load_stage
 
     def run() -> None:
         stage = load_stage(name)
@@ -71,7 +71,7 @@ def to_trace(name: str) -> list[str]:
     import tempfile
 
     from gearfmu.cosim import run
-    from gearfmu.spec.scene import load_scene
+    from gearfmu.scenefile.scene import load_scene
 
     with tempfile.TemporaryDirectory() as folder:
         return walked(lambda: run(load_scene(name, {"duration": 2e-3, "settle": 1e-3}), folder, "kernel"))
@@ -80,11 +80,11 @@ def to_trace(name: str) -> list[str]:
 def to_body() -> list[str]:
     """From the table of a gear to its body."""
     from gearfmu.body.bodies import make
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.stage import load_stage
 
     changes: dict[str, Any] = {f"gears.pinion.body.mesh.{field}": count for field, count in COARSE.items()}
     stage = load_stage("fzg_c", changes | {"gears.pinion.body.modes": 40})
-    return walked(lambda: make(stage.by_file["pinion"]), ("fem", "geometry", "spec", "ranges.py", "units.py"))
+    return walked(lambda: make(stage.by_file["pinion"]), ("fem", "geometry", "stagefile", "ranges.py", "units.py"))
 
 
 def signatures(word: str = "Any") -> int:
@@ -119,9 +119,9 @@ def rows() -> Iterator[tuple[str, str]]:
     for name in SCENES:
         yield f"scene.toml → trace, {name}", f"{len(set(to_trace(name)))} modules"
     yield "table → body, pinion of fzg_c", "{} modules, {} stays, {} returns".format(len(set(body)), *stays(body))
-    yield "forms of files below spec", "{} lines in {} files".format(*mentions(FORMS, "spec"))
+    yield "forms of files below spec", "{} lines in {} files".format(*mentions(FORMS, "stagefile"))
     yield "classes of reduced bodies", f"{mentions(BODIES)[0]}"
-    yield "places that ask for a drive by its class", "{} lines in {} files".format(*mentions(DRIVES, "spec"))
+    yield "places that ask for a drive by its class", "{} lines in {} files".format(*mentions(DRIVES, "scenefile"))
     yield "annotations with Any", f"{signatures()}"
     sizes = [len(path.read_text(encoding="utf-8").splitlines()) for path in PRODUCT.rglob("*.py")]
     yield (

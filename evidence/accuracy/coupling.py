@@ -32,7 +32,7 @@ from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text, written_whole
 from gearfmu.report.style import panels, styled
-from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[2]

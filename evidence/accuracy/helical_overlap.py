@@ -33,11 +33,11 @@ from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.report.style import panels, styled
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import GearSpec, MeshSpec
 from gearfmu.stage import assemble, loaded_te
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import GearSpec, MeshSpec
 
 OVERLAPS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 WIDTH = 28e-3  # m

@@ -30,7 +30,7 @@ from gearfmu.planning.judge import FAILED, error
 from gearfmu.planning.make import Job, PlanError, make
 from gearfmu.planning.request import Request, request
 from gearfmu.planning.trials import Task, Window, run_trial
-from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.study.table import read_rows, write_rows
 from gearfmu.sweeps.runners import in_this_process
 

@@ -26,8 +26,8 @@ import numpy as np
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.instance import Recording
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stagefile.stage import load_stage
 
 REFERENCE, SETTLED, WINDOW = 0.625e-6, 1.2e-3, 8.4e-3  # s
 HIGHEST = 10e3  # Hz

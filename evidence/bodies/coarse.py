@@ -23,8 +23,8 @@ import numpy as np
 from gearfmu.api.models import load, reduce
 from gearfmu.body import Body, current_bodies
 from gearfmu.files import written_whole
-from gearfmu.spec.proposals.coarse import coarse_stage
-from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
+from gearfmu.stagefile.proposals.coarse import coarse_stage
+from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
 
 TO = 20e3  # Hz
 PAIR = Wish((31, 73), 2.5e-3, 30e-3, center=141e-3, helix=math.radians(22), torque=180.0)

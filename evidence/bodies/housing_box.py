@@ -1,6 +1,6 @@
 """Mesh of the housing of two_stage: a closed box with a bore for every bearing, and four feet.
 
-    python evidence/bodies/housing_box.py [FILE]        # reduced_models/two_stage/housing.inp when none is named
+    python -m evidence.bodies.housing_box [FILE]      # reduced_models/two_stage/housing.inp when none is named
 
 A plane mesh of quadrilaterals across the shafts, drawn out along them: end walls take all of it, side walls its outer
 ring, bosses the rings round the bores. Millimetres; 8-node hexahedra, which the import makes quadratic.
@@ -9,13 +9,13 @@ ring, bosses the rings round the bores. Millimetres; 8-node hexahedra, which the
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-SHIPPED = Path(__file__).resolve().parents[2] / "reduced_models" / "two_stage" / "housing.inp"
+from evidence.bodies import deck
+
+Line = tuple[tuple[float, float, int], ...]
 LINES = (  # from, to, cells: the first and last are side walls
     ((-60, -50, 1), (-50, 50, 6), (50, 114, 4), (114, 156, 3), (156, 234, 5), (234, 290, 3), (290, 300, 1)),
     ((-90, -80, 1), (-80, -53, 2), (-53, 53, 6), (53, 63, 1), (63, 183, 7), (183, 240, 3), (240, 250, 1)),
@@ -32,7 +32,7 @@ class Bore:
     name: str
     axis: tuple[float, float]
     block: tuple[float, float, float, float]
-    radii: tuple[float, float]
+    radii: tuple[float, ...]
     bosses: tuple[tuple[int, int], tuple[int, int]]
     seats: tuple[tuple[int, int], tuple[int, int]]
 
@@ -45,27 +45,28 @@ BORES = (
 
 
 class Plane:
-    """Quadrilaterals across the shafts. points; quads (F, 4); ring: of the side walls; boss: number of the bore, −1."""
+    """Quadrilaterals across the shafts, of lines along x and y, with bores. points; quads (F, 4); ring: of the side
+    walls; boss: number of the bore, −1."""
 
-    def __init__(self) -> None:
+    def __init__(self, lines: tuple[Line, Line], bores: tuple[Bore, ...]) -> None:
         self.points: list[tuple[float, float]] = []
         self.quads: list[list[int]] = []
         self.ring: list[bool] = []
         self.boss: list[int] = []
         self._known: dict[tuple[float, float], int] = {}
-        x, y = (_line(parts) for parts in LINES)
+        x, y = (_line(parts) for parts in lines)
         for i in range(len(x) - 1):
             for j in range(len(y) - 1):
                 middle = 0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])
-                if not any(b.block[0] < middle[0] < b.block[1] and b.block[2] < middle[1] < b.block[3] for b in BORES):
+                if not any(b.block[0] < middle[0] < b.block[1] and b.block[2] < middle[1] < b.block[3] for b in bores):
                     corners = [(x[i], y[j]), (x[i + 1], y[j]), (x[i + 1], y[j + 1]), (x[i], y[j + 1])]
                     edge = i in (0, len(x) - 2) or j in (0, len(y) - 2)
                     self._add(corners, edge, -1)
-        for number, bore in enumerate(BORES):
+        for number, bore in enumerate(bores):
             self._rings(number, bore, x, y)
 
     def _rings(self, number: int, bore: Bore, x: np.ndarray, y: np.ndarray) -> None:
-        """Two rings between a block's edge and the bore: to the boss, and the boss."""
+        """Rings between a block's edge and the bore, by its radii: to the boss, and the boss."""
         low, high, bottom, top = bore.block
         across, along = x[(x >= low) & (x <= high)], y[(y >= bottom) & (y <= top)]
         edge = [(v, bottom) for v in across[:-1]] + [(high, v) for v in along[:-1]]
@@ -92,7 +93,7 @@ class Plane:
         return self._known[key]
 
 
-def _line(parts: tuple[tuple[float, float, int], ...]) -> np.ndarray:
+def _line(parts: Line) -> np.ndarray:
     return np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in parts] + [[parts[-1][1]]])
 
 
@@ -111,10 +112,7 @@ def hexahedra(plane: Plane) -> np.ndarray:
 
 def outside(cells: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Nodes of the outer surface: of boundary faces that neither a bore's surface nor the inside of the box has."""
-    faces = cells[:, [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]]
-    faces = faces.reshape(-1, 4)
-    _, index, number = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    faces = faces[index[number == 1]]
+    faces = deck.boundary(cells)
     x, y, z = (nodes[faces][..., k] for k in range(3))
     (left, right), (bottom, top) = ((parts[0][0], parts[-1][1]) for parts in LINES)
     flat = [np.ptp(x, axis=1) == 0, np.ptp(y, axis=1) == 0, np.ptp(z, axis=1) == 0]
@@ -146,26 +144,15 @@ def node_sets(plane: Plane, cells: np.ndarray, nodes: np.ndarray) -> dict[str, n
     return found | {"outside": skin}
 
 
-def deck() -> str:
+def text() -> str:
     """The mesh as an Abaqus deck."""
-    plane = Plane()
+    plane = Plane(LINES, BORES)
     cells = hexahedra(plane)
     flat = np.array(plane.points)
     nodes = np.vstack([np.column_stack([flat, np.full(len(flat), float(z))]) for z in LEVELS])
-    sets, used = node_sets(plane, cells, nodes), np.unique(cells)
-    number = np.zeros(len(nodes), int)
-    number[used] = np.arange(1, len(used) + 1)
-    lines = ["*HEADING", "housing of two_stage, millimetres (evidence/bodies/housing_box.py)", "*NODE"]
-    lines += [f"{number[n]},{nodes[n, 0]:.7g},{nodes[n, 1]:.7g},{nodes[n, 2]:.7g}" for n in used]
-    lines += ["*ELEMENT, TYPE=C3D8, ELSET=ALL"]
-    lines += [f"{k},{','.join(str(number[n]) for n in cell)}" for k, cell in enumerate(cells, start=1)]
-    for name, own in sets.items():
-        lines.append(f"*NSET, NSET={name.upper()}")
-        lines += [",".join(str(number[n]) for n in own[k : k + 16]) for k in range(0, len(own), 16)]
-    return "\n".join(lines) + "\n"
+    heading = "housing of two_stage, millimetres (evidence/bodies/housing_box.py)"
+    return deck.abaqus(heading, nodes, cells, node_sets(plane, cells, nodes))
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1]) if sys.argv[1:] else SHIPPED
-    target.write_text(deck(), encoding="utf-8")
-    print(f"{target}: {target.stat().st_size / 1e3:.0f} kB")
+    deck.write(text(), "two_stage")

@@ -26,8 +26,8 @@ from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_states, variant
 from gearfmu.body import load_bodies
 from gearfmu.errors import SimulationError
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import write_columns
+from gearfmu.stagefile.stage import load_stage
 
 STEPS = (5e-6, 7.5e-6, 10e-6)
 SLICES = (1, 5, 10)

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.tables.gear import Bearing, GearSpec
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.fields import GEAR_NUMBERS, change_gear
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.fields import GEAR_NUMBERS, change_gear
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.gear import Bearing, GearSpec
+from gearfmu.stagefile.tables.ports import PortSpec
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from evidence.energy.light import STEP, LightRattle, run, statistics
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.trace import write_columns
+from gearfmu.stagefile.stage import load_stage
 
 SCENES = {"one flank": LightRattle(), "both flanks": LightRattle(torque=9.0, swing=4e-3)}
 CONVERGED = STEP / 64

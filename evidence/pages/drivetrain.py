@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import get_args
 
-from gearfmu.spec.reading.base import Quantity, Spec
-from gearfmu.spec.scene import load_scene, shipped_scenes
-from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
-from gearfmu.spec.scenes.parts import ClutchPart, Drivetrain, InertiaPart, PortShaft, ShaftPart, TorquePart
-from gearfmu.spec.scenes.shaft_loads import ShaftLoad
+from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.parts import ClutchPart, Drivetrain, InertiaPart, PortShaft, ShaftPart, TorquePart
+from gearfmu.scenefile.scene import load_scene, shipped_scenes
+from gearfmu.scenefile.shaft_loads import ShaftLoad
+from gearfmu.stagefile.reading.base import Quantity, Spec
 
 INTRODUCTION = """# Drivetrains and scenes
 

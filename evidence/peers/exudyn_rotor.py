@@ -36,12 +36,12 @@ from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
-from gearfmu.stage.build.ground_part import GroundPart
-from gearfmu.stage.build.groups import Layout, Support, mount
-from gearfmu.stage.build.spinning import body_spinning, turn_rates
-from gearfmu.stage.build.whirls import whirl_rows
+from gearfmu.stage.assembly.ground_part import GroundPart
+from gearfmu.stage.assembly.groups import Layout, Support, mount
+from gearfmu.stage.assembly.spinning import body_spinning, turn_rates
+from gearfmu.stage.assembly.whirls import whirl_rows
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 COARSE = MeshSpec(flank=2, thickness=1, root=2, rim=1, width=2)
 MODES, SPEEDS, STEPS = 18, (300.0, 600.0, 1200.0), (1e-6, 5e-7, 2.5e-7)

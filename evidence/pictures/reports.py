@@ -1,6 +1,6 @@
 """Pictures of the README and docs from runs (its chart of error against time: evidence/study/cost_chart.py).
 
-    python -m evidence.pictures.reports FOLDER_OF_DEMO [FOLDER_OF_SET [COMPARISON [FOLDER_OF_HOUSED_RUN_UP]]]
+    python -m evidence.pictures.reports DEMO SET COMPARISON HOUSED_RUN_UP HOUSED_SET    # reports or their folders
 
 Needs Chromium.
 """
@@ -35,8 +35,8 @@ def shot(page: Path, name: str, size: tuple[int, int], element: str | None = Non
         return None
 
 
-def main(demo: Path, planets: Path | None = None, comparison: Path | None = None, housed: Path | None = None) -> None:
-    """Every picture that the given runs allow."""
+def main(demo: Path, planets: Path, comparison: Path, housed: Path, housed_set: Path) -> None:
+    """Every picture of the given runs."""
     shot(demo / "report.html", "report", WIDE)
     shot(demo / "report.html", "report_420", NARROW)
     shot(demo / "report.html", "report_mesh", WIDE, "#mesh")
@@ -44,13 +44,11 @@ def main(demo: Path, planets: Path | None = None, comparison: Path | None = None
     shot(
         demo / "report.html", "deformed_pair", WIDE, "#stage figure canvas", "document.querySelector('.closer').click()"
     )
-    if planets is not None:
-        shot(planets / "report.html", "report_set", WIDE)
-    if comparison is not None:
-        shot(comparison, "report_comparison", (1200, 1300))
-    if housed is not None:
-        shot(housed / "report.html", "housed_stage", WIDE, "#stage")
-        shot(housed / "report.html", "sound_waterfall", WIDE, "#housing_waterfall")
+    shot(planets / "report.html", "report_set", WIDE)
+    shot(comparison, "report_comparison", (1200, 1300))
+    shot(housed / "report.html", "housed_stage", WIDE, "#stage")
+    shot(housed / "report.html", "sound_waterfall", WIDE, "#housing_waterfall")
+    shot(housed_set / "report.html", "housed_set", WIDE, "#stage")
 
 
 if __name__ == "__main__":

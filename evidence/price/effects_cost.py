@@ -28,11 +28,11 @@ from unittest.mock import patch
 from gearfmu.body import load_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel import build
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import Eccentricity, ProfileSpec
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "gearfmu" / "stage" / COSTS

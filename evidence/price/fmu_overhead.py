@@ -21,9 +21,9 @@ from fmpy import read_model_description
 from gearfmu.body import load_body
 from gearfmu.fmu import export
 from gearfmu.kernel.build import compile_program
-from gearfmu.spec.reading.files import model_folder
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
+from gearfmu.stagefile.reading.files import model_folder
+from gearfmu.stagefile.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
 STAGE, STEPS, REPEATS = "fzg_c/stage_relief", 20000, 3

@@ -30,7 +30,7 @@ from gearfmu.cosim.ports import KEYS
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.recorder import DRIVE, Recorder
 from gearfmu.cosim.scene_run import drive_of, stage_model
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 
 FILE = Path(__file__).with_suffix(".csv")
 STEPS, STEP, BLOCK = 2000, 1e-4, 100

@@ -25,9 +25,9 @@ from evidence.price.steps import SET_START, SET_TORQUES
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stagefile.stage import load_stage
 
 STEP, BLOCK, BLOCKS = 1e-4, 10, 50
 PAIRS = 2  # tooth pairs within reach, nearly always

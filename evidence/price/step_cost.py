@@ -60,8 +60,8 @@ def stored_bodies(spec: Any) -> Any:
 def write(folder: Path, case: Case) -> None:
     """Blob, library and arguments of the host program, by the package that this process imports."""
     from gearfmu.kernel.build import build_library
-    from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
+    from gearfmu.stagefile.stage import load_stage
 
     build_library()  # where this package looks for it
     build_library(out=folder / "kernel.so")
@@ -78,8 +78,8 @@ def write(folder: Path, case: Case) -> None:
 def least(folder: Path, case: Case) -> float:
     """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
     from gearfmu.kernel import Kernel
-    from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
+    from gearfmu.stagefile.stage import load_stage
 
     spec = load_stage(case.stage)
     model = assemble(spec, stored_bodies(spec))

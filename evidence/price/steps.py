@@ -21,8 +21,8 @@ from pathlib import Path
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stagefile.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_suffix(".csv")

@@ -18,7 +18,7 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.kernel import Kernel
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel
 
 PROBE = 1e-3  # s

@@ -16,9 +16,9 @@ from evidence.stability.motion import Constant, Step, UpAndDown
 from evidence.stability.of_pairs import turns_of
 from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, PlanetSet, shares, sun_torque
 from evidence.stability.record import Record, Watched
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import ChainSpec, PortSpec
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import ChainSpec, PortSpec
 
 EFFECTS = (
     "residual", "hertz", "coast_flank", "contact_damping", "tip_relief", "tip_contact", "bearings", "modal_damping",

@@ -15,13 +15,13 @@ from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
-from gearfmu.spec.tables.lead import LeadSpec
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
+from gearfmu.stagefile.tables.lead import LeadSpec
+from gearfmu.stagefile.tables.ports import PortSpec
 
 RELIEVED, PLAIN = "fzg_c/stage_relief", "fzg_c"
 SHAFTS = ("pinion", "wheel")

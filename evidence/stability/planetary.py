@@ -17,14 +17,14 @@ from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import Body, load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import RingSpec
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import RingSpec
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.ports import PortSpec
 
 SET = "planetary54"
 PLANETS, SHAFTS = 4, ("carrier", "sun")

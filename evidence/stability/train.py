@@ -12,9 +12,9 @@ from evidence.stability.bench import Bench, at
 from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
 
 TRAIN = "two_stage"
 PORT_OF = {"stage1": ("input", 0), "stage2": ("output", 1)}  # port that shares a shaft with gear A (0) or B (1)

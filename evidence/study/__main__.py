@@ -18,9 +18,9 @@ from evidence.study.tidy import tidy
 from gearfmu.commands.models import bodies_for_motion
 from gearfmu.commands.shared import progress_bar
 from gearfmu.report.study import write_chart
-from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.stage.assembly.levels import LEVELS
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.ladder import window
 from gearfmu.study.table import read_rows, write_rows
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.kernel.linear import LinearModel
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.stage.build.assembly import assemble
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.assemble import assemble
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
 
 POSITIONS = 16  # of one pitch
 

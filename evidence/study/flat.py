@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearfmu.stage.build.assembly import MODEL_VERSION
-from gearfmu.stage.build.blob import write_blob
-from gearfmu.stage.build.compact import residual_sections
-from gearfmu.stage.build.fields import gear_numbers, order_sections
-from gearfmu.stage.build.teeth import OFFSETS
+from gearfmu.stage.assembly.assemble import MODEL_VERSION
+from gearfmu.stage.assembly.blob import write_blob
+from gearfmu.stage.assembly.compact import residual_sections
+from gearfmu.stage.assembly.fields import gear_numbers, order_sections
+from gearfmu.stage.assembly.teeth import OFFSETS
 
 GRID = 4  # rolls of the tables: all equal
 OWN = 3

@@ -16,9 +16,9 @@ import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage.run.trace import write_columns
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study import Job, Row, default_rows
 from gearfmu.study.norm import Signals
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import Errors, errors
 

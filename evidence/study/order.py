@@ -11,8 +11,8 @@ import numpy as np
 
 from evidence.study.flat import FlatPair, contact_frequencies, exact_force
 from gearfmu.kernel import Kernel
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.bench import Point, measure, models_for
 from gearfmu.study.ladder import fitting
 from gearfmu.study.norm import errors

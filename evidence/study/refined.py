@@ -17,11 +17,11 @@ from evidence.study.dashpot import same_loss
 from gearfmu.body import load_bodies, reduce_body
 from gearfmu.report.study import QUANTITIES
 from gearfmu.report.style import panels, saved, styled
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.teeth import ROLLS
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stage.assembly.teeth import ROLLS
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
 

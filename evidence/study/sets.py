@@ -20,12 +20,12 @@ from gearfmu.body import load_bodies, reduce_body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.bench import Point, Replay, Run, measure, models_for, replayed_price
 from gearfmu.study.ladder import fitting, window
 from gearfmu.study.norm import Errors, Signals, errors

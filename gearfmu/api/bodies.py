@@ -21,9 +21,9 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import gear_full_order, ring_full_order
 from gearfmu.reduction.transfer import LINES
 from gearfmu.reduction.transfer import Judging as Lines
-from gearfmu.spec.forms.general import GearBody, Stage
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.forms.general import GearBody, Stage
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.tables.housing import HousingBody
 
 PAPER = ("modal", "craig_bampton", "rubin", "krylov")  # the methods of the paper
 SIZE, DAMPING = 120, 0.01

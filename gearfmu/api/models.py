@@ -10,15 +10,15 @@ from typing import Protocol, TypeAlias
 
 from gearfmu.body import Body, body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.expand import with_bores, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.files import Changes, model_folder
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.scene import load_scene as load_scene_file
-from gearfmu.spec.stage import load_stage as load_stage_file
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.scenefile.scene import load_scene as load_scene_file
 from gearfmu.stage import StageModel
 from gearfmu.stage import assemble as assemble_model
+from gearfmu.stagefile.forms.expand import with_bores, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.reading.files import Changes, model_folder
+from gearfmu.stagefile.stage import load_stage as load_stage_file
+from gearfmu.stagefile.tables.ports import PortSpec
 
 BORES = ("averaging", "rigid")
 PORT_KINDS = ("spring", "torque", "fixed")

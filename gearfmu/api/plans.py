@@ -15,7 +15,7 @@ from gearfmu.planning.book import Plan, keep_plan, kept_plan
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
 from gearfmu.planning.run import run_planned
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import Trace
 from gearfmu.sweeps.plan import plan as points_of
 from gearfmu.sweeps.run import sweep as run_sweep

@@ -23,12 +23,12 @@ from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import Extras
 from gearfmu.report import write
 from gearfmu.report.run import Run
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.exchange import convert as convert_trace
 from gearfmu.stage.run.simulate import wound_starts, write_starts
 from gearfmu.stage.run.steady import parameters
+from gearfmu.stagefile.forms.general import Stage
 
 
 def export(

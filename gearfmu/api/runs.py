@@ -12,13 +12,13 @@ from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, model_of, reduce
 from gearfmu.api.settings import Quantity, RunSettings, Settings, checked, in_si
 from gearfmu.cosim.scene_run import Staged
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.tables.profile import Profile, read_profile
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
 from gearfmu.stage.run.simulate import Inputs
 from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.profile import Profile, read_profile
 
 
 def te(
@@ -69,7 +69,7 @@ def simulate(
     settle : from here on the report takes results and spectra.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
     profile : among the keyword arguments, torque, speed or both over time in place of the arguments: a CSV file with a
-        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.tables.profile.Profile` of arrays in SI.
+        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.stagefile.tables.profile.Profile` of arrays in SI.
 
     The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
     setting, SpecError for a port that this cannot turn, for a profile that cannot be used and for a torque or a speed

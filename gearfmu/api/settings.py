@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
 from gearfmu.ranges import in_range, range_of
-from gearfmu.spec.scene import Level
-from gearfmu.spec.tables.profile import Profile
+from gearfmu.scenefile.scene import Level
+from gearfmu.stagefile.tables.profile import Profile
 from gearfmu.units import to_si
 
 Quantity: TypeAlias = str | float  # "302 N*m", or the SI number

@@ -18,10 +18,10 @@ from gearfmu.modes.housing import Placed, placed_housing
 from gearfmu.modes.paths import TransferPaths, paths_of
 from gearfmu.modes.rings import stage_rings
 from gearfmu.sound import Radiation, SoundError, SoundPower
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.observed import MODE, MOTION
+from gearfmu.stage.assembly.observed import MODE, MOTION
 from gearfmu.stage.run.sound import MOTIONS, Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.forms.general import Stage
 
 HIGHEST = 10e3  # Hz, of the housing's motion; less where the run's step does not resolve it
 UNITS = ("m", "m", "m", "rad", "rad", "rad")

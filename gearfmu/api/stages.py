@@ -15,14 +15,14 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.modes.bodies import body_modes, gear_modes
 from gearfmu.modes.linear import StageModes, stage_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.proposals.new import new_stage
-from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
 from gearfmu.stage.effects import EFFECTS, Effect
 from gearfmu.stage.run.bearings import Bearings, stage_bearings
 from gearfmu.stage.run.efficiency import Efficiency, mesh_efficiency
 from gearfmu.stage.run.limits import largest_torque
 from gearfmu.stage.run.steady import parameters
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.proposals.new import new_stage
+from gearfmu.stagefile.proposals.numbers import new_from_numbers, wish_of
 
 _UNITS = {"module": "m", "width": "m", "center": "m", "helix": "rad", "pressure_angle": "rad", "torque": "N*m",
           "speed": "rad/s", "relief": "m"}  # fmt: skip

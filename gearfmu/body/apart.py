@@ -21,7 +21,7 @@ from typing import Any
 
 from gearfmu.errors import BodyError
 from gearfmu.reduction.memory import Need, available_memory
-from gearfmu.spec.forms.general import Stage
+from gearfmu.stagefile.forms.general import Stage
 
 Progress = Callable[[str, float], None]
 Job = tuple[Stage, str, Path]  # a stage, the name of the gear, the file of its body

@@ -17,8 +17,8 @@ from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
 from gearfmu.reduction.display import Picture
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.spec.forms.body import ALGORITHMS, body_hash
-from gearfmu.spec.forms.general import Reduced
+from gearfmu.stagefile.forms.body import ALGORITHMS, body_hash
+from gearfmu.stagefile.forms.general import Reduced
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 _FORMER = {  # names of earlier versions, told by the AttributeError

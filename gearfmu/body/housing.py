@@ -13,7 +13,7 @@ from gearfmu.reduction.basis import Size
 from gearfmu.reduction.imported.housing import ImportedHousing, imported_housing
 from gearfmu.reduction.imported.superelement import superelement
 from gearfmu.reduction.transfer import Judging
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.tables.housing import HousingBody
 
 Progress = Callable[[str, float], None]
 LINES = 60  # at which the error is measured

@@ -39,10 +39,10 @@ from gearfmu.reduction.imported.gear import (
 from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.imported.whole import Held, imported_gear_order
-from gearfmu.spec.forms.general import RingBody, ToothedBody
-from gearfmu.spec.forms.planetary import CarrierBody, MountsSpec
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
+from gearfmu.stagefile.forms.general import RingBody, ToothedBody
+from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 
 def check_gear(gear: ToothedBody) -> CheckedGear:

@@ -20,7 +20,7 @@ from gearfmu.reduction.cyclic.modal import Modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
 from gearfmu.reduction.display import Outline, Picture, Shapes, unfold_sectors, whole_surface
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 _PICTURE_LOADS = 5

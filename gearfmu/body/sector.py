@@ -6,10 +6,10 @@ from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.tables.housing import HousingBody
 
 
 def body_sector(stage: Stage, name: str, scale: float = 1.0) -> FeMesh:

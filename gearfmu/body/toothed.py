@@ -33,8 +33,8 @@ from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.reduction.display import outline
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
-from gearfmu.spec.forms.general import ToothedBody
-from gearfmu.spec.forms.shapes import GearShape, gear_shape
+from gearfmu.stagefile.forms.general import ToothedBody
+from gearfmu.stagefile.forms.shapes import GearShape, gear_shape
 
 ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`

@@ -25,8 +25,8 @@ from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import static_response
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.forms.shapes import carrier_geometry
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import carrier_geometry
 
 Progress = Callable[[str, float], None]
 

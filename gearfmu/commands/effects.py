@@ -11,9 +11,9 @@ import click
 from gearfmu.commands.shared import stage_names
 
 if TYPE_CHECKING:
-    from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
     from gearfmu.stage import StageModel
     from gearfmu.stage.effects import Cost
+    from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
 
 FIELDS = ("formula", "matters", "off", "switch", "code")
 
@@ -51,9 +51,9 @@ def _numbers(stage: str) -> dict[str, str]:
     """Data of a stage for each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape
-    from gearfmu.stage.build.flanks import FlankField
+    from gearfmu.stage.assembly.flanks import FlankField
     from gearfmu.stage.effects import torque_on_flanks_alone
+    from gearfmu.stagefile.forms.shapes import face_width, gear_shape, mesh_shape
 
     model = model_of(stage)
     spec = model.stage
@@ -114,7 +114,7 @@ def _film(stage: Stage, mesh: EngagementSpec) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
-    from gearfmu.stage.build.meshes import REACH, film_stop
+    from gearfmu.stage.assembly.meshes import REACH, film_stop
 
     return f"takes {1e3 * film_stop(stage, mesh):.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
@@ -135,7 +135,7 @@ def _whirling(model: StageModel) -> str:
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of neglected terms, a line for every gear whose file has them."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.stage.build.observed import gear_bodies
+    from gearfmu.stage.assembly.observed import gear_bodies
     from gearfmu.stage.run.inertia import inertia_terms
 
     spec, bodies = bodies_of(stage)

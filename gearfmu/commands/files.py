@@ -11,7 +11,7 @@ import click
 from gearfmu.commands.shared import echo_pairs
 
 if TYPE_CHECKING:
-    from gearfmu.spec.forms.general import Stage
+    from gearfmu.stagefile.forms.general import Stage
 
 UNITS = {
     "r_b": "m", "r_f": "m", "r_a": "m", "base_pitch": "m", "ring_least_tip_radius": "m", "gap_between_planets": "m",
@@ -47,8 +47,8 @@ def schema(kind: str, out: Path | None) -> None:
 
 
 def _schema_text(kind: str) -> str:
-    from gearfmu.spec.scene import SceneSpec
-    from gearfmu.spec.schema import file_schema, general_schema, set_schema, stage_schema
+    from gearfmu.scenefile.scene import SceneSpec
+    from gearfmu.stagefile.schema import file_schema, general_schema, set_schema, stage_schema
 
     made = {
         "stage": stage_schema,
@@ -77,8 +77,8 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 def _shipped(name: Path) -> Path:
     """File of a shipped scene, or of a stage as `find_stage` finds it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
-    from gearfmu.spec.reading.files import find_stage, shipped_stages
-    from gearfmu.spec.scene import SHIPPED, shipped_scenes
+    from gearfmu.scenefile.scene import SHIPPED, shipped_scenes
+    from gearfmu.stagefile.reading.files import find_stage, shipped_stages
 
     scenes = shipped_scenes()
     if str(name) in scenes:
@@ -134,10 +134,10 @@ def _deformation(path: Path) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    from gearfmu.spec.forms.derived import derived
-    from gearfmu.spec.reading.base import read_toml
-    from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.scenefile.scene import load_scene
+    from gearfmu.stagefile.forms.derived import derived
+    from gearfmu.stagefile.reading.base import read_toml
+    from gearfmu.stagefile.stage import load_stage
 
     if path.is_file() and "coupling" in read_toml(path):
         return {"file": str(path), "kind": "scene", **load_scene(path).model_dump(mode="json")}
@@ -167,9 +167,9 @@ def _needs(stage: Stage) -> str | dict[str, dict[str, float]]:
 
 
 def _toml_with_units(path: Path) -> dict[str, Any]:
-    from gearfmu.spec.reading.shown import shown
-    from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.scenefile.scene import load_scene
+    from gearfmu.stagefile.reading.shown import shown
+    from gearfmu.stagefile.stage import load_stage
 
     found = _toml(path)
     spec = load_scene(path) if found["kind"] == "scene" else load_stage(path).written

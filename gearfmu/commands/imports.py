@@ -10,7 +10,7 @@ import click
 from gearfmu.commands.shared import Quantity, echo_pairs, stage_names
 
 if TYPE_CHECKING:
-    from gearfmu.spec.forms.general import Stage
+    from gearfmu.stagefile.forms.general import Stage
 
 
 @click.command(name="import")
@@ -34,7 +34,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.stage import load_stage
 
     spec = load_stage(stage)
     names = spec.files
@@ -48,9 +48,9 @@ def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> di
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported.carrier import imported_carrier
-    from gearfmu.spec.forms.general import GearBody, RingBody
-    from gearfmu.spec.forms.planetary import CarrierBody
-    from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
+    from gearfmu.stagefile.forms.general import GearBody, RingBody
+    from gearfmu.stagefile.forms.planetary import CarrierBody
+    from gearfmu.stagefile.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     table = spec.by_file[name]
     if isinstance(table, CarrierBody):

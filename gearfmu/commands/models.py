@@ -12,8 +12,8 @@ from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
     from gearfmu.body import Body
-    from gearfmu.spec.forms.general import Stage
     from gearfmu.stage import StageModel
+    from gearfmu.stagefile.forms.general import Stage
 
 
 def model_of(

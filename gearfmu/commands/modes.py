@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gearfmu.modes.linear import StageModes
     from gearfmu.modes.shapes import BodyModes
     from gearfmu.report.campbell import Crossing
-    from gearfmu.spec.forms.general import Stage
+    from gearfmu.stagefile.forms.general import Stage
 
 
 COUPLED = (
@@ -141,8 +141,8 @@ def table(body: BodyModes) -> list[str]:
 
 def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
     """how: the ring on its mounts, the carrier without couplings."""
-    from gearfmu.spec.forms.expand import CARRIER
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.forms.expand import CARRIER
+    from gearfmu.stagefile.stage import load_stage
 
     spec, (mounted, uncoupled) = load_stage(stage), how
     of_set = bool(spec.carriers)

@@ -73,7 +73,7 @@ class _Teeth(click.ParamType):
 def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: object) -> int:
     """Write NAME/stage.toml, every field commented: from numbers of teeth, module and face width with everything else
     proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
-    from gearfmu.spec.proposals.new import new_stage
+    from gearfmu.stagefile.proposals.new import new_stage
 
     given = {key: value for key, value in numbers.items() if value not in (None, False, ())}
     forms = [word for word, there in (("--like", like), ("--rexs", rexs), ("--teeth", given)) if there]
@@ -90,9 +90,9 @@ def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: o
 
 def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
     """The stage file of teeth, module and width, and the shape that it proposes."""
-    from gearfmu.spec.forms.shapes import centre_distance
-    from gearfmu.spec.proposals.numbers import new_from_numbers, wish_of
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.forms.shapes import centre_distance
+    from gearfmu.stagefile.proposals.numbers import new_from_numbers, wish_of
+    from gearfmu.stagefile.stage import load_stage
 
     path = new_from_numbers(name, wish_of(given))
     stage = load_stage(path)
@@ -118,8 +118,8 @@ def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
     """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
     from gearfmu.errors import SpecError
     from gearfmu.rexs import draft_from_rexs
-    from gearfmu.spec.proposals.new import write_drafted
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.proposals.new import write_drafted
+    from gearfmu.stagefile.stage import load_stage
 
     draft = draft_from_rexs(rexs, stage)
     path = write_drafted(name, draft.tables, draft.marks, f"read from the REXS file {rexs.name}")

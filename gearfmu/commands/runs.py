@@ -13,10 +13,10 @@ from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_
 
 if TYPE_CHECKING:
     from gearfmu.body import Body
-    from gearfmu.spec.forms.general import Stage
-    from gearfmu.spec.scene import SceneSpec
+    from gearfmu.scenefile.scene import SceneSpec
     from gearfmu.stage import Trace
     from gearfmu.stage.run.deformation import Deformation
+    from gearfmu.stagefile.forms.general import Stage
 
 DEMO_STEP = 20e-6  # s
 OUT = click.Path(path_type=Path, file_okay=False)
@@ -26,7 +26,7 @@ def _list(context: click.Context, option: object, wanted: bool) -> None:
     """Print the shipped scenes with their descriptions, and end."""
     if not wanted or context.resilient_parsing:
         return
-    from gearfmu.spec.scene import load_scene, shipped_scenes
+    from gearfmu.scenefile.scene import load_scene, shipped_scenes
 
     names = shipped_scenes()
     for name in names:
@@ -125,8 +125,8 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque."""
     from gearfmu.commands.models import model_of, parameters
-    from gearfmu.spec.tables.profile import read_profile
     from gearfmu.stage.run.steady import LoadCase, steady_run
+    from gearfmu.stagefile.tables.profile import read_profile
 
     level = drive.pop("level")
     settings = (*settings, f"level={level}") if level else settings
@@ -147,7 +147,7 @@ def demo(out: Path) -> int:
 
     It is `gearfmu run clutch_closure --step "20 us"`: so finely sampled its spectra are right up to 16 kHz.
     """
-    from gearfmu.spec.scene import load_scene
+    from gearfmu.scenefile.scene import load_scene
 
     return run_scene(with_step(load_scene("clutch_closure"), DEMO_STEP), out, unit="fmu")
 
@@ -195,7 +195,7 @@ def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -
 
 def changed_scene(scene: str, step: float | None = None, **others: object) -> SceneSpec:
     """The SceneSpec of SCENE with another communication step (s), torque, speed, level or stage where one is given."""
-    from gearfmu.spec.scene import load_scene
+    from gearfmu.scenefile.scene import load_scene
 
     keys = {"level": "stage.level", "stage": "stage.name"}
     changes = {keys.get(key, key): value for key, value in others.items() if value is not None}
@@ -271,8 +271,8 @@ def write_deformed(deformation: Deformation, folder: Path, spec: Stage, reduced:
     bodies."""
     from gearfmu.modes.deformed import deformed_gear
     from gearfmu.modes.vtu import write_series
-    from gearfmu.stage.build.meshes import tooth_phases
-    from gearfmu.stage.build.observed import gear_bodies
+    from gearfmu.stage.assembly.meshes import tooth_phases
+    from gearfmu.stage.assembly.observed import gear_bodies
 
     bodies = gear_bodies(spec, reduced)
     phases = tooth_phases(spec)

@@ -57,14 +57,14 @@ def level_option(command: Callable[..., object]) -> Callable[..., object]:
 
 def stage_names(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
     """Shipped stages that begin so, for the completion of shells; files where there is none."""
-    from gearfmu.spec.reading.files import shipped_stages
+    from gearfmu.stagefile.reading.files import shipped_stages
 
     return _completed(shipped_stages(), begun)
 
 
 def scene_names(_: click.Context, __: click.Parameter, begun: str) -> list[CompletionItem]:
     """As `stage_names` for scenes."""
-    from gearfmu.spec.scene import shipped_scenes
+    from gearfmu.scenefile.scene import shipped_scenes
 
     return _completed(shipped_scenes(), begun)
 

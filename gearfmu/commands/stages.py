@@ -30,9 +30,9 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
-    from gearfmu.spec.forms.general import GearBody, RingBody
-    from gearfmu.spec.forms.shapes import gear_shape
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.forms.general import GearBody, RingBody
+    from gearfmu.stagefile.forms.shapes import gear_shape
+    from gearfmu.stagefile.stage import load_stage
 
     spec = load_stage(stage)
     for name in _chosen(spec.files, only):
@@ -67,8 +67,8 @@ def reduce(stage: str, out: Path | None, force: bool, coarse: bool) -> None:
     import time
 
     from gearfmu.body import current_bodies, reduce_bodies
-    from gearfmu.spec.proposals.coarse import STATED_ERROR, coarse_stage
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.stagefile.proposals.coarse import STATED_ERROR, coarse_stage
+    from gearfmu.stagefile.stage import load_stage
 
     if coarse:
         stage, out = str(coarse_stage(stage, out)), None

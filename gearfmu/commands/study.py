@@ -11,7 +11,7 @@ import click
 from gearfmu.commands.shared import progress_bar
 
 if TYPE_CHECKING:
-    from gearfmu.spec.scene import SceneSpec
+    from gearfmu.scenefile.scene import SceneSpec
     from gearfmu.study import Row
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
@@ -30,7 +30,7 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE over the internal step and the slices."""
     from gearfmu.commands.models import bodies_for_motion
-    from gearfmu.spec.scene import load_scene
+    from gearfmu.scenefile.scene import load_scene
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):

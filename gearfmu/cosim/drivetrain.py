@@ -12,10 +12,10 @@ from collections.abc import Callable, Mapping
 from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.signals import Constant, Ramp, Signal
-from gearfmu.spec.forms.turning import Shafts
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
-from gearfmu.spec.tables.ports import ChainSpec, PortSpec
+from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stagefile.forms.turning import Shafts
+from gearfmu.stagefile.tables.ports import ChainSpec, PortSpec
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens

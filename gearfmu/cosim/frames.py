@@ -9,9 +9,9 @@ import numpy as np
 
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage.build.groups import MOTIONS
-from gearfmu.stage.build.observed import MODE, MOTION
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stage.assembly.groups import MOTIONS
+from gearfmu.stage.assembly.observed import MODE, MOTION
 from gearfmu.stage.run.deformation import Deformation, GearMotion
 
 

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator, Mapping
 from gearfmu.cosim.drive import Drive
 from gearfmu.errors import Problem, SpecError
 from gearfmu.fmu.opened import OpenedFmu
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": "kg*m^2"}
 UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}

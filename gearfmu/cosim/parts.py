@@ -22,11 +22,11 @@ from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spri
 from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import rolling, solved, undriven
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.scenes.parts import GROUND, Drivetrain
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.parts import GROUND, Drivetrain
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import rolling, solved, undriven
+from gearfmu.stagefile.tables.ports import PortSpec
 
 SAME = 1e-9  # relative to the largest speed: speeds that do not differ
 SMALL = 1e-9  # N·m: torques that are none

@@ -28,15 +28,15 @@ from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import require_driven, shafts_of
-from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.observed import gear_hashes
+from gearfmu.stage.assembly.observed import gear_hashes
 from gearfmu.stage.run.deformation import FILE_NAME
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import require_driven, shafts_of
+from gearfmu.stagefile.stage import load_stage
 
 WHOLE = Wiring()
 

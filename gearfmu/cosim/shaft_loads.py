@@ -25,11 +25,11 @@ from gearfmu.cosim.drive import Drive, Loads, frequencies_of
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import CouplingError, Problem, SpecError
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import turns, undriven
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.scenes.shaft_loads import ShaftLoad
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.scenefile.shaft_loads import ShaftLoad
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import turns, undriven
+from gearfmu.stagefile.tables.ports import PortSpec
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on

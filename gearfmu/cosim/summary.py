@@ -12,9 +12,9 @@ from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.kernel.binding import status_words
-from gearfmu.spec.forms.turning import meshings
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage.build.model import integrator_of
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stage.assembly.model import integrator_of
+from gearfmu.stagefile.forms.turning import meshings
 
 TORQUES = (
     "{}.shaft.tau",

@@ -31,7 +31,7 @@ from gearfmu.femesh.lattice import (
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.geometry.planetary import CarrierGeometry
-from gearfmu.spec.forms.planetary import CarrierMeshSpec
+from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 
 _CORE = 0.55  # reach of the core in parts of the bolt's radius
 _OUTWARD, _INWARD = math.radians(52), math.radians(128)  # the two rays, seen from the bolt's axis

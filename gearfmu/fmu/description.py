@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 from gearfmu.fmu.units import DISPLAY, base_exponents, unit_of
 from gearfmu.kernel import Variable
 from gearfmu.kernel.instance import INSTANCES
-from gearfmu.spec.forms.general import Stage
+from gearfmu.stagefile.forms.general import Stage
 
 OF_SUPPORT, OF_MODE = (13, 14, 15), 2**24  # numbers of the table; where references of amplitudes begin
 AXES = {"x": "along x", "y": "along y", "z": "along z", "rx": "about x", "ry": "about y", "rz": "about z"}

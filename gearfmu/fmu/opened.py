@@ -11,11 +11,11 @@ from pathlib import Path
 from gearfmu.body import Body, body_hashes, load_bodies
 from gearfmu.errors import BodyError, FmuError, ModelError, Problem, SpecError
 from gearfmu.fmu.stage_file import EXPORT_AGAIN, MODEL_FILE, STAGE_FILE, read_stage_file, refused
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stored import differences, restored, stored_files
-from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.build.observed import MOTION
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stage.assembly.observed import MOTION
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stored import differences, restored, stored_files
 
 MOST_SHOWN = 5  # differences
 

@@ -25,8 +25,8 @@ from gearfmu.fmu.documentation import licences, page
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import FLAGS, HERE, SUFFIX, BuildError, fmi_headers, host_platform, library_path, sources
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stagefile.forms.general import Stage
 
 FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 SYSTEM_HEADERS = "errno float math stdarg stddef stdint stdio stdlib string".split()  # all that the sources include

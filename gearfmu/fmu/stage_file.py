@@ -11,8 +11,8 @@ import json
 from typing import Any
 
 from gearfmu.errors import FmuError, Problem, SpecError
-from gearfmu.spec.stored import stored, stored_files
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stagefile.stored import stored, stored_files
 
 MODEL_FILE = "resources/model.gkb"
 STAGE_FILE = "resources/stage.json"

@@ -16,11 +16,11 @@ from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order, evenly_spaced, scaled_sector
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
-from gearfmu.spec.forms.expand import CARRIER
-from gearfmu.spec.forms.general import RingBody, Stage, ToothedBody
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.forms.shapes import carrier_geometry
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.forms.expand import CARRIER
+from gearfmu.stagefile.forms.general import RingBody, Stage, ToothedBody
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import carrier_geometry
+from gearfmu.stagefile.tables.housing import HousingBody
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 

@@ -10,9 +10,9 @@ import numpy as np
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.modes.housed import Housing
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.assembly import layout_of
-from gearfmu.stage.build.groups import FORCES
+from gearfmu.stage.assembly.assemble import layout_of
+from gearfmu.stage.assembly.groups import FORCES
+from gearfmu.stagefile.forms.general import Stage
 
 AXES = "xyz"
 

@@ -23,12 +23,13 @@ from scipy.optimize import linear_sum_assignment
 from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
-from gearfmu.spec.forms.general import ShaftBody, Stage
-from gearfmu.spec.forms.turning import rolling
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.assembly import stage_group
-from gearfmu.stage.build.groups import Group
+from gearfmu.stage.assembly.assemble import stage_group
+from gearfmu.stage.assembly.groups import Group
 from gearfmu.stage.run.limits import places_of
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import rolling
+from gearfmu.stagefile.tables.shaft import ShaftBody
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 EVERY = {"level": 3.0, "h": 1e-7}  # full, at a step that resolves every oscillator

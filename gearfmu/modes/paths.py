@@ -15,8 +15,8 @@ from gearfmu.errors import near_or_all
 from gearfmu.modes.housed import paths
 from gearfmu.modes.housing import placed_housing
 from gearfmu.sound import SoundError, midbands, segments, third_octaves
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
 
 SENSOR = "sensor."
 

@@ -26,7 +26,7 @@ import scipy.linalg as sl
 from gearfmu.kernel.linear import GROUND, LinearModel
 from gearfmu.modes.linear import linearised
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.assembly.blob import read_blob
 
 SPARE = 1.5  # modes up to this times the highest frequency are dynamic
 

@@ -13,7 +13,7 @@ from typing import Any
 from gearfmu.errors import Problem, SpecError
 from gearfmu.files import write_text
 from gearfmu.planning.choice import Choice
-from gearfmu.spec.reading.base import read_toml
+from gearfmu.stagefile.reading.base import read_toml
 
 FORMAT = 1
 HEAD = """# Made by `gearfmu plan`: what each segment of a scene is run with for an error budget, and why.

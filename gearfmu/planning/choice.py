@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stage.effects import EFFECTS, Effect, costs
 from gearfmu.stage.run.refinement import twice
 from gearfmu.study.ladder import SLICES, STEPS, fitting

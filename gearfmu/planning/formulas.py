@@ -20,8 +20,8 @@ from gearfmu.planning.choice import MODES, SLICED, STEP, Choice, Knob
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Trial
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import loaded_te
 

@@ -19,7 +19,7 @@ from gearfmu.planning.search import UNSEEN, Bench, Found, Measured, Pair, measur
 from gearfmu.planning.segments import Part, parts
 from gearfmu.planning.trials import Task, Trial, prime, run_trials
 from gearfmu.planning.windows import GROWN, GROWN_LOST, LONGEST, QUIET, Noise, mesh_frequency, quiet_enough
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.sweeps.runners import Runner
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gearfmu.errors import GearfmuError, Problem, SpecError, near_or_all
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.te import set_error
 from gearfmu.units import to_si

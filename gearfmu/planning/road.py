@@ -16,7 +16,7 @@ from gearfmu.cosim.fmu_unit import FmuUnit, kernel_bytes, with_kernel_bytes
 from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run
 from gearfmu.planning.choice import Choice
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
 
 

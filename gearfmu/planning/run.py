@@ -25,10 +25,10 @@ from gearfmu.planning.road import Road
 from gearfmu.planning.tripwires import Trip, Wires, answer
 from gearfmu.planning.verify import Check, Mark, Spot, SpotChecks
 from gearfmu.report.results import strict
-from gearfmu.spec.forms.turning import meshings
-from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import Trace
 from gearfmu.stage.run.trace import Channel
+from gearfmu.stagefile.forms.turning import meshings
 
 LEG = 5e-3  # s
 UNITS = ("kernel", "fmu")

@@ -13,7 +13,7 @@ from gearfmu.planning.formulas import CERTAIN, Conditions, predicted
 from gearfmu.planning.judge import Error, error
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Task, Trial, Window, run_trials
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.sweeps.runners import Runner
 
 LADDERS = (STEP, MODES, SLICED)

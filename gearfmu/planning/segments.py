@@ -18,7 +18,7 @@ from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Window, pilot_choice
 from gearfmu.planning.windows import LONGEST, first_window, whole_periods
 from gearfmu.report.signals import LOCKED, spans
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.limits import largest_torque
 

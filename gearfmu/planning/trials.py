@@ -21,7 +21,7 @@ from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import Choice
 from gearfmu.planning.judge import Signals
 from gearfmu.planning.request import Request
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.study.bench import Kept, Price, Replay, recorded_run, replayed_price
 from gearfmu.study.ladder import fitting

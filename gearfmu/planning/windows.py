@@ -17,9 +17,9 @@ from gearfmu.planning.judge import FAILED, error, split_half_noise
 from gearfmu.planning.request import Request
 from gearfmu.planning.search import Bench
 from gearfmu.planning.trials import Task, Trial, Window
-from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 MESH_PERIODS, DECAYS, BAND_PERIODS = 10, 3, 4
 FAST = 1.0  # level

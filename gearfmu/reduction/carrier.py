@@ -14,8 +14,8 @@ from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_orde
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.forms.shapes import carrier_geometry
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import carrier_geometry
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 _COARSER = 0.75  # … of the mesh from which that one's frequencies are extrapolated where it is large

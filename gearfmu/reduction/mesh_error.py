@@ -17,7 +17,7 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.carrier import FINER, carrier_full_order, compared_scale, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.spec.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.planetary import CarrierBody
 
 COMPARED = 20  # lowest elastic modes
 _POWER = 3  # of the element's length

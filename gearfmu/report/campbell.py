@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from gearfmu.modes.linear import GROUPS, StageModes
 from gearfmu.report.style import COLOURS, INK, MUTED, WIDTH, styled, written
-from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.limits import engagements_per_turn
+from gearfmu.stagefile.forms.shapes import mesh_shape
 
 ORDERS = 8
 RPM = 30 / np.pi

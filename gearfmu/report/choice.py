@@ -16,8 +16,8 @@ from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
-from gearfmu.stage.build.meshes import tooth_phases
-from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.assembly.meshes import tooth_phases
+from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.deformation import DeformationError
 from gearfmu.stage.run.trace import Trace
 

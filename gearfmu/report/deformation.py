@@ -22,11 +22,11 @@ from PIL import Image
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
 from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, png, round_scale, styled
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.meshes import mesh_axes
+from gearfmu.stage.assembly.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn
 IN_A_ROW = 3

@@ -15,7 +15,7 @@ from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
 from gearfmu.report.signals import GEAR_SPEED, input_shaft, mesh_speed
-from gearfmu.spec.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
 
 PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
 STEADY = 0.1  # nine tenths of the samples lie as close together, over their median

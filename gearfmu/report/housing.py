@@ -20,9 +20,9 @@ from gearfmu.report.runup import RunUp
 from gearfmu.report.signals import GEAR_SPEED, Window
 from gearfmu.sound import SoundError, SoundPower, midbands, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
 
 NAME = "housing"  # what the names of its figures begin with
 MOUNT = "mount."

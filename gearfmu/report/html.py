@@ -15,9 +15,9 @@ from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.plan import plan_sections
 from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
 from gearfmu.report.run import Run
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
+from gearfmu.stagefile.forms.general import Stage
 
 NVH = ("spectrum", "orders", "spectrogram")
 RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")

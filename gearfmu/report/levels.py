@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.files import model_folder
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.reading.files import model_folder
 
 COLUMNS = (
     "scene",

@@ -15,15 +15,15 @@ from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import SETTLED, Window, drive_side, window_of_interest
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import assemble
-from gearfmu.stage.build.meshes import EXTERNAL, kind_of
+from gearfmu.stage.assembly.meshes import EXTERNAL, kind_of
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import mesh_harmonics, statics_of
 from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of

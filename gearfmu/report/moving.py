@@ -23,11 +23,11 @@ from gearfmu.reduction.display import Picture
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
-from gearfmu.spec.forms.general import EngagementSpec, Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.meshes import direction_of, kind_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
 
 FRAMES, CONTACTS = 160, 4
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn

@@ -22,11 +22,11 @@ from gearfmu.report.signals import (
     planet_set,
     window_of_interest,
 )
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.flank_loads import FlankLoads
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import Meshing
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, loudest_sensors
 from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import Meshing
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import Meshing
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
 BACKWARD = 0.02  # of it: largest loss on the way, wobble of the drive below one swing per revolution

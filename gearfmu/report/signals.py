@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import Meshing, meshings
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import Meshing, meshings
 
 GEAR_SPEED = ".gear.w"
 LOCKED = ".locked"

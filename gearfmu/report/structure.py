@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.spec.forms.general import ShaftBody, Stage
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.tables.housing import HousingBody
+from gearfmu.stagefile.tables.shaft import ShaftBody
 
 AROUND = 40  # sectors of a surface of revolution
 Profile = Sequence[tuple[float, float]]

@@ -10,7 +10,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 
 from gearfmu.report.style import COLOURS, MUTED, panels, saved, styled
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
 MARKS = {"rk45": "s", "dg4": "o"}

@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearfmu.report.style import COLOURS, MUTED, WIDTH, styled, written
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.stage.build.flanks import FlankField
+from gearfmu.stage.assembly.flanks import FlankField
 from gearfmu.stage.run.te import TeResult
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_shape
 
 NOISE = 1e-10  # m
 HARMONICS = 6

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.proposals.draft import Draft, millimetres, put_proportions
+from gearfmu.stagefile.proposals.draft import Draft, millimetres, put_proportions
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")

@@ -18,9 +18,9 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
-from gearfmu.spec.forms.shapes import gears_in_mesh
-from gearfmu.spec.proposals.draft import (
+from gearfmu.stagefile.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.stagefile.forms.shapes import gears_in_mesh
+from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
     PITCH_SPEED,
     STRIP_PER_MODULE,
@@ -30,8 +30,8 @@ from gearfmu.spec.proposals.draft import (
     put_shafts,
     usual_torque,
 )
-from gearfmu.spec.reading.base import validate
-from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.stagefile.reading.base import validate
+from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
 from gearfmu.units import to_si
 
 NAMES = ("pinion", "wheel")

@@ -27,8 +27,8 @@ from gearfmu.rexs.pair import (
     put_rack_data,
     root_diameter,
 )
-from gearfmu.spec.forms.pair_checks import rounded_up
-from gearfmu.spec.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
+from gearfmu.stagefile.forms.pair_checks import rounded_up
+from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
@@ -189,9 +189,9 @@ def _tip_that_clears(draft: Draft, distance: float) -> float:
     """Smallest tip radius (m) of the ring that does not meet the planet below its form circle; 0 where that cannot be
     told before the rest is put right."""
     from gearfmu.geometry.planetary import HANDS, RingMesh
-    from gearfmu.spec.forms.planetary import RingSpec, SetGearSpec, SetSpec
-    from gearfmu.spec.forms.shapes import gear_geometry, ring_geometry
-    from gearfmu.spec.reading.base import validate
+    from gearfmu.stagefile.forms.planetary import RingSpec, SetGearSpec, SetSpec
+    from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
+    from gearfmu.stagefile.reading.base import validate
 
     ring_table = {"tip_diameter": "1 mm", "rim_diameter": "1 m"} | {
         key: value for key, value in draft.tables["ring"].items() if key not in ("tip_diameter", "rim_diameter")

@@ -9,7 +9,7 @@ from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import draft_pair
 from gearfmu.rexs.planetary import draft_set
 from gearfmu.rexs.reading import read_rexs
-from gearfmu.spec.proposals.draft import Draft, Unread
+from gearfmu.stagefile.proposals.draft import Draft, Unread
 
 
 def draft_from_rexs(path: Path, stage: str = "") -> Draft:

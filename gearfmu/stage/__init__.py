@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gearfmu.stage.build.assembly import assemble
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.assemble import assemble
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.simulate import Steady, simulate
 from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.stage.run.trace import Channel, Trace

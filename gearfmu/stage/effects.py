@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import statics_of
 

@@ -21,12 +21,12 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.model import integrator_of
-from gearfmu.stage.build.teeth import ROLLS
+from gearfmu.stage.assembly.model import integrator_of
+from gearfmu.stage.assembly.teeth import ROLLS
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed together

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stage.assembly.levels import LEVELS
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.bench import Point
 
 STEPS = (20e-6, 14.2e-6, 10e-6, 7.5e-6, 6.7e-6, 5e-6, 3.4e-6, 2.5e-6, 1.25e-6)  # s

@@ -13,9 +13,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.run.te import set_error
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.forms.general import Stage
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.refinement import twice
 from gearfmu.stage.run.trace import TraceError

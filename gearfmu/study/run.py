@@ -18,9 +18,9 @@ from gearfmu.cosim.coupled import OK
 from gearfmu.errors import ModelError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.levels import LEVELS
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
 from gearfmu.study.ladder import base_point, points, window
 from gearfmu.study.norm import band_error, errors, lock_time

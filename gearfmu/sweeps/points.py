@@ -11,10 +11,10 @@ from typing import Any
 from gearfmu.body import Body, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.kernel.build import source_hash, sources
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel, Trace, assemble
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.sweeps.plan import RUN, TE, split
 
 OK = "ok"

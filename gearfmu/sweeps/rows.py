@@ -13,11 +13,11 @@ from gearfmu.cosim.scene_run import Staged
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
 from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
 from gearfmu.stage.run.te import TeResult, loaded_te
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
 

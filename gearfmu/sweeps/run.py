@@ -13,8 +13,8 @@ import numpy as np
 
 from gearfmu.body import body_hashes, load_bodies
 from gearfmu.errors import BodyError, GearfmuError
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.sweeps.journal import Journal
 from gearfmu.sweeps.plan import RUN, Plan, split
 from gearfmu.sweeps.points import LOST, OK, Outcome, Task, Variant, compute, prepare, program

@@ -29,7 +29,7 @@ from gearfmu.reduction.full_order import FullOrder, Interface
 from gearfmu.reduction.imported.skin import enveloping_surface
 from gearfmu.reduction.transfer import Judging, direct
 from gearfmu.sound import skin_of
-from gearfmu.stage.build.ground_part import ground_part
+from gearfmu.stage.assembly.ground_part import ground_part
 
 CELLS, SIZE = (4, 4, 3), (0.16, 0.12, 0.09)
 INNER = tuple(size * (count - 2) / count for size, count in zip(SIZE, CELLS, strict=True))

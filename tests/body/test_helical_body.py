@@ -18,7 +18,7 @@ from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.parts import drawn_counts, kept_offsets
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDED = 2e-6  # tables in steps of 2^-23 to 2^-22 of their largest entry, rows in steps of 2^-21 to 2^-20

@@ -21,10 +21,10 @@ from gearfmu.body import (
 from gearfmu.body.layout import SENSORS, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.shapes import carrier_geometry, ring_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")

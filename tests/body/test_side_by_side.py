@@ -15,7 +15,7 @@ from gearfmu.femesh import sector_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need, gear_need, whole_need
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
 COUNTS = "modes = 21\nroll_points = 4\nwidth_functions = 2\n"

@@ -19,10 +19,10 @@ from gearfmu.body.layout import ENTRIES, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import seal
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 TINY = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=2)
 

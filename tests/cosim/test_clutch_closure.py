@@ -14,7 +14,7 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 
 pytestmark = pytest.mark.full
 H, WHOLE = 5e-6, Window(0.0, steady=False)

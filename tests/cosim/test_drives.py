@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gearfmu.cosim.scene_run import drive_of, in_drivetrain
-from gearfmu.spec.scene import load_scene, shipped_scenes
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene, shipped_scenes
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.mark.parametrize("name", shipped_scenes())

@@ -19,8 +19,8 @@ from gearfmu.fmu.opened import OpenedFmu
 from gearfmu.fmu.package import write_archive
 from gearfmu.planning.book import Plan
 from gearfmu.planning.run import run_planned
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage.build.model import StageModel
+from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.trace import Trace
 
 OF_A_ROAD = {"finished", "cpu_s", "realtime_factor", "stage_cpu_s", "stage_realtime_factor", "unit", "fmu_path"}

@@ -13,10 +13,10 @@ from gearfmu.cosim.network import Driven
 from gearfmu.cosim.parts import Rest, Start, part_network, part_ports, start_of, start_speeds_of
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.errors import SpecError
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 SHIFT = "planetary_shift"
 PAIR = """

@@ -17,9 +17,9 @@ from gearfmu.cosim.drive import Drive
 from gearfmu.cosim.drivetrain import capacity, car_drive, engine_torque, rig_drive, road_load
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.spec.forms.turning import Shafts
-from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.scenes.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.stagefile.forms.turning import Shafts
 
 SHAFTS = Shafts("pinion", "wheel", -1.5)
 CAR = PassengerCar()

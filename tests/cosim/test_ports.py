@@ -11,8 +11,8 @@ from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.scene_run import drive_of
 from gearfmu.cosim.signals import Ramp
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
+from gearfmu.stagefile.stage import load_stage
 
 SHAFTS = ("pinion", "wheel")
 

@@ -12,7 +12,7 @@ from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.summary import summary
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
 
 
 def scene(folder: Path, effects: str) -> SceneSpec:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
+from gearfmu.scenefile.scene import SHIPPED, load_scene, shipped_scenes
 
 
 def test_shipped_scenes():

@@ -14,7 +14,7 @@ from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model, verified
 from gearfmu.errors import CouplingError, FmuError, ModelError, SpecError
-from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.run.trace import Trace
 
 

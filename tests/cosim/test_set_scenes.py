@@ -13,8 +13,8 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.fmu import export
-from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.scenes.shaft_loads import SpeedControl
+from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.scenefile.shaft_loads import SpeedControl
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.trace import Trace
 

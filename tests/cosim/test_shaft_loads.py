@@ -18,10 +18,10 @@ from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
-from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
-from gearfmu.spec.scenes.shaft_loads import ShaftLoad
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.stage import load_stage
 
 SPEED = 85.0  # rad/s, of the carrier
 PAPER = "planetary_paper"

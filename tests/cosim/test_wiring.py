@@ -12,7 +12,7 @@ from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import drive_of, run_once, stage_model
 from gearfmu.errors import CouplingError, ModelError
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel
 
 TORQUE, H = "pinion.shaft.tau", 5e-6

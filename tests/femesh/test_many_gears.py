@@ -13,9 +13,9 @@ from sections import section
 from gearfmu.errors import Problem
 from gearfmu.femesh import gear_sector, scaled_jacobian, volume
 from gearfmu.geometry import GearGeometry, involute
-from gearfmu.spec.forms.pair_checks import geometry_problems
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.tables.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
+from gearfmu.stagefile.forms.pair_checks import geometry_problems
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.tables.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
 
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)
 

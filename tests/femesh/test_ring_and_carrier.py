@@ -19,10 +19,10 @@ from gearfmu.femesh import FeMesh, mesh_report, ring_sector, scaled_jacobian, vo
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import CarrierGeometry
-from gearfmu.spec.forms.planetary import CarrierMeshSpec
-from gearfmu.spec.forms.shapes import carrier_geometry, ring_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
+from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 SPEC = load_stage("planetary54")
 RING, WIDTH = ring_geometry(SPEC.written.ring, SPEC.written.set), SPEC.written.ring.face_width

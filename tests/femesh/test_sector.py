@@ -13,9 +13,9 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.section import graded, transfinite
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 STAGE = load_stage("fzg_c")
 SHAPES = [gear_geometry(gear, STAGE.written.pair) for gear in STAGE.gears]

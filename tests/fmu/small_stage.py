@@ -12,9 +12,9 @@ import numpy as np
 from handmade import mass_matrix, toothed
 
 from gearfmu.body import Body
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.stage import load_stage
 
 ROLLS, FUNCTIONS = 6, 3
 TOOTH_FREQUENCY = 40e3

@@ -10,14 +10,14 @@ import sys
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
 
 MAKES = """
 import sys
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.stage import assemble
 spec = load_stage(sys.argv[1])
 model = assemble(spec, load_bodies(spec))

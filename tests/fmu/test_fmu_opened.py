@@ -16,11 +16,11 @@ from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import write_archive
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.validate import _stage as stage_findings
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.reading.files import shipped_stages
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.stored import restored, stored
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.reading.files import shipped_stages
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import restored, stored
 
 TOPOGRAPHY = "roll_mm,z_mm,deviation_um\n10,-5,0\n10,5,0\n20,-5,3\n20,5,3\n"
 

@@ -1,5 +1,5 @@
-"""The FMU of the planetary set: the kernel's numbers bit for bit, its state, its terminals; all probes with either kind
-of port."""
+"""The FMU of the planetary set, on the ground and in a housing: the kernel's numbers bit for bit, its state, its
+terminals; all probes with either kind of port."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export
 from gearfmu.fmu.description import shafts
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.stage import load_stage
 
 STEPS, H, RIGID = 10, 1e-4, 0
 START = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}
 
-pytestmark = pytest.mark.full  # the blob holds four planets: packing and loading it takes longer than the runs
+SETS = ["planetary54/stage_housed", pytest.param("planetary54", marks=pytest.mark.full)]
 
 
-def model(kind: str) -> StageModel:
-    spec = load_stage("planetary54")
+def model(name: str, kind: str = "torque") -> StageModel:
+    spec = load_stage(name)
     return assemble(with_port_kinds(spec, {"carrier": kind, "sun": kind}), load_bodies(spec))
 
 
-@pytest.fixture(scope="module")
-def planetary() -> StageModel:
-    return model("torque")
+@pytest.fixture(scope="module", params=SETS)
+def planetary(request: pytest.FixtureRequest) -> StageModel:
+    return model(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +75,11 @@ def test_the_fmu_of_a_set_is_its_kernel_bit_for_bit(
     values = np.array(expected)
     assert np.abs(values[:, names.index("ring_planet3.force")]).min() > 1000, "the run loads the teeth"
     assert values.tobytes() == np.array(found).tobytes()
+    felt = [np.ptp(values[:, k]) for k, name in enumerate(names) if name.startswith(("sensor.", "mount."))]
+    assert bool(felt) == bool(planetary.stage.housings) and min(felt, default=1.0) > 0
 
 
+@pytest.mark.full
 def test_a_helical_set_runs_through_fmpy(tmp_path: Path) -> None:
     """An importer of its own, from start to end: kernel's numbers, axial forces of sun and ring among them."""
     spec = load_stage("helical_set")
@@ -117,8 +120,11 @@ def test_a_set_names_its_ports_planets_and_pins(planetary: StageModel) -> None:
     assert list(shafts(variables)) == ["carrier", "sun"]
     names = {v.name for v in variables}
     assert {"sun_planet1.force", "ring_planet4.te", "pin.planet2.fx", "bearing.ring.fy", "planet3.gear.w"} <= names
+    housed = {"sensor.top.ax", "mount.left_back.fy", "bearing.ring_seat.mz", "effect.housing"}
+    assert housed & names == (housed if planetary.stage.housings else set())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["torque", "spring"])
 def test_the_fmu_of_a_set_passes_every_probe(kind: str, tmp_path: Path) -> None:
-    assert findings(export(model(kind), tmp_path / "planetary54.fmu")) == []
+    assert findings(export(model("planetary54", kind), tmp_path / "planetary54.fmu")) == []

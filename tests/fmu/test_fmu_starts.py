@@ -18,7 +18,7 @@ from gearfmu.api.results import with_windup
 from gearfmu.errors import ModelError
 from gearfmu.fmu import export
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 STARTS = {"level": 1.0, "slices": 3.0, "backlash": 5e-5, "effect.hertz": 0.0}
 

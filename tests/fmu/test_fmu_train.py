@@ -13,8 +13,8 @@ from evidence.fmu_probes.probes import Subject
 from gearfmu.body import load_bodies
 from gearfmu.fmu import export
 from gearfmu.fmu.description import shafts
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stagefile.stage import load_stage
 
 STEPS, H = 20, 1e-4
 

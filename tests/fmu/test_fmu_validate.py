@@ -17,9 +17,9 @@ from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
 from gearfmu.kernel.build import host_platform
-from gearfmu.spec.reading.files import model_folder
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
+from gearfmu.stagefile.reading.files import model_folder
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gearfmu.geometry import involute
-from gearfmu.spec.forms.shapes import carrier_geometry, set_geometry
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import carrier_geometry, set_geometry
+from gearfmu.stagefile.stage import load_stage
 
 SPEC = load_stage("planetary54")
 SET = set_geometry(SPEC.written)

@@ -10,10 +10,10 @@ from decks import write_deck
 
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh, gear_sector
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.reading.files import find_stage
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
           "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 8",

@@ -20,7 +20,7 @@ from gearfmu.fem.factor import FactorError
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.imported.gear import hinge_problem
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.stage import load_stage
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 MM = 1e-3

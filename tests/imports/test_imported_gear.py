@@ -15,8 +15,8 @@ from gearfmu.body import Body, reduce_bodies, reduce_body
 from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
-from gearfmu.spec.forms.body import expected_hash
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
+from gearfmu.stagefile.forms.body import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 TABLES = ("flank.static", "flank.node", "static", "mass")

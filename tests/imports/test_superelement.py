@@ -22,7 +22,7 @@ from gearfmu.body import Body
 from gearfmu.body.housing import housing_order, reduced_housing
 from gearfmu.errors import MeshError
 from gearfmu.reduction.imported.housing import ImportedHousing
-from gearfmu.spec.tables.housing import HousingBody
+from gearfmu.stagefile.tables.housing import HousingBody
 
 SIZE = (20.0, 16.0, 40.0)
 STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3, "density": 7850.0}

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stagefile.stage import load_stage
 
 FOLDER = Path(__file__).parents[1] / "reference" / "golden_models"
 MODELS = {  # name → stage, modes of a body (a set needs more: distant teeth), width functions, friction possible

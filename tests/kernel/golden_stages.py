@@ -15,7 +15,7 @@ from small_model import pair_blob, with_nodes
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 STEP = 2e-5  # s, communication step
 RIGID, FAST, STANDARD, FULL, PAPER, EXPLICIT = map(float, range(6))

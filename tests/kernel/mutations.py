@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gearfmu.stage.build.blob import ENTRY, HEADER, seal
+from gearfmu.stage.assembly.blob import ENTRY, HEADER, seal
 
 EDGES = [
     0,

@@ -91,7 +91,8 @@ class Scheme:
 @dataclass
 class State:
     """y, v (n,): modal state, y = displacement + κ f · f (n,): modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta,
-    dash (m,): η of the last step, the dashpots' part of it, and their force at its end."""
+    dash (m,): η of the last step, the dashpots' part of it, and their force at its end · shift: account of the
+    invariant's jumps, J."""
 
     y: np.ndarray
     v: np.ndarray
@@ -101,6 +102,7 @@ class State:
     eta: np.ndarray
     dash: np.ndarray
     late: np.ndarray
+    shift: float = 0.0
 
     @property
     def sampled(self) -> np.ndarray:
@@ -213,18 +215,18 @@ class Reference:
         y = a11 * state.y + a12 * state.v + self.bq * f
         v = a21 * state.y + a22 * state.v + self.bv * f
         gap = self._gap(y, external)
-        force, eta, dash, late = self._forces(gap, state)
+        force, eta, dash, late, shift = self._forces(gap, state)
         y = y + self.bq * (self.w.T @ (force + eta))
         v = v + self.bv * (self.w.T @ (force + eta))
         reached = gap + self.d @ (force + eta) + self.c @ force + self.a @ late
-        return State(y, v, external + self.w.T @ force, force, reached, eta, dash, late)
+        return State(y, v, external + self.w.T @ force, force, reached, eta, dash, late, shift)
 
     def energy(self, state: State) -> float:
         """The invariant of the undamped step without external work: Σ weight (½v² + ½ω²y²) + ½λᵀC′λ, J, and
         what the dashpots' force holds in the compliance outside their paths."""
         modal = 0.5 * self.weight @ (state.v**2 + (self.problem.omega * state.y) ** 2)
         held = self.a @ state.late @ (state.force + 0.5 * state.late)
-        return float(modal + 0.5 * state.force @ self.c @ state.force + held)
+        return float(modal + 0.5 * state.force @ self.c @ state.force + held - state.shift)
 
     def displacement(self, state: State) -> np.ndarray:
         """Physical modal displacements (n,)."""
@@ -237,25 +239,25 @@ class Reference:
     def _gap(self, y: np.ndarray, external: np.ndarray) -> np.ndarray:
         return self.problem.offset + self.w @ (y - self.kappa * external)
 
-    def _forces(self, gap: np.ndarray, state: State) -> tuple[np.ndarray, ...]:
-        """λ₁, η, η_d and the dashpots' force at the end: complementarity, then energy where a contact changed, or
-        dissipation where none did."""
+    def _forces(self, gap: np.ndarray, state: State) -> tuple:
+        """λ₁, η, η_d, the dashpots' force at the end and the account of jumps: complementarity, then energy where a
+        contact changed, or dissipation where none did."""
         p, s = self.problem, self.scheme
         was = (state.force > 0) | p.bilateral
         none = np.zeros_like(gap)
         if not was.any() and np.all(gap >= 0):
-            return none, none, none, none
-        solved, eta = self._solve(gap, state, was), none
+            return none, none, none, none, state.shift
+        solved, eta, shift = self._solve(gap, state, was), none, state.shift
         changed = bool(np.any(solved.active != was))
         self.changes += changed
         if changed and s.energy:
-            solved, eta = self._conserve(gap, state, solved, was)
+            solved, eta, shift = self._conserve(gap, state, solved, was)
         elif not changed and s.epsilon:
             solved = self._solve(gap, state, was, 2 * s.epsilon)
             eta = 2 * s.epsilon * (solved.force - state.force)
         force, dashpots = solved.force, solved.dashpots
         dash = dashpots.by @ force + dashpots.fixed
-        return force, eta + dash, dash, dashpots.late_by @ force + dashpots.late_fixed
+        return force, eta + dash, dash, dashpots.late_by @ force + dashpots.late_fixed, shift
 
     def _solve(self, gap: np.ndarray, state: State, start: np.ndarray, slow: float = 0.0) -> Solved:
         """The complementarity problem with η = η_d + slow (λ₁ − λ₀). Where a dashpot stands follows from λ₁ and is
@@ -279,10 +281,23 @@ class Reference:
         """(m,): part of the step in which a contact touches that is open at one end of it; left (m,): distance at the
         end. Even motion: what it deflects when closed, by those that close or open with it, over that and the distance
         when open."""
+        own, moved = self._moved(state, force, left)
+        return np.where(own > 0, own / np.where(own > 0, moved, 1.0), 1.0)
+
+    def _moved(self, state: State, force: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(m,): what a contact that closes or opens deflects when closed, by all that do; that and the distance when
+        open."""
         closes, opens = (state.force == 0) & (force > 0), (state.force > 0) & (force == 0)
         own = np.where(opens, self.c @ (opens * state.force), self.c @ (closes * force))
-        apart = np.where(state.force > 0, left, state.gap)
-        return np.where(own > 0, own / np.where(own > 0, own + apart, 1.0), 1.0)
+        return own, own + np.where(state.force > 0, left, np.maximum(0.0, state.gap))
+
+    def _jump(self, state: State, solved: Solved) -> float:
+        """Half the jump of the invariant in the step: its states lead the motion by h²/12 of the rate of the force."""
+        force, rigid = solved.force, self.problem.bilateral
+        own, moved = self._moved(state, force, np.maximum(0.0, solved.gap + (solved.lagged + self.c) @ force))
+        passes = (own > 0) & ~rigid & ((state.force > 0) != (force > 0))
+        power = (force - state.force) * np.square(moved) / np.where(passes, own, 1.0)
+        return -min(1.0, 4 * self.scheme.gamma - 1) / 24 * float(power[passes].sum())
 
     def _stand(self, state: State, force: np.ndarray, closed: np.ndarray, left: np.ndarray) -> Dashpots:
         """The dashpots as λ₁ and `closed` (m,), contacts closed at either end, place them; left (m,): distance at the
@@ -327,33 +342,40 @@ class Reference:
         late_fixed = np.where((hold == 0) & (acts > 0), beta * fixed + tail, 0.0)
         return Dashpots(acts, clip, hold, part, by, fixed, late_by, late_fixed)
 
-    def _conserve(self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray) -> tuple[Solved, np.ndarray]:
-        """The solution and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
+    def _conserve(
+        self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray
+    ) -> tuple[Solved, np.ndarray, float]:
+        """The solution and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ and
+        the jump of the invariant; the account of these jumps, within a tenth of the energy at the end."""
         c, d, force0 = self.c, self.d, state.force
         before = state.gap - c @ force0
         stored = 0.5 * force0 @ c @ force0
         reached = solved.gap + solved.lagged @ solved.force
+        most = 0.05 * solved.force @ c @ solved.force
+        shift = float(np.clip(state.shift + self._jump(state, solved), -most, most))
         direction = np.where(solved.active | was, self.problem.weight * (reached - before), 0.0)
-        alpha = 0.0
-        for _ in range(ROUNDS):
+        alpha, plain = 0.0, solved
+        for i in range(2 * ROUNDS):
+            if i == ROUNDS:  # no root was found: without the jump
+                alpha, solved, shift = 0.0, plain, state.shift
             force, active, lagged = solved.force, solved.active, solved.lagged
             z = force + alpha * direction
             moved = solved.gap + lagged @ force - before
-            defect = 0.5 * force @ c @ force - stored + 0.5 * (force0 + z) @ moved
+            defect = 0.5 * force @ c @ force - stored + state.shift - shift + 0.5 * (force0 + z) @ moved
             rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # decides where flanks just graze
             if abs(defect) <= self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2) + rounding:
-                return solved, alpha * direction
+                return solved, alpha * direction, shift
             self.rounds += 1
             p = np.zeros_like(force)
             if active.any():
                 p[active] = -np.linalg.solve((lagged + c)[np.ix_(active, active)], (d @ direction)[active])
-            w, shift = p + direction, lagged @ p + d @ direction
-            c1 = force @ c @ p + 0.5 * w @ moved + 0.5 * (force0 + z) @ shift
-            c2 = 0.5 * p @ c @ p + 0.5 * w @ shift
+            w, follows = p + direction, lagged @ p + d @ direction
+            c1 = force @ c @ p + 0.5 * w @ moved + 0.5 * (force0 + z) @ follows
+            c2 = 0.5 * p @ c @ p + 0.5 * w @ follows
             alpha -= 2 * defect / (c1 + np.copysign(np.sqrt(max(0.0, c1**2 - 4 * defect * c2)), c1))
             solved = self._solve(gap + alpha * (d @ direction), state, active)
         self.failures += 1
-        return solved, alpha * direction
+        return solved, alpha * direction, shift
 
 
 def _modes(problem: Problem, scheme: Scheme) -> tuple[np.ndarray, ...]:

@@ -2,7 +2,7 @@
 bars.
 
 The sections are those of gearfmu/kernel/src/model/gk_fields.inc; the pair's ground oscillators come from its invented
-free bodies by gearfmu.stage.build.groups, as those of every stage.
+free bodies by gearfmu.stage.assembly.groups, as those of every stage.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from handmade import mass_matrix, toothed
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
-from gearfmu.spec.tables.ports import LevelSpec
-from gearfmu.stage.build.assembly import (
+from gearfmu.stage.assembly.assemble import (
     MODEL_VERSION,
     flank_sections,
     flank_sizes,
@@ -24,10 +23,11 @@ from gearfmu.stage.build.assembly import (
     port_compliances,
     set_sections,
 )
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.fields import gear_numbers, order_sections
-from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part
-from gearfmu.stage.build.groups import Group, Layout, Support, mount
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.fields import gear_numbers, order_sections
+from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
+from gearfmu.stage.assembly.groups import Group, Layout, Support, mount
+from gearfmu.stagefile.tables.ports import LevelSpec
 
 NAMES = ("pinion", "wheel")
 OFFSETS = np.arange(-3, 4)

@@ -8,9 +8,9 @@ import pytest
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 from gearfmu.stage.run.steady import Steady
+from gearfmu.stagefile.stage import load_stage
 
 STEP, BEFORE, AFTER = 20e-6, 250, 250  # s; communication steps
 

@@ -14,7 +14,7 @@ from mutations import mutated
 from probes import Probes
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.build.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, read_blob, seal, write_blob
+from gearfmu.stage.assembly.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, read_blob, seal, write_blob
 
 BAD_BLOB = 1
 SAMPLE = {

@@ -10,7 +10,7 @@ import pytest
 from small_model import BASE, LENGTH, PSI, ROLLS, WORKING, own_residual, pair_blob
 
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 STEP, FREQUENCY, CYCLES = 1e-5, 200.0, 3  # s, Hz: far below the lowest resonance
 DAMPING, RESIDUAL = 2e4, 4e-9  # N·s/m² over the face width; m/N of one tooth beyond its modes

@@ -11,8 +11,8 @@ from small_model import pair_blob
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.fields import SIZES
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.fields import SIZES
 
 SECTIONS = read_blob(pair_blob())
 Change = Callable[[Any], Any]

@@ -11,7 +11,7 @@ from small_model import pair_blob
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 
 def changed(**sections: Any) -> bytes:

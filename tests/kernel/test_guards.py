@@ -12,7 +12,7 @@ from small_model import BASE, INERTIA, LENGTH, PSI, TEETH, WORKING, pair_blob
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 STEP = 2e-5  # s, communication step: three internal ones
 QUARTER = math.pi / 2 / TEETH[0]  # rad of the pinion: a quarter of a pitch, what one step may turn it

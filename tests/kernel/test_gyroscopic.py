@@ -12,7 +12,7 @@ import scipy.linalg as sl
 from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 SPEED, APART = 600.0, 1.0  # rad/s of the pinion; what it lags behind the wheel by, so that teeth part
 STEP = 2e-5  # s

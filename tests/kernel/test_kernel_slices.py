@@ -131,7 +131,7 @@ def test_mirrored_slices_as_one_row_change_nothing(slices: int, damping: float) 
 
 
 @pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (1, 0.0)], ids=["dg4", "em"])
-@pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 1e4)])
+@pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 8e3)])
 @pytest.mark.parametrize("slices", [1, 4, 5, 6])
 def test_slices_step_by_step(
     double_library: Path, slices: int, integrator: int, gamma: float, zeta: float, damping: float
@@ -143,7 +143,7 @@ def test_slices_step_by_step(
     np.testing.assert_allclose(got[:, 0], expected[:, 0], rtol=0, atol=close * expected[:, 0].max())
     np.testing.assert_allclose(got[:, 1], expected[:, 1], rtol=close)
     loss = np.diff(got[:, 2])
-    growth = {0.0: 1e-12, 2e3: 1e-4, 1e4: 2e-4}[damping]  # dashpots balance to second order; measured: 5.5e-5, 1.1e-4
+    growth = {0.0: 1e-12, 2e3: 1e-4, 8e3: 2e-4}[damping]  # dashpots balance to second order; measured: 5.5e-5, 1.1e-4
     assert loss.min() >= -growth * got[0, 1]
     assert -loss[loss < 0].sum() <= 3e-3 * max(got[-1, 2], 1e-9 * got[0, 1])  # measured: 1.8e-3
     assert (got[-1, 2] > 0.01 * got[0, 1]) == (zeta > 0 or damping > 0)

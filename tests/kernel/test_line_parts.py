@@ -13,7 +13,7 @@ from golden_stages import _run as run
 from inner import Inner
 from scipy.integrate import quad
 
-from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.assembly.blob import read_blob
 
 PLACES = 4
 

@@ -11,7 +11,7 @@ from small_model import TEETH, pair_blob
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, K, PLAY, SPEED = 2.0, 8e6, 4e-4, 0.5  # kg, N/m, m, m/s: a flat stage's spins are translations

@@ -14,7 +14,7 @@ from small_model import pair_blob, with_nodes
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.ranges import HEADER, kernel_limits
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 BLOB = with_nodes(pair_blob(("chain", "spring")))
 KNOWN: Mapping[str, Any] = read_blob(BLOB)

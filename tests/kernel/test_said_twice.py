@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import parts
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
-from gearfmu.stage.build import assembly, blob, compact, flanks, meshes, teeth
+from gearfmu.stage.assembly import assemble, blob, compact, flanks, meshes, teeth
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
@@ -38,7 +38,7 @@ def shape(field: str) -> list[str]:
     [
         ("gk.h", "GK_ABI", binding.ABI),
         ("gk.h", "GK_MESSAGE", binding.MESSAGE),
-        ("gk_model.c", "MODEL_VERSION", assembly.MODEL_VERSION),
+        ("gk_model.c", "MODEL_VERSION", assemble.MODEL_VERSION),
         ("gk_model.h", "LEADS", flanks.WIDTHS),
         ("gk_model.h", "OFFSETS", len(teeth.OFFSETS)),
         ("gk_model.h", "OFFSETS", 2 * parts._OFFSETS + 1),
@@ -80,4 +80,4 @@ def test_laws_of_friction_are_in_one_order() -> None:
 def test_a_model_knows_the_table_of_variables() -> None:
     """Else a kernel with other value references would answer to the GUID of a description made before."""
     table = next(p for p in sources() if p.name == "gk_variables.inc").read_bytes().replace(b"\r\n", b"\n")
-    assert hashlib.sha256(table).hexdigest().startswith(assembly.VARIABLES)
+    assert hashlib.sha256(table).hexdigest().startswith(assemble.VARIABLES)

@@ -11,7 +11,7 @@ import pytest
 from golden_models import golden_model
 
 from gearfmu.kernel import Kernel
-from gearfmu.stage.build import blob as blobs
+from gearfmu.stage.assembly import blob as blobs
 
 FAST, STANDARD = 1.0, 2.0
 STEP = 2e-5

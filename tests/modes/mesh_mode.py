@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 
 from evidence.study.dashpot import own_path
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble, loaded_te
+from gearfmu.stagefile.stage import load_stage
 
 RATIO = 0.03
 CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ

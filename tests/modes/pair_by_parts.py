@@ -13,8 +13,8 @@ from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import Body
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.teeth import excited_modes, resampling, symmetric_functions
+from gearfmu.stage.assembly.teeth import excited_modes, resampling, symmetric_functions
+from gearfmu.stagefile.forms.general import Stage
 
 DRIVE, BORE = 0, (0, 1, 5)  # flank; directions of the bore: x, y and spin
 LEAST_HALF_WIDTH = 5e-6  # m: below it the local law is a parabola (docs/theory.md 2.4), not known here

@@ -10,9 +10,9 @@ from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import Material
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import Material
 
 COUNT = 10
 

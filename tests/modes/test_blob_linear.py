@@ -15,10 +15,10 @@ from flank_reader import full_tables
 from pair_by_parts import Contact, couple, gear_at, slice_weights, tangents
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.assembly import general_sections
-from gearfmu.stage.build.ground_part import read_tables
-from gearfmu.stage.build.teeth import OFFSETS
+from gearfmu.stage.assembly.assemble import general_sections
+from gearfmu.stage.assembly.ground_part import read_tables
+from gearfmu.stage.assembly.teeth import OFFSETS
+from gearfmu.stagefile.stage import load_stage
 
 ROLLS = 48
 PLACES = [((0, 0), (20, 30)), ((1, -1), (38, 9))]  # tooth numbers and grid rolls of both gears

@@ -21,8 +21,8 @@ from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.modes.vtu import write_series
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.display import outline, turn_sectors
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.deformation import Deformation, DeformationError, GearMotion
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="module", params=["sun", "ring"])

@@ -16,7 +16,7 @@ from gearfmu.modes.linear import linearised
 from gearfmu.modes.rings import Rings, stage_rings
 from gearfmu.sound import SoundError, level, midbands, third_octaves
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.run.simulate import Steady, simulate
 from gearfmu.stage.run.trace import Channel, Trace
 

@@ -19,12 +19,12 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
 from gearfmu.modes.linear import Linearised, full_kernel, linearised, shaft_rows, stage_modes
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.limits import largest_torque, places_of
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import ChainSpec
 
 TORQUE = 302.0
 FREE = {name: {"kind": "torque", "chain": None} for name in ("pinion", "wheel")}

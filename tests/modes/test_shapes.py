@@ -17,8 +17,8 @@ from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.shapes import MOST, energy_shares, harmonic_shares
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="module")

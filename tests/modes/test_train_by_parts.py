@@ -15,11 +15,11 @@ from train_by_parts import Load, frequencies
 
 from gearfmu.body import load_bodies
 from gearfmu.modes.linear import EVERY, Linearised, linearised
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.limits import places_of
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
 
 COUNT = 60
 LIGHT = 0.1  # N·m: frequencies move with the place at which gears stand, in proportion to the load: 3e-4 at 1 N·m

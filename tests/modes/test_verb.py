@@ -15,9 +15,9 @@ from gearfmu.commands import shared
 from gearfmu.fem import solids
 from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.modes.bodies import body_modes, uncoupled_carrier_modes
-from gearfmu.spec.forms.shapes import carrier_geometry
-from gearfmu.spec.reading.files import find_stage
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import carrier_geometry
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(autouse=True)

@@ -21,9 +21,10 @@ from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
 from gearfmu.body import Body
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.general import EngagementSpec, ShaftBody, Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.stage.build.teeth import resampling
+from gearfmu.stage.assembly.teeth import resampling
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.tables.shaft import ShaftBody
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out

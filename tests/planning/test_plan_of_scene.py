@@ -19,7 +19,7 @@ from gearfmu.planning.request import request
 from gearfmu.planning.run import planned_scene, planned_stage, run_planned
 from gearfmu.planning.table import plan_text, run_text
 from gearfmu.report.plan import plan_sections
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage.effects import DISSIPATION, EFFECTS
 from gearfmu.sweeps.runners import in_this_process
 

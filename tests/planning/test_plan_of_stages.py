@@ -15,10 +15,10 @@ from gearfmu.planning.choice import FULL_STEP_OF_SETS, space
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
 from gearfmu.planning.table import plan_text
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.sweeps.runners import in_this_process
 
 SCENE = """

@@ -19,12 +19,12 @@ from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import MountsSpec, RingSpec
-from gearfmu.spec.forms.shapes import ring_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import MountsSpec, RingSpec
+from gearfmu.stagefile.forms.shapes import ring_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
 
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 MOUNTS = MountsSpec(points=6, stiffness=5e7)

@@ -11,9 +11,9 @@ from gearfmu.femesh import sector_mesh
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
-from gearfmu.spec.forms.shapes import gear_geometry, ring_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
 CASES = {

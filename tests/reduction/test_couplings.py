@@ -19,8 +19,8 @@ from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
-from gearfmu.spec.forms.shapes import carrier_geometry
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import carrier_geometry
+from gearfmu.stagefile.stage import load_stage
 
 SPEC = load_stage("planetary54")
 SCALE = 0.34

@@ -10,7 +10,7 @@ import pytest
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.stage import load_stage
 
 SCALE = 0.3
 SHIFTS = (-((2e4 * np.pi) ** 2), (2e4 * np.pi) ** 2)  # rad²/s², the second beyond the first elastic modes

@@ -16,8 +16,8 @@ import pytest
 from gearfmu.body import reduce_bodies
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh.mesh import rotated
-from gearfmu.spec.forms.shapes import set_geometry
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import set_geometry
+from gearfmu.stagefile.stage import load_stage
 
 FOLDER = Path(__file__).resolve().parents[2] / "evidence" / "reduction" / "in_time"
 

@@ -17,8 +17,8 @@ from gearfmu.reduction.mesh_error import (
     extrapolated,
     free_frequencies,
 )
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.stage import load_stage
 
 ALLOWED = {"planetary54": 3.2e-3, "helical_set": 4.3e-3}  # reached; 3e-3 were wished
 COARSE = 0.35

@@ -17,15 +17,15 @@ import numpy as np
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity
-from gearfmu.spec.tables.gear import BodySpec, MeshSpec
-from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.run.simulate import Inputs, simulate
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity
+from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.ports import SupportSpec
 
 ROOT = Path(__file__).parents[2]
 COARSE = BodySpec(

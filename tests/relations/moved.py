@@ -9,12 +9,12 @@ from types import MappingProxyType
 import numpy as np
 from kinds import Kind, channels, level_number
 
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.forms.turning import turns
-from gearfmu.spec.tables.flanks import Eccentricity, Wobble
 from gearfmu.stage import StageModel, Steady
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.forms.turning import turns
+from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
 
 WHOLE = 1e-6  # of a pitch
 Vector = tuple[float, float]

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from kinds import HOUSED, KINDS, Change, Kind, channels, differences, drawn, even, family, level_number, loaded
 
-from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
 
 # tolerances, of a channel's family
 ALONE = 1e-8  # one engagement: found up to 2e-10

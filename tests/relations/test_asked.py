@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from kinds import KINDS, Kind, drawn, level_number
 
-from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.spec.tables.profile import Profile
 from gearfmu.stage import StageModel, Steady, Trace, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
+from gearfmu.stagefile.forms.turning import meshings, turns
+from gearfmu.stagefile.tables.profile import Profile
 
 STEP, DURATION, SETTLED = 20e-6, 0.035, 0.015  # s
 ASKED = 1e-3

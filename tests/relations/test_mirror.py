@@ -21,16 +21,16 @@ from moved import renamed, run, start_of
 from scipy.optimize import brentq
 
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
-from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, Wobble
-from gearfmu.spec.tables.lead import LeadSpec, Misalignment
-from gearfmu.spec.tables.ports import FrictionSpec
 from gearfmu.stage import StageModel, Steady
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
+from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, Wobble
+from gearfmu.stagefile.tables.lead import LeadSpec, Misalignment
+from gearfmu.stagefile.tables.ports import FrictionSpec
 
 SAME = 5e-3  # tables of coast flanks are read where they touch at the nominal distance: up to 2e-3 at this load
 LIGHT = 0.3  # of the torque

@@ -16,14 +16,14 @@ import pytest
 from kinds import KINDS, Kind, differences, drawn, held_as
 from moved import each_vector, renamed, run, start_of, turned_vector
 
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.tables.flanks import Eccentricity, Wobble
-from gearfmu.spec.tables.lead import Misalignment
-from gearfmu.spec.tables.ports import FrictionSpec
 from gearfmu.stage import Steady
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
+from gearfmu.stagefile.tables.lead import Misalignment
+from gearfmu.stagefile.tables.ports import FrictionSpec
 
 ANGLES = (math.pi, -math.pi, 0.5 * math.pi, -2.0, 0.7)
 OFFSETS = ((4e-6, -7e-6), (-3e-6, 5e-6), (2e-6, 6e-6))  # m: of rotors, one after the other

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from kinds import KINDS, Kind, assembled, bodies_of
 
-from gearfmu.spec.forms.expand import with_ports
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.profiled import Line, Profiled
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stagefile.forms.expand import with_ports
 
 PLAY = 2e-3  # rad, of every port
 QUICK = ("pair", "helical")

@@ -11,9 +11,9 @@ import pytest
 from inner import Inner
 from kinds import KINDS, Kind
 
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.spec.tables.flanks import Eccentricity, Wobble
 from gearfmu.stage import StageModel, Steady
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
 
 STEP = 2e-6  # rad: of the angles of ports
 RIGID = {"effect.elastic": 0.0, "effect.hertz": 0.0}

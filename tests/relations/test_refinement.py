@@ -14,13 +14,13 @@ from kinds import COARSE, KINDS, assembled, bodies_of, level_number
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.te import loaded_te
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 from gearfmu.study.bench import Point, measure, models_for
 from gearfmu.study.ladder import window
 from gearfmu.study.norm import errors
@@ -153,7 +153,7 @@ def test_one_and_a_half_times_the_mesh() -> None:
 @pytest.mark.parametrize("name", ["pair", pytest.param("helical", marks=pytest.mark.full)])
 def test_twice_the_rolls_of_the_grid(name: str) -> None:
     from gearfmu.stage import assemble
-    from gearfmu.stage.build.teeth import ROLLS
+    from gearfmu.stage.assembly.teeth import ROLLS
 
     kind, known = KINDS[name], bodies_of(KINDS[name].file)
     finer = assemble(kind.stage, [known[body] for body in known], 2 * ROLLS)

@@ -24,14 +24,14 @@ import pytest
 from kinds import KINDS, Drawn, Kind, assembled, channels, differences, drawn
 
 from gearfmu.body import reduce_body
-from gearfmu.spec.forms.expand import expand
-from gearfmu.spec.forms.general import ToothedBody
-from gearfmu.spec.forms.planetary import CarrierMeshSpec, CarrierSpec
-from gearfmu.spec.reading.base import Quantity, Spec
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, Steady, simulate
 from gearfmu.stage.run.te import loaded_te
+from gearfmu.stagefile.forms.expand import expand
+from gearfmu.stagefile.forms.general import ToothedBody
+from gearfmu.stagefile.forms.planetary import CarrierMeshSpec, CarrierSpec
+from gearfmu.stagefile.reading.base import Quantity, Spec
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
 
 C = 4.0
 H = 10e-6  # s

@@ -19,8 +19,8 @@ from typing import Any
 import pytest
 from kinds import COARSE, KINDS, ROOT, assembled, bodies_of
 
-from gearfmu.spec.reading.files import find_stage, read_layers
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.reading.files import find_stage, read_layers
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.units import to_si
 
 getcontext().prec = 40

@@ -16,9 +16,9 @@ from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.femesh.mesh import rotated
 from gearfmu.report.moving import _unit_loads, moving_view
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.sweeps.page import write_page
 
 pytestmark = [pytest.mark.full, pytest.mark.needs("chromium")]

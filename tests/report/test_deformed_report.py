@@ -17,9 +17,9 @@ from PIL import Image
 
 from gearfmu import report
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.deformation import Deformation, GearMotion
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.stage import load_stage
 
 CARRIER = 85.0
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gearfmu.report.te import write_flanks
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import ProfileSpec
-from gearfmu.spec.tables.lead import LeadSpec
-from gearfmu.stage.build.flanks import FlankField
+from gearfmu.stage.assembly.flanks import FlankField
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import ProfileSpec
+from gearfmu.stagefile.tables.lead import LeadSpec
 
 
 def test_only_flanks_that_are_not_nominal_are_drawn(tmp_path: Path) -> None:

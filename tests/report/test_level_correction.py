@@ -10,8 +10,8 @@ import pytest
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report import levels
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace, write_columns
+from gearfmu.stagefile.stage import load_stage
 
 ROW = ("pair_loaded", "fast", 28, 5, 6.7, 0.0123, 0.04, 0.05, -0.001, 0.15)
 

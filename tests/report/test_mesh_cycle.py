@@ -23,11 +23,11 @@ from gearfmu.report.mesh_cycle import (
 )
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.signals import SETTLED, Window, window_of_interest
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
 
 TORQUE = 302.0
 

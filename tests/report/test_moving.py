@@ -15,11 +15,11 @@ from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.touching import contacts_at
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N
 TIME = np.linspace(0.0, 0.02, 2001)

@@ -16,9 +16,9 @@ from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.runup import Turning, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings, planet_set
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.stage import load_stage
 
 STEP, SLOW, FAST, DURATION = 5e-5, 60.0, 240.0, 1.0  # s, rad/s of the carrier
 TIME = np.arange(round(DURATION / STEP) + 1) * STEP

@@ -17,8 +17,8 @@ from gearfmu.report.metrics import Spectrum, band_rms
 from gearfmu.report.planets import LEAST_SPAN, planets, shares, sharing
 from gearfmu.report.run import Run
 from gearfmu.report.signals import Window, known_meshings, planet_set
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.stage import load_stage
 
 STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
 MESH = 54 * CARRIER / (2 * np.pi)  # Hz

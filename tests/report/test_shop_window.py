@@ -10,7 +10,7 @@ from gearfmu import cosim
 from gearfmu.commands.runs import DEMO_STEP, with_step
 from gearfmu.report.plots_nvh import octave_table, sampling_warning
 from gearfmu.report.signals import window_of_interest
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage.run.trace import Trace
 
 

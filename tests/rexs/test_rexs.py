@@ -14,8 +14,8 @@ from gearfmu.errors import SpecError
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.reading import read_rexs
-from gearfmu.spec.proposals.new import write_drafted
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.proposals.new import write_drafted
+from gearfmu.stagefile.stage import load_stage
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "rexs"
 PAIR, SET = EXAMPLES / "fzg_c.rexs", EXAMPLES / "planetary54.rexs"

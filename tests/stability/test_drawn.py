@@ -17,8 +17,8 @@ from evidence.stability.record import Inputs, Record, Stopped, Watched, run_time
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, SimulationError, SpecError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stagefile.stage import load_stage
 
 PAIRS, TRAINS, SETS = ("fzg_c/stage_relief", "helical_demo"), ("two_stage",), ("planetary54", "helical_set")
 LIMITS = {  # largest torque (N·m) and speed (rad/s) of the input

@@ -14,7 +14,7 @@ from scipy.optimize import brentq, minimize_scalar, root
 
 from gearfmu.body import Body
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.spec.forms.general import Stage
+from gearfmu.stagefile.forms.general import Stage
 
 DRIVE = 0
 RZ = 5

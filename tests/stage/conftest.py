@@ -6,9 +6,9 @@ import pytest
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="session")

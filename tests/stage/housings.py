@@ -10,7 +10,7 @@ from gearfmu.body.body import Body, How, Node, Sensors
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.spec.forms.general import Stage
+from gearfmu.stagefile.forms.general import Stage
 
 FEET = {
     "foot0": (-0.05, -0.09, 0.01),

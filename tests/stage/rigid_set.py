@@ -23,15 +23,15 @@ from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import set_geometries
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.assembly import mount_sets
-from gearfmu.stage.build.groups import SPIN, Group
-from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.assembly.assemble import mount_sets
+from gearfmu.stage.assembly.groups import SPIN, Group
+from gearfmu.stage.assembly.layout import stage_layout
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import set_geometries
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 HARD = 5e19  # Pa: the local compliance stays above the least that a model may have
 TORQUE = PortSpec(kind="torque")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gearfmu.stage import StageModel
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 
 def by_functions_alone(model: StageModel) -> StageModel:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gearfmu.body.bodies import reduce_body
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.proposals.numbers import Wish, new_from_numbers
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.run.te import loaded_te
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 COARSE = {"modes": 24, "roll_points": 8, "width_functions": 3}
 

@@ -7,14 +7,14 @@ import pytest
 from flank_reader import full_tables
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
-from gearfmu.stage.build.assembly import general_sections, mount_sets
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.compact import residual_sections
-from gearfmu.stage.build.fields import GEAR_NUMBERS, SIZES
-from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.teeth import ROLLS, blend, resampling
+from gearfmu.stage.assembly.assemble import general_sections, mount_sets
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.compact import residual_sections
+from gearfmu.stage.assembly.fields import GEAR_NUMBERS, SIZES
+from gearfmu.stage.assembly.layout import stage_layout
+from gearfmu.stage.assembly.teeth import ROLLS, blend, resampling
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import pytest
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 FAST = 1

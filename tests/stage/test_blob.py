@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as stn
 
 from evidence.sources import rounded_hash
 from gearfmu.errors import ModelError
-from gearfmu.stage.build.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
+from gearfmu.stage.assembly.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
 
 SAMPLE = {
     "name": "fzg_c µm",

@@ -16,8 +16,8 @@ import sections
 
 from evidence.peers.calculix import positions, rigid_bores, section, solid, sun_planet
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stagefile.forms.general import Stage
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "evidence" / "peers" / "calculix"

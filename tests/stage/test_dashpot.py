@@ -9,9 +9,9 @@ from few_modes import with_modes
 
 from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import Steady, assemble
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
 
 SPEED, LOAD = 628.0, 80.0  # rad/s, N·m on the pinion: near the mesh mode
 STEP, SETTLED, SAMPLES = 30e-6, 700, 1400

@@ -15,12 +15,12 @@ from gearfmu import cli
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.scene import Effects
-from gearfmu.spec.tables.ports import PortSpec
+from gearfmu.scenefile.scene import Effects
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 LOAD = 302.0
 TORQUE, SPEED, START = 50.0, 10.0, 20e-6  # N·m, rad/s, s

@@ -12,7 +12,7 @@ from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.general import Stage
+from gearfmu.stagefile.forms.general import Stage
 
 FAST, FULL, EXPLICIT = 1, 3, 5
 CENTRAL = 3

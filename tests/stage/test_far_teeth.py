@@ -9,9 +9,9 @@ import pytest
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN, LinearModel
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stagefile.stage import load_stage
 
 RIGID, FAST, STANDARD, FULL = 0.0, 1.0, 2.0, 3.0
 TORQUE = 600.0

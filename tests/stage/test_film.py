@@ -16,12 +16,12 @@ from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import FilmSpec
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.meshes import REACH, film_impulse
+from gearfmu.stage.assembly.meshes import REACH, film_impulse
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import FilmSpec
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m

@@ -18,16 +18,16 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.relief import ReliefCurve
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
-from gearfmu.spec.tables.gear import GearSpec
-from gearfmu.spec.tables.lead import EndRelief, LeadSpec, Misalignment
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
+from gearfmu.stagefile.tables.gear import GearSpec
+from gearfmu.stagefile.tables.lead import EndRelief, LeadSpec, Misalignment
+from gearfmu.stagefile.tables.ports import PortSpec
 
 NO_CORNERS = {"effect.tip_contact": 0.0}
 PROFILES: dict[str, dict[str, Any]] = {

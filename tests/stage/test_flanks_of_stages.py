@@ -11,17 +11,17 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_shape, planet_angles
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
 from gearfmu.stage import assemble
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.flanks import FlankField
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.flanks import FlankField
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import loaded_te, statics_of
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_shape, planet_angles
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
 
 TORQUE = 600.0
 

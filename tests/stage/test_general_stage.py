@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage
-from gearfmu.spec.forms.shapes import gears_in_mesh, mesh_shape
-from gearfmu.spec.tables.ports import SupportSpec
-from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
-from gearfmu.stage.build.fields import order_sections
-from gearfmu.stage.build.groups import mount
-from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.assemble import MODEL_VERSION, general_sections
+from gearfmu.stage.assembly.fields import order_sections
+from gearfmu.stage.assembly.groups import mount
+from gearfmu.stage.assembly.layout import stage_layout
+from gearfmu.stage.assembly.meshes import tooth_phases
+from gearfmu.stagefile.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage
+from gearfmu.stagefile.forms.shapes import gears_in_mesh, mesh_shape
+from gearfmu.stagefile.tables.ports import SupportSpec
 
 A = 0.0915
 SHAFT = {

@@ -12,11 +12,11 @@ import pytest
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gearfmu.stage.build.assembly import assemble, general_sections
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.compact import ground_rows
-from gearfmu.stage.build.ground_part import read_tables, turn_tables
-from gearfmu.stage.build.groups import SPIN, mount
-from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.teeth import OFFSETS, blend, resampling, symmetric_functions
+from gearfmu.stage.assembly.assemble import assemble, general_sections
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.compact import ground_rows
+from gearfmu.stage.assembly.ground_part import read_tables, turn_tables
+from gearfmu.stage.assembly.groups import SPIN, mount
+from gearfmu.stage.assembly.layout import stage_layout
+from gearfmu.stage.assembly.teeth import OFFSETS, blend, resampling, symmetric_functions
 
 LOADS = [
     (0, 0, 5, 0),

@@ -14,11 +14,11 @@ from gearfmu.body import Body
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
 
 HELD = {"effect.bearings": 0.0}  # axes
 

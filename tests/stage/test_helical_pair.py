@@ -11,14 +11,14 @@ import pytest
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.lead import LeadSpec, Misalignment
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.fields import change_gear
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.fields import change_gear
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.lead import LeadSpec, Misalignment
+from gearfmu.stagefile.tables.ports import PortSpec
 
 TORQUE, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}

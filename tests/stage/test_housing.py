@@ -14,16 +14,16 @@ from gearfmu.body.body import Body, Node, rigid_rows
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.modes.housing import placed_housing
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.assembly import mount_sets
-from gearfmu.stage.build.ground_part import GroundPart
-from gearfmu.stage.build.groups import Group, Layout, Support, mount, node_directions
-from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.assembly.assemble import mount_sets
+from gearfmu.stage.assembly.ground_part import GroundPart
+from gearfmu.stage.assembly.groups import Group, Layout, Support, mount, node_directions
+from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 TORQUE, SPEED, H = 150.0, 150.0, 20e-6
 

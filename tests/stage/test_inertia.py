@@ -9,8 +9,8 @@ import pytest
 import small_gear
 
 from gearfmu.reduction.cyclic.modal import elastic_modes
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage.run.inertia import gear_inertia, largest_speeds
+from gearfmu.stagefile.stage import load_stage
 
 
 def test_speeds_are_those_of_the_fastest_the_stage_may_turn() -> None:

@@ -19,12 +19,12 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.build.meshes import tooth_phases
+from gearfmu.stage.assembly.meshes import tooth_phases
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.spec.forms.general import GearBody, Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import SupportSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stagefile.forms.general import GearBody, Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import SupportSpec
 
 H, DURATION = 20e-6, 4e-4
 BETWEEN = 1e9  # N/m

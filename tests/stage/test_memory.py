@@ -10,8 +10,8 @@ from few_modes import with_modes
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import instance
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
+from gearfmu.stagefile.stage import load_stage
 
 GUARD, PATTERN = 1 << 22, 0xA5
 

@@ -13,11 +13,11 @@ import pytest
 from evidence.energy.free import Rattle, energies, free_pair, started
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.build.meshes import flank_nodes, mesh_penalty
+from gearfmu.stage.assembly.meshes import flank_nodes, mesh_penalty
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 PAPER, LINE, NODAL = 4, 1, 2
 SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion

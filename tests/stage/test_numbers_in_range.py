@@ -19,15 +19,15 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import gearfmu as gf
-import gearfmu.spec
+import gearfmu.stagefile
 from gearfmu.cli import outcome
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.ranges import Range, all_ranges, kernel_limits, range_of
-from gearfmu.spec.reading.base import Quantity, Spec, Whole, metadata_of, validate
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.lead import Misalignment
-from gearfmu.spec.tables.profile import read_profile
 from gearfmu.stage.run.steady import CASE_RANGES, PARAMETER_RANGES
+from gearfmu.stagefile.reading.base import Quantity, Spec, Whole, metadata_of, validate
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.lead import Misalignment
+from gearfmu.stagefile.tables.profile import read_profile
 
 Annotation = Quantity | Whole
 FILE = "some.toml"
@@ -35,9 +35,9 @@ FILE = "some.toml"
 
 def classes(kind: type[Spec] = Spec) -> set[type[Spec]]:
     """Every class of a table that a file may hold."""
-    for module in pkgutil.iter_modules(gearfmu.spec.__path__):
-        importlib.import_module(f"gearfmu.spec.{module.name}")
-    own = kind.__module__.startswith("gearfmu.spec") and bool(kind.model_fields)
+    for module in pkgutil.iter_modules(gearfmu.stagefile.__path__):
+        importlib.import_module(f"gearfmu.stagefile.{module.name}")
+    own = kind.__module__.startswith("gearfmu.stagefile") and bool(kind.model_fields)
     return ({kind} if own else set()).union(*(classes(inner) for inner in kind.__subclasses__()))
 
 
@@ -236,7 +236,7 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
 
 
 def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file(tmp_path: Path) -> None:
-    from gearfmu.spec.forms.general_checks import general_problems
+    from gearfmu.stagefile.forms.general_checks import general_problems
 
     stage = gf.load("two_stage")
     many = stage.model_copy(update={"engagements": stage.engagements[:1] * 13})

@@ -19,16 +19,16 @@ from gearfmu.femesh import sector_mesh
 from gearfmu.kernel import Kernel
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_shape, set_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.groups import MOTIONS
-from gearfmu.stage.build.meshes import tooth_phases
-from gearfmu.stage.build.observed import MODE, MOTION
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.groups import MOTIONS
+from gearfmu.stage.assembly.meshes import tooth_phases
+from gearfmu.stage.assembly.observed import MODE, MOTION
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_shape, set_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
 
 TORQUE, SLICES = 600.0, 5
 MESH = MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2)

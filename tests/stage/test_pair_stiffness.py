@@ -20,9 +20,9 @@ from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.tables.gear import GearSpec
 from gearfmu.stage import StageModel
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.gear import GearSpec
 
 LINE_LOAD = 300e3  # N/m
 

@@ -12,11 +12,11 @@ import pytest
 
 import gearfmu as gf
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.forms.turning import meshings, turns
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stage.build.meshes import direction_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 STEP, SETTLES, PITCHES, POSITIONS = 2e-5, 5e-3, 2, 64
 RIGID = {"effect.elastic": 0.0, "level": 0.0}
@@ -111,9 +111,9 @@ def in_motion(model: StageModel, case: Case) -> list[float]:
 )
 def test_gears_lose_the_integral_over_the_path(case: Case) -> None:
     """Within 0.5 %; the second mesh of the train carries on coast flanks. The two ways differ by .78 % of a train cut
-    into 5 slices, .36 % with 14, .28 % with 20, whatever the step. The coefficient is so small that planets hardly swing
-    where friction changes sides. Between rigid gears it may be five times that; an elastic ring would stick around the
-    pitch point until twice the friction has bent it back, and lose 2 to 5 % less."""
+    into 5 slices, .36 % with 14, .28 % with 20, whatever the step. The coefficient is so small that planets hardly
+    swing where friction changes sides. Between rigid gears it may be five times that; an elastic ring would stick
+    around the pitch point until twice the friction has bent it back, and lose 2 to 5 % less."""
     model = gf.assemble(case.name)
     for mesh, power in zip(case.engagements, in_motion(model, case), strict=True):
         path = by_the_path(model, case, mesh)

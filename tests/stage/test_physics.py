@@ -12,10 +12,10 @@ from gearfmu.body import Body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 PITCH = 2 * math.pi / 24  # rad, of the wheel
 LOAD = 302.0

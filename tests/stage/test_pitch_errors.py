@@ -16,12 +16,12 @@ from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.body import expected_hash
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.reading.files import find_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.build.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stagefile.forms.body import expected_hash
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.reading.files import find_stage
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
 DEVIATION = 50e-6

@@ -16,8 +16,8 @@ import pytest
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
 from evidence.stability.planetary import ALL_MESHES, TORQUE, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import rewritten
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import rewritten
 
 H, STEPS = 5e-6, 400
 CONSERVING = {

@@ -8,10 +8,10 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 H, STEP = 5e-6, 2e-5

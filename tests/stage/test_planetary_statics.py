@@ -18,13 +18,13 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
 from gearfmu.modes.linear import linearised
-from gearfmu.spec.forms.expand import rewritten, with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.turning import turns
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te, statics_of
+from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.turning import turns
+from gearfmu.stagefile.stage import load_stage
 
 TORQUE = 600.0  # N·m on the carrier, driving
 R_SUN = 1.25e-3 * 18 * math.cos(math.radians(20))  # base radius of sun and planets, m

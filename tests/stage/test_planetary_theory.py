@@ -21,12 +21,12 @@ from scipy.integrate import cumulative_trapezoid
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.modes.linear import linearised
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.ports import PortSpec
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02

@@ -11,11 +11,11 @@ import pytest
 import gearfmu as gf
 from gearfmu import cli
 from gearfmu.errors import SpecError
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.tables.ports import PortSpec
-from gearfmu.spec.tables.profile import Profile, read_profile
 from gearfmu.stage.run.profiled import Line, Profiled, winding_torques
 from gearfmu.stage.run.simulate import Steady
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.profile import Profile, read_profile
 
 RPM = np.pi / 30
 BASE_RADIUS = 33.8289e-3  # m, of the pinion

@@ -13,18 +13,18 @@ from gearfmu.bearing import rest
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.bearings import OperatingSpec, RollerBearing
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.build.assembly import settled, tangents_of
-from gearfmu.stage.build.blob import read_blob
-from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.rolling import SETTLED, Settled
+from gearfmu.stage.assembly.assemble import settled, tangents_of
+from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.layout import stage_layout
+from gearfmu.stage.assembly.rolling import SETTLED, Settled
 from gearfmu.stage.run.bearings import stage_bearings
 from gearfmu.stage.run.limits import beyond_limits
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.te import loaded_te
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.bearings import OperatingSpec, RollerBearing
 
 HELD = {"effect.bearings": 0.0}  # axes
 

@@ -12,9 +12,9 @@ import pytest
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.stage import load_stage
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 H = 60e-6  # s, communication step: 8, 16, 32 … internal steps of 7.5, 3.75, 1.875 … µs

@@ -18,14 +18,14 @@ from slices import by_functions_alone
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.build.blob import read_blob, write_blob
-from gearfmu.stage.build.layout import width_degrees
-from gearfmu.stage.build.slices import DISTANCES, between_functions
+from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.layout import width_degrees
+from gearfmu.stage.assembly.slices import DISTANCES, between_functions
 from gearfmu.stage.run.te import mesh_harmonics, place_of, statics_of
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.lead import Misalignment
 
 HELD = {"effect.bearings": 0.0}  # axes
 

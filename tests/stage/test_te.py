@@ -11,10 +11,10 @@ import pytest
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.expand import with_ports
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.tables.ports import ChainSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stagefile.forms.expand import with_ports
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.ports import ChainSpec
 
 LOAD = 302.0  # N·m on the pinion
 PITCH = 2 * math.pi / 24  # rad, of the wheel

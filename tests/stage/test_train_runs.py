@@ -13,15 +13,15 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.spec.forms.general import RotorSpec, Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.forms.turning import shafts_of
-from gearfmu.spec.reading.base import read_toml
-from gearfmu.spec.reading.files import find_stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.general import RotorSpec, Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.forms.turning import shafts_of
+from gearfmu.stagefile.reading.base import read_toml
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s

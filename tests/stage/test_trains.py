@@ -11,9 +11,9 @@ import scipy.linalg as sl
 from handmade import on_axis
 
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
-from gearfmu.stage.build.ground_part import GroundPart, Reading, ground_part, read_tables
-from gearfmu.stage.build.groups import Layout, Support, mount, node_directions
-from gearfmu.stage.build.teeth import OFFSETS, resampling
+from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part, read_tables
+from gearfmu.stage.assembly.groups import Layout, Support, mount, node_directions
+from gearfmu.stage.assembly.teeth import OFFSETS, resampling
 
 STEEL = Steel(206e9, 0.3, 7850.0)
 SHAFTS = [

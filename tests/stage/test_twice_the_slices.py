@@ -11,11 +11,11 @@ from gearfmu import cli
 from gearfmu.body import load_bodies
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.planning.choice import space
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run import refinement
 from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, left_of_slices, twice
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from evidence.study import order
 from evidence.study.flat import FlatPair, contact_frequencies, contact_rows, exact_force
-from gearfmu.spec.scene import load_scene
+from gearfmu.scenefile.scene import load_scene
 from gearfmu.study.ladder import window
 
 CLOSED = ("dg4", "em")

@@ -15,8 +15,8 @@ from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu import cli
 from gearfmu.errors import SpecError
 from gearfmu.report.study import write_chart
-from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.stage.build.teeth import ROLLS
+from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.stage.assembly.teeth import ROLLS
 from gearfmu.study import Job, ReferenceRow, Row, study
 from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points

@@ -11,8 +11,8 @@ import pytest
 from evidence.study.__main__ import main as program
 from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
-from gearfmu.spec.scene import load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.scenefile.scene import load_scene
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study import Job, study
 from gearfmu.study.ladder import SET_DURATION, SET_SETTLE, window
 from gearfmu.study.table import read_rows, write_rows

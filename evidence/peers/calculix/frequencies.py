@@ -27,9 +27,9 @@ from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.spec.forms.shapes import gear_geometry
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import Material
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import Material
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent

@@ -34,13 +34,13 @@ from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_force
 from gearfmu.body import Body, load_body
 from gearfmu.body.store import save_body
 from gearfmu.geometry import PairGeometry, hertz
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import MeshSpec
-from gearfmu.spec.tables.lead import Misalignment
 from gearfmu.stage import assemble
 from gearfmu.stage.run.te import TANGENT, place_of, statics_of
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.lead import Misalignment
 
 WIDTH, LAYERS, SLICES = 12e-3, 5, 10
 POSITIONS = 4

@@ -29,10 +29,10 @@ from evidence.peers.calculix.solid import extruded
 from gearfmu.body import reduce_bodies
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.stage import load_stage
 
 POSITIONS = 8
 TORQUES = (40.0, 120.0)  # N·m on the pinion

@@ -34,9 +34,9 @@ from evidence.peers.calculix.sun_planet import set_bodies, sun_planet
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry, hertz
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 POSITIONS = 12
 TORQUES = {"fzg_c": (80.0, 302.0, 600.0), "sun_planet": OF_SET}  # N·m on the pinion

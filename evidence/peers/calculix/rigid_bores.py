@@ -12,8 +12,8 @@ from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_geometry
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_geometry
 
 
 def rigid_bore_bodies(spec: Stage) -> list[Body]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.spec.forms.expand import rewritten
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.planetary import SetGearSpec
-from gearfmu.spec.stage import load_stage
-from gearfmu.spec.tables.gear import GearSpec
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import SetGearSpec
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.gear import GearSpec
 
 TORQUES = (37.5, 75.0)  # N·m on the sun: its share at 600 N·m on the carrier, and twice that
 

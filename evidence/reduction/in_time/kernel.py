@@ -26,9 +26,9 @@ from gearfmu.body import reduce_bodies
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.build.meshes import mesh_penalty
+from gearfmu.stage.assembly.meshes import mesh_penalty
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 HERE = Path(__file__).parent
 START = Rattle(position=0.1, speed=1.0)

@@ -32,9 +32,9 @@ from evidence.reduction.in_time.transient import Assembly, Joints, Member
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.reduction.full_order import Interface
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import set_geometry
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import set_geometry
+from gearfmu.stagefile.stage import load_stage
 
 
 def ring_hammering(meshes: Meshes) -> Scene:

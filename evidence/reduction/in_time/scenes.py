@@ -25,8 +25,8 @@ from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
-from gearfmu.spec.forms.shapes import set_geometry
-from gearfmu.spec.stage import load_stage
+from gearfmu.stagefile.forms.shapes import set_geometry
+from gearfmu.stagefile.stage import load_stage
 
 TORQUE, RAMP = 150.0, 0.1e-3  # N·m, s
 SPEED = 25.0  # rad/s of carrier and planet where they hammer

@@ -21,8 +21,8 @@ from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
-from gearfmu.spec.forms.planetary import CarrierBody
-from gearfmu.spec.forms.shapes import carrier_geometry
+from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import carrier_geometry
 
 _OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
 

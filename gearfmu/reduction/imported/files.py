@@ -18,7 +18,7 @@ from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
 from gearfmu.femesh.imported import ImportedMesh, read_mesh
 from gearfmu.reduction.imported.couplings import Matrices
-from gearfmu.spec.tables.imported import FilesSpec
+from gearfmu.stagefile.tables.imported import FilesSpec
 
 _AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
 

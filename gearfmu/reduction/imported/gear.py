@@ -22,7 +22,7 @@ from gearfmu.reduction.imported.flank import FitRange, fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
 from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.memory import MESH_COARSER, Need, ReductionSize, require_memory, sector_need, whole_need
-from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
+from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 BORE = "bore"
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)

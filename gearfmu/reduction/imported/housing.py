@@ -23,7 +23,7 @@ from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_cou
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.imported.skin import Surface, closed_surface, enveloping_surface
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
-from gearfmu.spec.tables.housing import HousingBody, HousingImportSpec
+from gearfmu.stagefile.tables.housing import HousingBody, HousingImportSpec
 
 HOUSING_FACTORS = 5  # of K, with the interfaces held, and at the reference's three points
 

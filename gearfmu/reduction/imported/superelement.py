@@ -2,9 +2,9 @@
 coordinates, as a FullOrder whose interfaces are rows of the unit matrix.
 
 Its rigid motion follows from the places of its points: R of the points, and of the modal coordinates z whatever leaves
-no force on them, K_zz z = −K_zp R; 0 for those of modes with the points held (Craig–Bampton). A point that its recovery
-gives is a sensor or a place on its skin. Rotations are rad; where one unit of length in the files is L, forces on
-points are L⁻¹ times moments (theory, section 7).
+no force on them, K_zz z = −K_zp R; 0 for those of modes with the points held (Craig–Bampton). Sensors and places on
+its skin are points of it, or what its recovery gives. Rotations are rad; where one unit of length in the files is L,
+forces on points are L⁻¹ times moments (theory, section 7).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from gearfmu.femesh.points import read_points
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.housing import ImportedHousing
 from gearfmu.reduction.imported.skin import Surface, enclosed
-from gearfmu.spec.tables.housing import HousingBody, HousingReducedSpec
+from gearfmu.stagefile.tables.housing import HousingBody, HousingReducedSpec
 
 MOST = 3000  # unknowns: matrices are full
 RIGID = 1e-5  # largest force of a rigid motion, relative to that of the single stiffnesses in it

@@ -9,10 +9,10 @@ import numpy as np
 
 from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, pass_orders, pass_swing
 from gearfmu.body import Body
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.assembly import settled
-from gearfmu.stage.build.rolling import BALL_NUMBERS, ROLLER_NUMBERS, filled
-from gearfmu.stage.build.shown import Card, Shown
+from gearfmu.stage.assembly.assemble import settled
+from gearfmu.stage.assembly.rolling import BALL_NUMBERS, ROLLER_NUMBERS, filled
+from gearfmu.stage.assembly.shown import Card, Shown
+from gearfmu.stagefile.forms.general import Stage
 
 AXES = ("x", "y", "z", "rx", "ry")
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
-from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.simulate import Steady, simulate
+from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 STEP = 2e-5  # s
 

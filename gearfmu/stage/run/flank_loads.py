@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.shapes import face_width, mesh_shape
-from gearfmu.stage.build.meshes import direction_of, mesh_axes, tooth_phases
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.limits import limit_named
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.shapes import face_width, mesh_shape
 
 SIDES = (1, -1)  # of the kernel's flanks 0 (drive) and 1 (coast)
 

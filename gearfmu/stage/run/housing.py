@@ -20,10 +20,10 @@ import scipy.linalg as sl
 
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.assembly import layout_of
-from gearfmu.stage.build.groups import FORCES, Group, mount
+from gearfmu.stage.assembly.assemble import layout_of
+from gearfmu.stage.assembly.groups import FORCES, Group, mount
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import Stage
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.spec.forms.general import Stage
-from gearfmu.spec.forms.shapes import gear_shape
-from gearfmu.spec.forms.turning import turns
-from gearfmu.stage.build.assembly import stage_group
-from gearfmu.stage.build.groups import Group
-from gearfmu.stage.build.observed import gear_bodies
-from gearfmu.stage.build.spinning import turn_rates
-from gearfmu.stage.build.whirls import whirl_rows
+from gearfmu.stage.assembly.assemble import stage_group
+from gearfmu.stage.assembly.groups import Group
+from gearfmu.stage.assembly.observed import gear_bodies
+from gearfmu.stage.assembly.spinning import turn_rates
+from gearfmu.stage.assembly.whirls import whirl_rows
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.forms.turning import turns
 
 WHIRL_BAND = 15e3  # Hz
 

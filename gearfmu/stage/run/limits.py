@@ -9,9 +9,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from gearfmu.errors import SimulationError
-from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.place import MeshPlace, place_of
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 RPM = 30 / np.pi
 OPERATING_RANGE = 2.0  # of torques over that at which bearings are linearised; a factor on stiffness of about 1.3

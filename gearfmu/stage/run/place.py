@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.general import EngagementSpec
-from gearfmu.spec.forms.shapes import mesh_shape
-from gearfmu.spec.forms.turning import turns
-from gearfmu.stage.build.meshes import kind_of
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.meshes import kind_of
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stagefile.forms.general import EngagementSpec
+from gearfmu.stagefile.forms.shapes import mesh_shape
+from gearfmu.stagefile.forms.turning import turns
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.simulate import Steady, Wound
 
 BETWEEN = 8  # largest part of the range of torques between two of them whose winding is computed: 1/BETWEEN

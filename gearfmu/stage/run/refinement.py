@@ -10,9 +10,9 @@ import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.ranges import all_ranges
-from gearfmu.spec.forms.general import Stage, ToothedBody
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.te import loaded_te
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
 
 ORDERS, POSITIONS = 8, 20
 HEARD = 10e-9  # m: an order that changes by less, a hundredth of the form deviations of the finest flanks (ISO 1328-1,

@@ -19,11 +19,11 @@ from gearfmu.files import write_text
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
 from gearfmu.kernel.instance import Recording
-from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.stage.build.assembly import FIXED_K
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.assemble import FIXED_K
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stage.run.winding import mean_winding, rubbed_away
+from gearfmu.stagefile.forms.turning import meshings, turns
 
 WINDING_POSITIONS, LOSS_STEPS = 16, 100  # over a pitch
 CHUNKS, LEAST_CHUNK = 200, 16  # a run is made in at most so many calls of the kernel, of at least so many steps

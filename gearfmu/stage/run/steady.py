@@ -12,13 +12,13 @@ import numpy as np
 from gearfmu.errors import ModelError, Problem, SpecError, near_or_all
 from gearfmu.kernel import Variable
 from gearfmu.ranges import Range, range_of, range_problems
-from gearfmu.spec.forms.turning import require_driven
-from gearfmu.spec.tables.profile import Profile
-from gearfmu.stage.build.model import StageModel
+from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.limits import beyond_limits, limit_named
 from gearfmu.stage.run.profiled import Line, Profiled
 from gearfmu.stage.run.simulate import Inputs, Steady, simulate
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.turning import require_driven
+from gearfmu.stagefile.tables.profile import Profile
 
 DURATION = 0.1  # s, of a run whose profile says none
 CASE_RANGES = {

@@ -17,12 +17,12 @@ import numpy as np
 from gearfmu.geometry.iso6336 import mesh_stiffness
 from gearfmu.geometry.planetary import set_ratio
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.spec.forms.general import GearBody, RingBody, Stage
-from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape, toothed
-from gearfmu.stage.build.model import StageModel
-from gearfmu.stage.build.shown import Card, Shown, plot_over
+from gearfmu.stage.assembly.model import StageModel
+from gearfmu.stage.assembly.shown import Card, Shown, plot_over
 from gearfmu.stage.run.limits import each_load
 from gearfmu.stage.run.place import MeshPlace, place_of
+from gearfmu.stagefile.forms.general import GearBody, RingBody, Stage
+from gearfmu.stagefile.forms.shapes import face_width, gear_shape, mesh_shape, toothed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

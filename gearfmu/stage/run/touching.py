@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.forms.general import EngagementSpec, Stage
-from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
-from gearfmu.stage.build.meshes import kind_of
+from gearfmu.stage.assembly.meshes import kind_of
 from gearfmu.stage.run.trace import Trace
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage
+from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
 
 GEAR_PHI = ".gear.phi"
 

@@ -18,7 +18,7 @@ from gearfmu.errors import GearfmuError, near_or_all
 from gearfmu.extras import required
 from gearfmu.files import written_whole
 from gearfmu.hdf5 import Format, reading, writing
-from gearfmu.stage.build.shown import Card, Shown, grouped, plot_over
+from gearfmu.stage.assembly.shown import Card, Shown, grouped, plot_over
 from gearfmu.units import quantity_text
 
 if TYPE_CHECKING:

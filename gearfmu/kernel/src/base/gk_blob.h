@@ -1,4 +1,4 @@
-/* A blob: one checked block of named, constant arrays (written by gearfmu/stage/build/blob.py).
+/* A blob: one checked block of named, constant arrays (written by gearfmu/stage/assembly/blob.py).
  * Opening checks magic, version, size, SHA-256, alignment, bounds and overlap of every section, and that every f64 and
  * f32 is finite; after that the accessors only look up. */
 #ifndef GK_BLOB_H

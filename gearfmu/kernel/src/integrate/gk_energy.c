@@ -75,8 +75,8 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         }
     }
     data->energy.dissipated += taken - (held - s->energy.held0);
-    if (work->another) data->energy.baseline += s->energy.stored0 + s->energy.held0;
-    return gk_solve_stored(s) + held;
+    if (work->another) data->energy.baseline += s->energy.stored0 + s->energy.held0 - s->energy.shift0;
+    return gk_solve_stored(s) + held - s->energy.shift;
 }
 
 /* Books what friction took in an engagement; returns what it holds. */

@@ -53,6 +53,7 @@ typedef struct gk_meshing { /* an engagement */
     double squeezed;          /* energy lost to the squeeze film */
     double rolling, unsteady; /* speed of gear A and its deviation from that, means over the last millisecond */
     double energy_error;      /* defect of energy that the balance of contacts tolerated so far */
+    double shift;             /* account of the invariant's jumps where contacts close and open (theory, 12c) */
     double pitch_angle, pitch_time,
         pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;

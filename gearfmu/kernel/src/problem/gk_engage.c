@@ -109,6 +109,7 @@ void gk_memory_recall(const gk_model *model, const gk_setup *setup, gk_work *wor
     else
         gk_solve_begin_dashpots(s);
     s->energy.error = GK_OF(data, meshing)[e].energy_error;
+    s->energy.shift = s->energy.shift0 = GK_OF(data, meshing)[e].shift;
     s->energy.correction = gk_clamp(s->energy.error, -PAYABLE * s->energy.stored0, PAYABLE * s->energy.stored0);
 }
 
@@ -127,6 +128,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     for (int b = 0; b < s->blocks; b++) gk_verbs_of(s->block[b].kind)->keep(setup, engaged, data, &s->block[b]);
     meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
     meshing->energy_error = s->energy.error;
+    meshing->shift = s->energy.shift;
 }
 
 /* an engagement without rows */

@@ -118,6 +118,7 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     gk_system *s = &engaged->system;
     const gk_forming f = {model, setup, data, work, e};
     list_rows(&f, k->h, s);
+    s->energy.lead = gk_min(1.0, 4.0 * k->gamma - 1.0) / 24.0;
     const size_t size = (size_t)(s->stride * s->stride + 4); /* a quad may write beyond the last row */
     const int tables = work->room.table_h > 0.0 && k->h == work->room.table_h && k->gamma == work->room.table_gamma &&
                        !setup->mesh[e].joined;

@@ -164,6 +164,17 @@ static int fills(const gk_base *base, const gk_mesh *mesh)
     return !mesh->joined && width == mesh->local;
 }
 
+/* clears the rows of the contacts beside what the first gear writes of them */
+static void clear_beside(const gk_base *base, const gk_mesh *mesh, gk_engaged *engaged)
+{
+    const int at = mesh->at[0], end = at + base->width[mesh->side[0].gear];
+    double *row = engaged->ground;
+    for (int i = 0; i < engaged->system.contacts; i++, row += engaged->local) {
+        memset(row, 0, (size_t)at * sizeof *row);
+        memset(row + end, 0, (size_t)(engaged->local - end) * sizeof *row);
+    }
+}
+
 /* rows of the joints at bores on the oscillators that a side reads */
 static void joint_rows(const gk_setup *setup, const gk_mesh *mesh, gk_engaged *engaged, int w)
 {
@@ -203,8 +214,11 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     gk_felt_plan(setup, work, engaged);
     const int local = engaged->local;
     if (!local) return;
-    const int afresh = fills(base, mesh);
-    if (!afresh) memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
+    const int afresh = fills(base, mesh), alone = !engaged->by_patterns[0] && !engaged->by_patterns[1];
+    if (!afresh && alone)
+        clear_beside(base, mesh, engaged);
+    else if (!afresh)
+        memset(engaged->ground, 0, (size_t)(engaged->system.contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &mesh->side[w];
         const int at = engaged->by_patterns[0] && w ? engaged->wide[0] : mesh->at[w];
@@ -213,7 +227,7 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
             gk_felt_rows(setup, work, e, w);
             continue;
         }
-        if (afresh) {
+        if (afresh || (alone && !w)) {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, WRITE)
         } else {
             GK_STRIPPED(GK_STRIPS(setup), ground_rows, &f, setup->spatial, ADD)

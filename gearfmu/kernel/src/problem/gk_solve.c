@@ -271,13 +271,33 @@ static double deflected_by_these(const gk_system *s, int i)
     return sum;
 }
 
+/* distance when it is open */
+static double open_distance(const gk_system *s, int i)
+{
+    return gk_max(0.0, passes(s, i) > 0 ? s->dashpot.apart[i] : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i));
+}
+
 /* The part of the step in which such a contact touches, by even motion: its deflection when closed, over that and the
  * distance when open. The scalar of the step's energy gives its mean force that part. */
 static double touching(const gk_system *s, int i)
 {
-    const double own = deflected_by_these(s, i),
-                 left = passes(s, i) > 0 ? s->dashpot.apart[i] : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
-    return own > 0.0 ? own / (own + gk_max(0.0, left)) : 1.0;
+    const double own = deflected_by_these(s, i);
+    return own > 0.0 ? own / (own + open_distance(s, i)) : 1.0;
+}
+
+/* Half the jump of the invariant where contacts close and open, by even motion (docs/theory.md, 12c) */
+double gk_solve_jump(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    double sum = 0.0;
+    for (int i = 0; i < s->contacts && !gk_film_on(s); i++) {
+        const int way = passes(s, i);
+        const double own = way ? deflected_by_these(s, i) : 0.0;
+        if (!(own > 0.0)) continue;
+        const double moved = own + open_distance(s, i);
+        sum -= way * (way > 0 ? s->force[i] : s->force0[i]) / own * moved * moved;
+    }
+    return s->energy.lead * sum;
 }
 
 /* |η_d| of such a contact per λ0 + λ1. By even motion its damper is at its limit, the force, until that has grown to

@@ -71,6 +71,8 @@ typedef struct gk_dashpots { /* η_d in the step, f_d at its end, A f_d; 0: of t
 typedef struct gk_account {    /* energy of the quasi-static part */
     double stored0, held0;     /* at the start of the step; what the dampers' force holds in Q then */
     double error, correction;  /* defect that the steps before left; what of it this step should make good */
+    double shift0, shift;      /* account of the invariant's jumps (12c), at the start and at the end */
+    double lead;               /* half of what states lead the motion by, over h²: 1/24 at γ = 1 */
     double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
     double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
 } gk_account;
@@ -218,6 +220,7 @@ GK_HOT void gk_solve_status(gk_system *s);
 GK_HOT void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
 GK_HOT void gk_solve_path(const gk_system *s, const double *x, double *y);
 GK_HOT double gk_solve_stored(const gk_system *s);
+GK_HOT double gk_solve_jump(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the
  * distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i)

@@ -281,7 +281,7 @@ static int all_small(const double *v, size_t count)
 static int good_meshing(const gk_meshing *m)
 {
     int good = m->pairs >= 0 && m->pairs <= MAX_PAIRS && all_small(m->frozen, POSE) && gk_finite(m->search_distance) &&
-               gk_finite(m->open_time) && gk_finite(m->squeezed) && gk_finite(m->energy_error) &&
+               gk_finite(m->open_time) && gk_finite(m->squeezed) && gk_finite(m->energy_error) && gk_finite(m->shift) &&
                all_small(&m->pitch_angle, 1) && all_small(&m->pitch_time, 1) && all_small(&m->pitch_impulse, 1);
     for (int p = 0; good && p < m->pairs; p++)
         good = (m->memory[p].key.flank == 0 || m->memory[p].key.flank == 1) &&

@@ -142,7 +142,7 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
 }
 
 /* ---- which oscillators are dynamic ------------------------------------------------------------------------------- */
-/* how many modes of a gear group are dynamic, from the first on (gearfmu/stage/build/levels.py has their order) */
+/* how many modes of a gear group are dynamic, from the first on (stage/assembly/levels.py has their order) */
 int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
 {
     GK_ASSERT(gk_is_gear(model, g));

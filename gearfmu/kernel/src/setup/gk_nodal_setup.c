@@ -124,7 +124,7 @@ static double blended(const gk_grid *grid, const gk_real *table, int functions, 
     return sum;
 }
 
-/* part c0, c_c or c_s of a row of modes of nodal diameter 0 and 1 (gearfmu/stage/build/free.py, turn_tables), from that
+/* part c0, c_c or c_s of a row of modes of nodal diameter 0 and 1 (ground_part.py, turn_tables), from that
  * on tooth 0 */
 static double low_part(const gk_gear *gear, const double *row, int part, int k)
 {

@@ -1,4 +1,4 @@
-/* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/build/
+/* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (stage/assembly/
  * compact.py).
  * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large.
  * Rows are kept in the setup, compliances only while the sides of their gear are filled. */

@@ -1,0 +1,254 @@
+"""SceneSpec: a stage in a drivetrain, what happens to it, for how long, and how the two are coupled."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AliasChoices, Field, SerializerFunctionWrapHandler, model_serializer
+
+from gearfmu.errors import Problem, SpecError, near_or_all
+from gearfmu.scenefile.deformation import DeformationChoice, deformation_problems
+from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.parts import ClutchSpec, Drivetrain, drivetrain_problems
+from gearfmu.scenefile.shaft_loads import ShaftLoad, load_problems, time_problems
+from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
+from gearfmu.stagefile.reading.files import Changes, changed_tables, merged_tables, shipped_stages
+
+SHIPPED = Path(__file__).parent.parent / "scenes"
+TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}
+SPEED = "start.pinion_speed"
+DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
+Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
+Integrator = Literal["dg4", "em", "rk45", "central"]
+Contact = Literal["by_level", "line", "nodal"]
+
+
+class Effects(Spec):
+    """Effects of the stage, all on unless switched off: docs/effects.md."""
+
+    elastic: Switch = True
+    residual: Switch = True
+    hertz: Switch = True
+    coast_flank: Switch = True
+    contact_damping: Switch = True
+    tip_relief: Switch = True
+    tip_contact: Switch = True
+    bearings: Switch = True
+    modal_damping: Switch = True
+    roll_motion: Switch = True
+    coriolis: Switch = True
+    centrifugal: Switch = True
+    gyroscopic: Switch = True
+    flank_deviations: Switch = True
+    runout: Switch = True
+    friction: Switch = True
+    film: Switch = True
+    housing: Switch = True
+
+    @model_serializer(mode="wrap")
+    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Scenes that are older than housings stay what they were."""
+        tables: dict[str, object] = handler(self)
+        return {key: value for key, value in tables.items() if key != "housing" or not value}
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """Names of those that are off."""
+        return tuple(name for name, on in self if not on)
+
+
+class StageChoice(Spec):
+    """Which stage, and how it is computed. h = 0: the step that suits model and level; contact:
+    docs/howto-nodal.md."""
+
+    name: Annotated[Text, Field(description='a path or the name of a shipped stage, e.g. "fzg_c/stage_relief"')]
+    level: Level = "standard"
+    integrator: Integrator = "dg4"
+    contact: Contact = "by_level"
+    slices: Annotated[Count, Whole("slices")] = 5
+    h: Annotated[float, Quantity("internal_step")] = 0.0
+    effects: Effects = Effects()
+
+
+class CouplingChoice(Spec):
+    """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0
+    for the communication step."""
+
+    step: Annotated[float, Quantity("step"), Field(description="communication step")]
+    master: Literal["gs_mean", "jacobi"] = "gs_mean"
+    micro_step: Annotated[float, Quantity("micro_step")] = 0.0
+
+
+class StartSpec(Spec):
+    """Speeds at the start; pinion_speed, also written input_speed: of the stage's input, its first port; slip: engine
+    faster than the pinion by this."""
+
+    pinion_speed: Annotated[float, Quantity("speed")] = Field(
+        validation_alias=AliasChoices("pinion_speed", "input_speed")
+    )
+    slip: Annotated[float, Quantity("speed")] = 0.0
+
+
+class SceneSpec(Spec):
+    """A scene. Exactly one of `passenger_car`, `test_rig`, `shaft_loads` and `drivetrain`; the car needs a `clutch`.
+
+    record : names of stage outputs and drivetrain variables, "*" and "?" as in file names. deformation : gears that
+    are recorded deformed; nothing of that is computed without.
+    """
+
+    name: Name
+    description: Text
+    duration: Annotated[float, Quantity("duration")]
+    settle: Annotated[float, Quantity("time")] = 0.0
+    stage: StageChoice
+    coupling: CouplingChoice
+    start: StartSpec
+    clutch: ClutchSpec | None = None
+    passenger_car: PassengerCar | None = None
+    test_rig: TestRig | None = None
+    shaft_loads: dict[Name, ShaftLoad] | None = None
+    drivetrain: Drivetrain | None = None
+    record: tuple[Text, ...] = ("*",)
+    deformation: DeformationChoice | None = None
+
+    @property
+    def hash(self) -> str:
+        """SHA-256, hex, over all values in SI; the text of the file does not matter."""
+        values = self.model_dump()
+        if not self.stage.effects.off:
+            del values["stage"]["effects"]
+        if self.stage.contact == "by_level":
+            del values["stage"]["contact"]
+        for load in (values["shaft_loads"] or {}).values():
+            if load["speed_control"] is None:
+                del load["speed_control"]
+        for added in ("shaft_loads", "drivetrain", "deformation"):
+            if values[added] is None:
+                del values[added]
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def chain_in_fmu(self) -> bool:
+        """Whether the clutch of a passenger car is inside the stage."""
+        return self.passenger_car is not None and self.passenger_car.chain_in_fmu
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps."""
+        return round(self.duration / self.coupling.step)
+
+
+def shipped_scenes() -> list[str]:
+    """Names of the scenes that come with the package."""
+    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def load_scene(path_or_name: str | Path, changes: Changes | None = None) -> SceneSpec:
+    """The scene in a TOML file, or the shipped one of that name. SpecError with everything that is wrong.
+
+    changes : fields that are to be other than in the file (`files.py`), {"stage.level": "fast"}; `torque` and `speed`
+    are short for those of the drive and of the start (`full_key`).
+    """
+    path = scene_path(path_or_name)
+    tables = read_toml(path)
+    full = {full_key(tables, key, str(path)): value for key, value in (changes or {}).items()}
+    if SPEED in full and isinstance(tables.get("start"), dict):
+        tables["start"].pop("input_speed", None)  # its other name
+    scene, problems = validate(SceneSpec, merged_tables(tables, changed_tables(SceneSpec, full)), str(path))
+    if scene is not None:
+        problems = list(_problems(scene, str(path)))
+    if scene is None or problems:
+        raise SpecError(problems)
+    return scene
+
+
+def full_key(tables: Mapping[str, Any], key: str, file: str) -> str:
+    """The key of a scene's field that `torque` (mean torque of the drive) or `speed` (of the input, at the start) is
+    short for; any other key as it is. SpecError where the scene has no single torque of its own."""
+    if key in ("speed", "start.input_speed"):
+        return SPEED
+    if key != "torque":
+        return key
+    found = next((f"{drive}.{name}" for drive, name in TORQUES.items() if drive in tables), None)
+    if found is None:
+        remedy = "this scene's drive has no single torque: name the field, such as shaft_loads.<port>.constant"
+        raise SpecError([Problem(file, "torque", "", remedy)])
+    return found
+
+
+def scene_path(path_or_name: str | Path) -> Path:
+    """File of a scene. SpecError when there is none, or a stage."""
+    given, shipped = Path(path_or_name), SHIPPED / f"{path_or_name}.toml"
+    if given.is_file() and not {"kind", "base"} & set(read_toml(given)):
+        return given
+    if not given.exists() and str(path_or_name) in shipped_scenes():
+        return shipped
+    file = str(path_or_name)
+    if given.exists() or file in shipped_stages():
+        remedy = "this is a stage: name it in a scene under [stage] (docs/howto-scene.md), or use the verb simulate"
+        raise SpecError([Problem(file, "", "", remedy)])
+    hint = near_or_all(file, shipped_scenes(), "shipped are", cutoff=0.6)
+    raise SpecError([Problem(file, "", "", f"no such file and no shipped scene: {hint}")])
+
+
+def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
+    """What no single field shows."""
+    chosen = [key for key in DRIVES if getattr(scene, key) is not None]
+    if len(chosen) != 1:
+        remedy = "give exactly one of [passenger_car], [test_rig], [shaft_loads] and [drivetrain]"
+        yield Problem(file, "", "", f"{remedy}, found {' and '.join(chosen) or 'none'}")
+    if scene.passenger_car is not None and scene.clutch is None:
+        yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
+    if scene.passenger_car is None and scene.clutch is not None:
+        remedy = "only the passenger car has this clutch: remove this table, or write [drivetrain.clutches.…]"
+        yield Problem(file, "clutch", "", remedy)
+    if scene.passenger_car is None and scene.start.slip:
+        yield Problem(
+            file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
+        )
+    if scene.shaft_loads is not None:
+        yield from load_problems(scene.shaft_loads, file)
+    if scene.drivetrain is not None:
+        yield from drivetrain_problems(scene.drivetrain, file)
+    if scene.clutch is not None:
+        yield from _clutch_problems(scene, scene.clutch, file)
+    yield from _time_problems(scene, file)
+    if scene.deformation is not None:
+        yield from deformation_problems(scene.deformation, scene.coupling.step, scene.duration, file)
+
+
+def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:
+    yield from time_problems(clutch.capacity, file, "clutch.capacity")
+    if clutch.peak != 1.0 and scene.chain_in_fmu:
+        yield Problem(
+            file,
+            "clutch.peak",
+            f"{clutch.peak:g}",
+            "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false",
+        )
+
+
+def _time_problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
+    step, duration = scene.coupling.step, scene.duration
+    if scene.settle >= duration:
+        yield Problem(file, "settle", f"{scene.settle:g} s", f"must be shorter than the duration, {duration:g} s")
+    if step > duration:
+        yield Problem(file, "coupling.step", f"{step:g} s", f"must not exceed the duration, {duration:g} s")
+    elif abs(scene.steps * step - duration) > 1e-9 * duration:
+        yield Problem(
+            file,
+            "coupling.step",
+            f"{step:g} s",
+            f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s",
+        )
+    if scene.coupling.micro_step > step:
+        yield Problem(
+            file,
+            "coupling.micro_step",
+            f"{scene.coupling.micro_step:g} s",
+            f"must not exceed the communication step, {step:g} s",
+        )

@@ -1,1 +1,0 @@
-"""Stage and scene files as frozen typed objects, SI inside; all problems of a file are reported at once."""

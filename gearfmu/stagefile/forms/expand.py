@@ -1,0 +1,279 @@
+"""A pair file and a planetary set in the terms of any stage, and stages whose files say something else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.planetary import HANDS
+from gearfmu.stagefile.forms.general import (
+    EngagementSpec,
+    Form,
+    GearBody,
+    Origin,
+    PlacedPort,
+    RingBody,
+    RotorSpec,
+    Stage,
+)
+from gearfmu.stagefile.forms.general_checks import with_relief_rolls
+from gearfmu.stagefile.forms.pair import StageSpec
+from gearfmu.stagefile.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.stagefile.forms.planetary_checks import mesh_torque
+from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier
+from gearfmu.stagefile.reading.base import Spec
+from gearfmu.stagefile.tables.bearings import Bearing, RollingMount
+from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
+from gearfmu.stagefile.tables.ports import PortSpec, SupportSpec
+
+CARRIER = "carrier"
+
+
+def expand(form: Form | Stage) -> Stage:
+    """The stage that a file says, which keeps what is written there."""
+    if isinstance(form, PlanetarySpec):
+        return expand_set(form)
+    return form if isinstance(form, Stage) else expand_pair(form)
+
+
+def rewritten(stage: Stage, **fields: Any) -> Stage:
+    """The stage as if its file had other fields: those of `stage.written`."""
+    return expand(stage.written.model_copy(update=fields))
+
+
+def with_ports(stage: Stage, ports: Mapping[str, PortSpec]) -> Stage:
+    """The stage with other ports of the same names, at the places where they were."""
+    own = {
+        name: old.model_copy(update=_fields(PortSpec, ports[name])) if name in ports else old
+        for name, old in stage.written.ports.items()
+    }
+    return rewritten(stage, ports=own)
+
+
+def with_bores(stage: Stage, coupling: str) -> Stage:
+    """The stage with the bores of all its gears "averaging" or "rigid"; those of imported bodies too. Rims of rings and
+    shafts stay as they are. SpecError for a planetary set, whose gears keep averaging bores."""
+    form = stage.written
+    if isinstance(form, PlanetarySpec):
+        remedy = "the gears of a planetary set keep averaging bores: leave it away"
+        raise SpecError([Problem(str(stage.source), "bore", coupling, remedy)])
+    if isinstance(form, Stage):
+        gears = {gear.name: _coupled(gear, coupling) for gear in form.gears if not isinstance(gear, RingBody)}
+        return rewritten(stage, bodies=form.bodies | gears)
+    return rewritten(stage, gears=tuple(_coupled(gear, coupling) for gear in form.gears))
+
+
+def expand_pair(spec: StageSpec) -> Stage:
+    """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
+    the origin, wheel on +x."""
+    pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
+    pinion, wheel = spec.gears
+    stage = Stage(
+        name=spec.name,
+        description=spec.description,
+        source=spec.source,
+        slices=spec.contact.slices,
+        nodal=spec.contact.nodal,
+        bodies={gear.name: _pair_gear(gear, pair, hand) for gear, hand in zip(spec.gears, (1, -1), strict=True)},
+        rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
+        engagements=(
+            EngagementSpec(
+                name="mesh",
+                gears=(pinion.name, wheel.name),
+                backlash=pair.backlash,
+                damping=spec.contact.damping,
+                torque_max=spec.torque_max,
+                speed_max=spec.speed_max,
+                misalignment=pair.misalignment,
+                friction=spec.contact.friction,
+                film=spec.contact.film,
+            ),
+        ),
+        supports=tuple(_held(gear.name, gear.bearing) for gear in spec.gears),
+        bearings=spec.bearings,
+        operating=spec.operating,
+        ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
+        levels=spec.levels,
+    )
+    stage._origin = Origin(spec, {g.name: f"gears.{g.name}" for g in spec.gears}, limits=spec.limits)
+    return stage
+
+
+def expand_set(spec: PlanetarySpec) -> Stage:
+    """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
+    carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
+    springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
+    its own the ring turns in them, held by the port. A housing stands in the axes of the ground: it holds the ring in
+    the two directions that are the same in both, along and about its axis.
+
+    What a set needs to move and does not say is 0 or left out, and refused by `Stage.require_motion`.
+    """
+    missing = tuple(motion_problems(spec))
+    planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
+    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, spec.set)}
+    for k, name in enumerate(planets):
+        eccentricity = spec.set.planet_eccentricity.get(k, spec.planet.eccentricity)
+        bodies[name] = _set_gear(spec.planet, spec.set, name=name, eccentricity=eccentricity)
+    bodies["ring"] = RingBody(
+        **_fields(RingSpec, spec.ring) | {"mounts": None}, kind="ring", **_angles(spec.set, HANDS["ring"])
+    )
+    bodies |= spec.bodies
+    bodies[CARRIER] = set_carrier(spec)
+    own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
+    stage = Stage(
+        name=spec.name,
+        description=spec.description,
+        source=spec.source,
+        bodies=bodies,
+        rotors=_set_rotors(spec, planets),
+        engagements=_set_meshes(spec, planets),
+        supports=_set_supports(spec, planets),
+        ports={
+            name: _placed(port, body=name, node="bore" if name == "carrier" else None)
+            for name, port in spec.ports.items()
+        },
+        levels=spec.levels,
+        **own,
+    )
+    stage, shared = with_relief_rolls(stage), dict.fromkeys(planets, "planet")
+    places = {name: name for name in (*bodies, "planet")} | shared
+    mounts, limits = spec.ring.mounts, spec.limits
+    stage._origin = Origin(spec, places, shared, mounts, limits, spec.set.load_sharing, missing)
+    return stage
+
+
+def motion_problems(spec: PlanetarySpec) -> list[Problem]:
+    """What a set needs to move and does not say."""
+    example = 'stiffness = "3e8 N/m", axial = "1e8 N/m", tilt = "1e5 N*m/rad"'
+    given: dict[str, tuple[Any, str]] = {
+        "speed_max": (spec.speed_max, 'speed_max = "300 rad/s"'),
+        "contact": (spec.contact, 'damping = "50e3 N*s/m^2"'),
+        "ring.mounts": (spec.ring.mounts, 'points = 6, stiffness = "1e8 N/m"'),
+    }
+    held = {"sun": spec.sun.bearing, "planet": spec.planet.bearing, "carrier": spec.carrier.bearing}
+    given |= {f"{name}.bearing": (bearing, example) for name, bearing in held.items()}
+    for name, bearing in held.items():
+        for field in ("axial", "tilt") if bearing is not None else ():
+            given[f"{name}.bearing.{field}"] = (getattr(bearing, field), example)
+    found = [
+        Problem(str(spec.source), field, "missing", f"a set needs it to move: write {how}")
+        for field, (value, how) in given.items()
+        if value is None
+    ]
+    if set(spec.ports) - {"ring"} != {"carrier", "sun"}:
+        remedy = (
+            "a set is driven and loaded at carrier and sun, and may be held at the ring: write [ports.carrier] and "
+            "[ports.sun], e.g. kind"
+        )
+        found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
+    return found
+
+
+def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]:
+    rotors = {"sun": RotorSpec(axis=(0.0, 0.0), bodies={"sun": 0.0}, carried_by="carrier")}
+    angles = planet_angles(spec)
+    for k, name in enumerate(planets):
+        c, s = math.cos(angles[k]), math.sin(angles[k])
+        radial, tangential = spec.set.pin_errors.get(k, (0.0, 0.0))
+        rotors[name] = RotorSpec(
+            axis=(spec.set.center_distance * c, spec.set.center_distance * s),
+            offset=(radial * c - tangential * s, radial * s + tangential * c),
+            bodies={name: 0.0},
+            carried_by="carrier",
+        )
+    rotors["ring"] = RotorSpec(
+        axis=(0.0, 0.0), bodies={"ring": 0.0}, carried_by="carrier", stands="ring" not in spec.ports
+    )
+    rotors["carrier"] = RotorSpec(axis=(0.0, 0.0), bodies={"carrier": 0.0})
+    return rotors
+
+
+def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
+    z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
+    contact = {name: getattr(spec.contact, name, None) for name in ("damping", "friction", "film")}
+    common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
+    torque, relative = mesh_torque(spec), (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
+    moves = spec.contact is not None and spec.speed_max is not None
+    made = EngagementSpec if moves else partial(EngagementSpec.model_construct, misalignment=None)
+    return tuple(
+        made(name=f"sun_{p}", gears=("sun", p), torque_max=torque, speed_max=relative / z_s, **common) for p in planets
+    ) + tuple(
+        made(name=f"ring_{p}", gears=(p, "ring"), torque_max=torque * z_p / z_s, speed_max=relative / z_p, **common)
+        for p in planets
+    )
+
+
+def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec, ...]:
+    sun, pin, carrier, mounts = spec.sun.bearing, spec.planet.bearing, spec.carrier.bearing, spec.ring.mounts
+    if not (sun and pin and carrier and mounts):
+        return ()
+    all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
+    torsion = None if "ring" in spec.ports else all_mounts * radius**2
+    ring = SupportSpec(
+        name="ring",
+        body="ring",
+        radial=all_mounts,
+        axial=all_mounts,
+        tilt=all_mounts * radius**2 / 2,
+        torsion=torsion,
+        damping_ratio=mounts.damping_ratio,
+    )
+    along = {"name": "ring_seat", "to": mounts.to, "node": mounts.node, "radial": None, "tilt": None}
+    held = [ring]
+    if mounts.to is not None:
+        held = [ring.model_copy(update={"axial": None, "torsion": None}), ring.model_copy(update=along)]
+    return (
+        _held("sun", sun),
+        *(_held(name, pin, to="carrier", node=f"bolt{k}") for k, name in enumerate(planets)),
+        _held("carrier", carrier, node="bore"),
+        *held,
+        *spec.supports,
+    )
+
+
+def _held(body: str, bearing: Bearing | RollingMount, **where: Any) -> SupportSpec:
+    if isinstance(bearing, RollingMount):
+        return SupportSpec(
+            name=body, body=body, bearing=bearing.rolling, span=bearing.span, carries=bearing.carries,
+            damping_ratio=bearing.damping_ratio,
+        )  # fmt: skip
+    return SupportSpec(
+        name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
+        damping_ratio=bearing.damping_ratio, **where,
+    )  # fmt: skip
+
+
+def _coupled(gear: Any, coupling: str) -> Any:
+    if gear.imported is None:
+        return gear.model_copy(update={"bore_coupling": coupling})
+    return gear.model_copy(update={"imported": gear.imported.model_copy(update={"bore_coupling": coupling})})
+
+
+def _pair_gear(gear: GearSpec, pair: PairSpec, hand: int) -> GearBody:
+    """A gear of a pair in the terms of any stage; hand : sign of its helix angle over that of the pair."""
+    return GearBody(**_fields(GearSpec, gear) | {"bearing": None}, **_angles(pair, hand))
+
+
+def _set_gear(gear: SetGearSpec, of: SetSpec, **changes: Any) -> GearBody:
+    """Sun or planet in the terms of any stage."""
+    return GearBody(**_fields(SetGearSpec, gear) | {"bearing": None} | changes, **_angles(of, HANDS[gear.name]))
+
+
+def _placed(port: PortSpec, **where: Any) -> PlacedPort:
+    return PlacedPort(**_fields(PortSpec, port), **where)
+
+
+def _fields(kind: type[Spec], spec: Spec) -> dict[str, Any]:
+    return {name: getattr(spec, name) for name in kind.model_fields}
+
+
+def _angles(of: PairSpec | SetSpec, hand: int) -> dict[str, Any]:
+    """Module and angles of a gear of a pair or set."""
+    return {
+        "normal_module": of.normal_module,
+        "pressure_angle": of.pressure_angle,
+        "helix_angle": hand * of.helix_angle + 0.0,
+    }

@@ -1,0 +1,149 @@
+"""What turns with what: speeds through the meshes of a stage, and the two ports that it is driven and loaded by."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
+
+
+@dataclass(frozen=True)
+class Shafts:
+    """The ports that a stage is driven and loaded by, and its ratio: speed of the input over speed of the output,
+    negative where they turn against each other, as in a single external pair."""
+
+    input: str
+    output: str
+    ratio: float
+
+
+def shafts_of(stage: Stage) -> Shafts:
+    """Input and output of a stage: its first and its second port. SpecError where it has fewer, or where no meshes lead
+    from one to the other."""
+    if len(stage.ports) < 2:
+        raise _refused(stage, ", ".join(stage.ports), "a stage needs an input and an output: write a second [ports.…]")
+    first, second = list(stage.ports)[:2]
+    driven, turning = stage.rotor_of(stage.ports[second].body), turns(stage, first)
+    if driven not in turning or driven == stage.rotor_of(stage.ports[first].body):
+        remedy = "no meshes lead from the first port to the second: put the two that drive and load the stage first"
+        raise _refused(stage, f"{first}, {second}", remedy)
+    return Shafts(first, second, float(1 / turning[driven]))
+
+
+def turns(stage: Stage, port: str) -> dict[str, Fraction]:
+    """Speeds of the rotors that are geared to the rotor of `port`, itself among them, and of those that stand, by name:
+    per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis). Where a stage has
+    carriers, ports beyond input and output stand."""
+    known = {name: Fraction(0) for name, rotor in stage.rotors.items() if rotor.stands}
+    if stage.carriers:
+        known |= {stage.rotor_of(held.body): Fraction(0) for held in list(stage.ports.values())[2:]}
+    known[stage.rotor_of(stage.ports[port].body)] = Fraction(1)
+    equations = [({name: Fraction(1)}, speed) for name, speed in known.items()]
+    return solved(equations + [(factors, Fraction(0)) for factors in rolling(stage)])
+
+
+def rolling(stage: Stage) -> list[dict[str, Fraction]]:
+    """What the meshes say of the rotors' speeds, and those that stand: sums of factors times speeds (by name) that are
+    zero, one for each engagement and standing rotor."""
+    standing = [{name: Fraction(1)} for name, rotor in stage.rotors.items() if rotor.stands]
+    return [_rolling(stage, mesh) for mesh in stage.engagements] + standing
+
+
+def _rolling(stage: Stage, mesh: EngagementSpec) -> dict[str, Fraction]:
+    """Factors of the rotors' speeds in z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
+    z_a, z_b = (_teeth(stage, gear) for gear in mesh.gears)
+    z_b *= -1 if stage.internal(mesh) else 1
+    factors: dict[str, Fraction] = defaultdict(Fraction)
+    for rotor, teeth in ((stage.rotor_of(mesh.gears[0]), z_a), (stage.rotor_of(mesh.gears[1]), z_b)):
+        factors[rotor] += teeth
+        if (frame := stage.frame_of(mesh)) is not None:
+            factors[frame] -= teeth
+    return factors
+
+
+def solved(equations: list[tuple[dict[str, Fraction], Fraction]]) -> dict[str, Fraction]:
+    """The unknowns that linear equations (factors by name, right side) decide; elimination without rounding."""
+    rows: dict[str, tuple[dict[str, Fraction], Fraction]] = {}
+    for factors, right in equations:
+        left = {name: Fraction(factor) for name, factor in factors.items() if factor}
+        for name, (own, value) in rows.items():
+            if share := left.pop(name, None):
+                right -= share * value
+                for other, factor in own.items():
+                    left[other] = left.get(other, Fraction(0)) - share * factor
+        left = {name: factor for name, factor in left.items() if factor}
+        if not left:
+            continue
+        pivot, factor = next(iter(left.items()))
+        new = {name: value / factor for name, value in left.items() if name != pivot}, right / factor
+        for name, (own, value) in rows.items():
+            if share := own.pop(pivot, None):
+                for other, part in new[0].items():
+                    own[other] = own.get(other, Fraction(0)) - share * part
+                rows[name] = {other: part for other, part in own.items() if part}, value - share * new[1]
+        rows[pivot] = new
+    return {name: value for name, (own, value) in rows.items() if not own}
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """How often an engagement meets. rotor: of its gear A, carrier: that carries both gears (None: the ground), by
+    name; teeth: of gear A. Mesh frequency: (ω_rotor − ω_carrier)·teeth/2π."""
+
+    rotor: str
+    carrier: str | None
+    teeth: int
+
+    def relative(self, speeds: Mapping[str, Any]) -> Any:
+        """Speed of gear A in the axes that carry it, from speeds by rotor."""
+        return speeds[self.rotor] if self.carrier is None else speeds[self.rotor] - speeds[self.carrier]
+
+    @property
+    def plain(self) -> list[Any]:
+        """For a trace's meta: rotor, teeth, and the carrier where there is one."""
+        return [self.rotor, self.teeth, *([] if self.carrier is None else [self.carrier])]
+
+    @classmethod
+    def of_plain(cls, known: Sequence[Any]) -> Meshing:
+        """The inverse of `plain`."""
+        rotor, teeth, *carrier = known
+        return cls(str(rotor), str(carrier[0]) if carrier else None, int(teeth))
+
+
+def meshings(stage: Stage) -> dict[str, Meshing]:
+    """The `Meshing` of every engagement by name."""
+    return {
+        m.name: Meshing(stage.rotor_of(m.gears[0]), stage.frame_of(m), _teeth(stage, m.gears[0]))
+        for m in stage.engagements
+    }
+
+
+def undriven(stage: Stage, driven: Collection[str], remedy: str) -> list[Problem]:
+    """Every spring port that is not among those `driven`; remedy: what to do about it, {name} stands for the port."""
+    return [
+        Problem(str(stage.source), f"ports.{name}.kind", '"spring"', remedy.format(name=name))
+        for name, port in stage.ports.items()
+        if name not in driven and port.kind == "spring"
+    ]
+
+
+def require_driven(stage: Stage, driven: Collection[str], by: str) -> None:
+    """SpecError where a spring port beside those `driven` would have to be, which `by` ("a scene") does not do."""
+    remedy = f"{by} drives {' and '.join(driven)} only: make this port one of kind torque or fixed"
+    if problems := undriven(stage, driven, remedy):
+        raise SpecError(problems)
+
+
+def _teeth(stage: Stage, gear: str) -> int:
+    body = stage.bodies[gear]
+    assert isinstance(body, ToothedBody)
+    return body.teeth
+
+
+def _refused(stage: Stage, value: str, remedy: str) -> SpecError:
+    return SpecError([Problem(str(stage.source), "ports", value, remedy)])

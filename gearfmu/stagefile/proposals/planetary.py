@@ -1,0 +1,185 @@
+"""A planetary set from its numbers of teeth and planets, module and face width."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.hertz import largest_relative_radius
+from gearfmu.geometry.planetary import MOUNTS, RingMesh, least_apart, set_ratio
+from gearfmu.geometry.shifts import (
+    DEDENDUM,
+    RING_FILLET,
+    OpenPair,
+    ring_of,
+    ring_shortcomings,
+    sum_of_shifts,
+)
+from gearfmu.ranges import range_of
+from gearfmu.stagefile.forms.pair_checks import rounded_up
+from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
+from gearfmu.stagefile.proposals.numbers import (
+    GIVEN,
+    Wish,
+    begun,
+    distance_of,
+    put_gear,
+    put_load,
+    put_patch,
+    put_slices,
+    put_wishes,
+)
+from gearfmu.stagefile.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
+
+NAMES = ("sun", "planet", "ring")
+_SHARING = {2: 1.1, 3: 1.1, 4: 1.25, 5: 1.35, 6: 1.44}  # mesh load factor of IEC 61400-4 by the number of planets
+_CARRIER_SCALE = 0.75
+
+
+def draft_set(wish: Wish) -> Draft:
+    """The draft of a planetary set. SpecError lists everything that is wrong with the numbers."""
+    rack, (sun, planet, ring) = wish.rack, wish.teeth
+    distances = [reference_distance(rack, teeth) for teeth in (sun + planet, max(ring - planet, 1))]
+    distance = distance_of(wish, max(distances))
+    pair = OpenPair(rack, (sun, planet), distance)
+    problems, mesh = [*_assembly(wish)], None
+    shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
+    if shift is None:
+        problems.append(Problem("", "center", millimetres(distance), f"of sun and planet {out_of_reach(pair)}"))
+    else:
+        mesh, found = _ring_mesh(wish, pair.at(shift).gears[1], distance)
+        problems += found
+    tip = mesh.planet.r_a if mesh is not None else reference_distance(rack, planet) + rack.m
+    problems += _room(wish, distance, tip)
+    if problems or mesh is None or shift is None:
+        raise SpecError(problems)
+    draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
+    if wish.center is None:
+        same = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
+        draft.assume("set.center_distance", millimetres(distance), same)
+    else:
+        draft.put("set.center_distance", millimetres(distance), GIVEN)
+    _put_planets(draft, wish)
+    put_gear(draft, "sun", pair.at(shift).gears[0], SHIFT_RULE)
+    put_gear(draft, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
+    put_wishes(draft, wish, ("sun", "planet"))
+    _put_ring(draft, mesh)
+    _put_carrier(draft, wish, mesh)
+    _put_loads(draft, wish, pair, shift, mesh)
+    put_slices(draft, rack, wish.width or 0.0)
+    return draft
+
+
+def _assembly(wish: Wish) -> Iterator[Problem]:
+    """Whether the planets can be put between sun and ring."""
+    (sun, _, ring), count = wish.teeth, wish.planets or 1
+    teeth = sun + ring
+    if wish.unequal or teeth % count == 0:
+        return
+    fitting = [str(n) for n in range(2, int(range_of("planets").high) + 1) if teeth % n == 0]
+    sums = f"{teeth - teeth % count} or {teeth - teeth % count + count}"
+    remedy = (
+        f"equally spaced planets cannot be mounted: (z_sun + z_ring)/planets = {teeth}/{count} is no integer; nearest "
+        f"are z_sun + z_ring = {sums}, {' or '.join(fitting) or 'no other number of'} planets, or planets that are "
+        "not equally spaced (unequal)"
+    )
+    yield Problem("", "planets", str(count), remedy)
+
+
+def _room(wish: Wish, distance: float, tip: float) -> Iterator[Problem]:
+    """Whether neighbouring planets of tip radius `tip` (m) stay apart."""
+    apart = 2 * distance * math.sin(least_apart(_angles(wish)) / 2)
+    if apart > 2 * tip:
+        return
+    most = math.floor(math.pi / math.asin(min(tip / distance, 1.0)) - 1e-9)
+    fewer = f"at most {most} of this size" if most > 1 else "smaller planets"
+    remedy = (
+        f"neighbouring planets touch: axes {millimetres(apart)} apart, tip diameter {millimetres(2 * tip)}; {fewer}"
+    )
+    yield Problem("", "planets", str(wish.planets), remedy)
+
+
+def _places(wish: Wish) -> list[int]:
+    """Places of the planets in steps of 2π/(z_s + z_r), nearest to even ones."""
+    teeth, count = wish.teeth[0] + wish.teeth[2], wish.planets or 1
+    return [round(k * teeth / count) for k in range(count)]
+
+
+def _angles(wish: Wish) -> tuple[float, ...]:
+    count = wish.planets or 1
+    if not wish.unequal:
+        return tuple(2 * math.pi * k / count for k in range(count))
+    return tuple(2 * math.pi * place / (wish.teeth[0] + wish.teeth[2]) for place in _places(wish))
+
+
+def _ring_mesh(wish: Wish, planet: GearGeometry, distance: float) -> tuple[RingMesh | None, list[Problem]]:
+    """Planet and ring, or what is wrong with them."""
+    sun, _, ring = wish.teeth
+    coaxial = f"sun and planets of {sun} and {planet.z} teeth suit a ring of about {sun + 2 * planet.z}"
+    difference = sum_of_shifts(planet.m, planet.alpha, planet.beta, ring - planet.z, distance)
+    if ring <= planet.z or not abs(difference) < 3:
+        return None, [Problem("", "teeth", wish.shown, f"sun and ring have no common centre distance: {coaxial}")]
+    mesh = RingMesh(planet, ring_of(planet, ring, distance), distance, 0.0)
+    if found := list(ring_shortcomings(mesh)):
+        return None, [Problem("", "teeth", wish.shown, f"{', '.join(found)}; {coaxial}, the ring has {ring}")]
+    return mesh, []
+
+
+def _put_planets(draft: Draft, wish: Wish) -> None:
+    count = wish.planets or 1
+    draft.put("set.planets", count, GIVEN)
+    draft.drop("set.positions")
+    if wish.unequal and (wish.teeth[0] + wish.teeth[2]) % count:
+        draft.assume("set.positions", _places(wish), "the places nearest to even ones at which teeth fit")
+    draft.assume("set.load_sharing", _SHARING[count], "IEC 61400-4 for this number of planets")
+    draft.drop("set.pin_errors")
+    held = {"bore": "rigid", **{f"bolt{k}": "rigid" for k in range(count)}}
+    draft.put("carrier.coupling", held, "proposed: bolts and bore on stiff shafts")
+
+
+def _put_ring(draft: Draft, mesh: RingMesh) -> None:
+    ring, m = mesh.ring, mesh.ring.m
+    draft.put("ring.teeth", ring.z, GIVEN)
+    draft.assume("ring.profile_shift", ring.x, "no backlash at the centre distance; positive outwards")
+    why = f"clear of the planets' roots; root diameter {millimetres(round(2 * ring.r_f, 6))}"
+    draft.assume("ring.tip_diameter", millimetres(2 * ring.r_a), why)
+    draft.assume("ring.rim_diameter", millimetres(rounded_up(2 * ring.r_f + 7 * m, 3)), "a rim of 3.5 m_n")
+    draft.assume("ring.dedendum", DEDENDUM, "ISO 53")
+    draft.assume("ring.fillet_radius", RING_FILLET, "of a shaping cutter")
+    draft.assume("ring.mounts.points", MOUNTS, "evenly round the rim")
+
+
+def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
+    bore = wish.bores[1] if wish.bores else mesh.planet.r_f
+    bolt = math.floor(0.75e4 * bore) / 1e4
+    draft.assume("carrier.bolt_diameter", millimetres(bolt), "three quarters of the planets' bore")
+    draft.assume("carrier.bore_diameter", millimetres(rounded_up(mesh.a, 2)), "the centre distance")
+    outer = rounded_up(2 * mesh.a + 2 * bolt, 3)
+    draft.assume("carrier.outer_diameter", millimetres(outer), "the bolt circle and two bolt diameters")
+    thickness = rounded_up(0.6 * (wish.width or 0.0), 2)
+    draft.assume("carrier.thickness", millimetres(thickness), "0.6 of the face width")
+    draft.assume("carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
+    draft.assume(
+        "carrier.mesh.scale",
+        _CARRIER_SCALE,
+        "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh",
+    )
+    inputs = 6 * ((wish.planets or 1) + 1)
+    draft.assume("carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
+
+
+def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: RingMesh) -> None:
+    """Torque and speed of the carrier, load patches of all gears."""
+    geometry, width = pair.at(shift), wish.width or 0.0
+    sun, planet = geometry.gears
+    ratio, count = set_ratio(sun.z, mesh.ring.z), wish.planets or 1
+    usual = usual_torque(2 * sun.r, planet.z / sun.z, width) * count / _SHARING[count] * ratio
+    torque, _ = put_load(draft, wish, usual, PITCH_SPEED / sun.r / ratio)
+    load = _SHARING[count] * torque / ratio / count / sun.r_b / width
+    outer = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
+    inner = mesh.largest_relative_radius()
+    put_patch(draft, "sun", sun, load, outer)
+    put_patch(draft, "planet", planet, load, max(outer, inner))
+    put_patch(draft, "ring", mesh.ring, load, inner)

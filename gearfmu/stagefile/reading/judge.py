@@ -1,0 +1,127 @@
+"""Problems of a file all at once: what cannot be read is put right where it is plain what was meant, so that the rest
+can be judged beside it."""
+
+from __future__ import annotations
+
+import copy
+import difflib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
+
+from gearfmu.errors import Problem, UnitError
+from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path, validate
+from gearfmu.units import to_si
+
+_ROUNDS = 4  # a key put right may bring further ones to light
+_MISSING = object()
+_BESIDE_TEETH = ("kg/m^3", "N/m", "N*m/rad", "N*m*s/rad", "N*s/m^2", "kg*m^2", "Hz", "rad/s")  # shape no tooth
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """problems, and whether the object could be judged as a whole."""
+
+    problems: list[Problem]
+    judged: bool
+
+
+def read_and_judge(
+    kind: type[SpecType], raw: dict[str, Any], file: str, judge: Callable[[SpecType], list[Problem]]
+) -> tuple[SpecType | None, Verdict]:
+    """`raw` tables of `file` as an object of class `kind` and everything that is wrong with it: what `judge` finds in
+    the object stands beside the fields that cannot be read, as far as it does not depend on them."""
+    spec, problems = validate(kind, raw, file)
+    meant = spec if spec is not None else _as_meant(kind, raw)
+    return spec, Verdict(problems + ([] if meant is None else judge(meant)), meant is not None)
+
+
+def _as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
+    """The object without keys that nobody knows (a misspelt one under its name), with bare numbers in SI, with numbers
+    that shape no tooth within their range, with the first of the words that are allowed, without optional fields and
+    tables that cannot be read; None where a field that must be there cannot."""
+    tables = copy.deepcopy(raw)
+    for _ in range(_ROUNDS):
+        try:
+            return kind.model_validate(tables, context=FROM_FILE)
+        except ValidationError as error:
+            entries = error.errors(include_url=False)
+        misspelt = [entry for entry in entries if entry["type"] == "extra_forbidden"]
+        others = [entry for entry in entries if entry["type"] != "extra_forbidden"]
+        if misspelt:
+            done = all([_rename(kind, tables, entry["loc"]) for entry in misspelt])
+        else:
+            done = all([_put_right(kind, tables, entry) for entry in others])
+        if not done:
+            return None
+    return None
+
+
+def _rename(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | int, ...]) -> bool:
+    """Gives an unknown key the name that it nearly has, where nothing stands there; else takes it away."""
+    *way, key = raw_path(tables, loc)
+    inside = _at(tables, way)
+    if not isinstance(inside, dict) or key not in inside:
+        return False
+    value = inside.pop(key)
+    free = [name for name in fields_at(kind, loc[:-1]) if name not in inside]
+    near = difflib.get_close_matches(str(key), [str(name) for name in free], n=1, cutoff=0.5)
+    if near:
+        inside[near[0]] = value
+    return True
+
+
+def _put_right(kind: type[SpecType], tables: dict[str, Any], entry: Any) -> bool:
+    loc = entry["loc"]
+    if not loc or entry["type"] == "missing":
+        return False
+    *way, key = raw_path(tables, loc)
+    inside, field = _at(tables, way), fields_at(kind, loc[:-1]).get(loc[-1])
+    if not isinstance(inside, dict) or key not in inside or field is None:
+        return False
+    quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
+    value = inside[key]
+    if quantity is not None and quantity.unit and isinstance(value, (int, float)) and not isinstance(value, bool):
+        inside[key] = f"{value!r} {quantity.unit}"
+        return True
+    if get_origin(field.annotation) is Literal:
+        inside[key] = get_args(field.annotation)[0]
+        return True
+    if quantity is not None and quantity.unit in _BESIDE_TEETH and (limit := _nearest(quantity, value)) is not None:
+        inside[key] = f"{limit!r} {quantity.unit}"
+        return True
+    return _leave_out(kind, tables, loc)
+
+
+def _nearest(quantity: Quantity, value: Any) -> float | None:
+    """The limit that a number is beyond; None where it is no number."""
+    try:
+        number = to_si(value, quantity.unit)
+    except UnitError:
+        return None
+    return quantity.range.low if number < quantity.range.low else quantity.range.high
+
+
+def _leave_out(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | int, ...]) -> bool:
+    """Takes away the field, or else the innermost table around it that need not be there."""
+    for depth in range(len(loc), 0, -1):
+        field, (*way, key) = fields_at(kind, loc[: depth - 1]).get(loc[depth - 1]), raw_path(tables, loc[:depth])
+        inside = _at(tables, way)
+        if field is not None and not field.is_required() and isinstance(inside, dict) and key in inside:
+            del inside[key]
+            return True
+    return False
+
+
+def _at(tables: Any, way: list[Any]) -> Any:
+    """What stands at the end of the way; _MISSING where it leads nowhere."""
+    for key in way:
+        if isinstance(tables, dict) and key in tables:
+            tables = tables[key]
+        elif isinstance(tables, list) and isinstance(key, int) and key < len(tables):
+            tables = tables[key]
+        else:
+            return _MISSING
+    return tables

@@ -1,0 +1,155 @@
+"""[gears.<name>.import], of a planetary set [sun.import], [planet.import], [ring.import], [carrier.import]: a body
+from finite elements made elsewhere (docs/howto-import.md)."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import Field, model_validator
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.planetary import HANDS
+from gearfmu.stagefile.reading.base import Quantity, Spec, Text, refuse
+from gearfmu.stagefile.reading.files import Layers
+
+FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
+
+Files = TypeVar("Files", bound="SourceSpec")
+
+
+class SourceSpec(Spec):
+    """What every import names: where its nodes lie, its units, and ready-made matrices; paths relative to the file that
+    says so."""
+
+    file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
+    length: Annotated[float, Quantity("length_unit")] = Field(
+        description='one length unit of the file, "1 mm" for a mesh in millimetres'
+    )
+    stiffness: Text = Field(default="", description="ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch")
+    mass: Text = Field(default="", description="ready-made mass matrix, with stiffness")
+    unknowns: Text = Field(
+        default="", description="CalculiX .dof file: node and direction of each row; without it x, y, z node by node"
+    )
+    force_unit: Annotated[float, Quantity("force_unit")] = Field(
+        default=1.0, description='one unit of force of the stiffness matrix, "1 N"'
+    )
+    mass_unit: Annotated[float, Quantity("mass_unit")] = Field(
+        default=1.0, description='one unit of mass of the mass matrix, "1 t" with millimetres, newtons and seconds'
+    )
+
+    @model_validator(mode="after")
+    def _both_matrices(self: Files) -> Files:
+        if bool(self.stiffness) != bool(self.mass):
+            raise refuse("stiffness and mass come together: give both files or none")
+        if self.unknowns and not self.stiffness:
+            raise refuse("unknowns sorts the rows of ready-made matrices: give stiffness and mass too")
+        return self
+
+    def located(self: Files, layers: Layers, place: str) -> Files:
+        """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
+        section, "gears.pinion.import"."""
+        named = [field for field in FILES if getattr(self, field, "")]
+        files = {field: str(_path(layers, f"{place}.{field}", getattr(self, field))) for field in named}
+        return self.model_copy(update=files)
+
+
+class FilesSpec(SourceSpec):
+    """Mesh of a body, its units, and, where they are ready-made, its matrices."""
+
+    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
+    ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
+
+
+class ImportSpec(FilesSpec):
+    """The finite elements of a gear; its place, tilt and the angle of its teeth are found by the involute fit."""
+
+    bore: Text = Field(
+        default="", description="node set of the bore; without it the nodes on the stage's bore diameter"
+    )
+    bore_coupling: Literal["averaging", "rigid"] = Field(
+        default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
+    )
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
+        default=5e-6, description="largest distance of a corner node from the best involute"
+    )
+
+
+class RingImportSpec(FilesSpec):
+    """The finite elements of a ring, placed by the involute fit of its tooth spaces."""
+
+    rim: Text = Field(default="", description="node set of the rim; without it the nodes on the stage's rim diameter")
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
+        default=5e-6, description="largest distance of a corner node from the best involute"
+    )
+
+    @property
+    def bore(self) -> str:
+        """The rim takes the place of the bore."""
+        return self.rim
+
+    @property
+    def bore_coupling(self) -> str:
+        """A rim is averaged, whole and by its patches."""
+        return "averaging"
+
+
+class CarrierImportSpec(FilesSpec):
+    """The finite elements of a carrier, in the set's frame: z = 0 at the planets' mid-width, bolt 0 on +x."""
+
+    bore: Text = Field(description="node set of the bore")
+    bolts: tuple[Text, ...] = Field(description="node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
+
+
+def missing_files(layers: Layers) -> list[Problem]:
+    """A problem for every file that a section `import` or `reduced` names and that is not there, whatever else is wrong
+    with the stage file."""
+    return [
+        Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
+        for place, section in _sections(layers.tables).items()
+        for field in FILES
+        if isinstance(name := section.get(field), str) and name
+        if not (path := _path(layers, f"{place}.{field}", name)).is_file()
+    ]
+
+
+def _path(layers: Layers, field: str, name: str) -> Path:
+    return layers.holder(field).parent / name
+
+
+def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables `import` and `reduced` of a stage file by their place."""
+    bodies = {
+        f"{group}.{name}": table
+        for group in ("gears", "bodies")
+        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
+    }
+    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
+    found = {
+        f"{place}.{key}": table.get(key)
+        for place, table in bodies.items()
+        if isinstance(table, dict)
+        for key in ("import", "reduced")
+    }
+    return {place: section for place, section in found.items() if isinstance(section, dict)}
+
+
+def import_inputs(spec: SourceSpec) -> dict[str, Any]:
+    """What the import contributes to the hash of a body: its fields, with the SHA-256 of each file for its name.
+
+    spec : its files as they can be opened (`located`). SpecError for every file that is not there, by its field alone.
+    """
+    values, problems = spec.model_dump(exclude_none=True), []
+    for field in FILES:
+        if not getattr(spec, field, ""):
+            continue
+        path = Path(getattr(spec, field))
+        try:
+            values[field] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            remedy = f"{path} cannot be read ({error.strerror}): write the path relative to the stage file"
+            problems.append(Problem("", field, path.name, remedy))
+    if problems:
+        raise SpecError(problems)
+    return values

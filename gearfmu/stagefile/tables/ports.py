@@ -1,0 +1,180 @@
+"""What a stage meets outside and between its bodies: ports, supports, contact, levels."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias, cast
+
+from pydantic import Field, model_validator
+
+from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Whole, refuse
+from gearfmu.stagefile.tables.bearings import CatalogueName, LaterFields, Ratio, Side
+from gearfmu.stagefile.tables.gear import Length
+
+Stiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("torsional_damping")]
+Inertia = Annotated[float, Quantity("inertia")]
+Cut = Annotated[float, Quantity("cut")]
+Limits: TypeAlias = tuple[tuple[float | None, str], ...]  # largest values that a stage is made for, with units
+
+
+class NodalSpec(Spec):
+    """Nodal contact with a penalty stiffness: flank nodes against the deformed flank of the other gear."""
+
+    along: Annotated[Count, Whole("nodes")] | None = Field(
+        default=None,
+        description="nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent",
+    )
+    across: Annotated[Count, Whole("nodes")] | None = Field(
+        default=None,
+        description="nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent",
+    )
+    penalty: Annotated[float, Quantity("penalty", words=("hertz",))] = Field(
+        default=cast(Any, "hertz"),  # the assembly puts the stiffness in its place
+        description='stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
+    )
+    nodes_of: Literal["both", "a", "b"] = Field(
+        default="both", description="gear whose nodes are in contact; of both each has half of the penalty"
+    )
+
+
+class FrictionSpec(Spec):
+    """Friction of the flanks along the profile."""
+
+    law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
+        default="constant", description="law of the coefficient of friction"
+    )
+    coefficient: Annotated[float, Quantity("friction_coefficient")] = Field(
+        default=0.05, description="coefficient of friction of law constant"
+    )
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth, of the other laws"
+    )
+    roughness: Annotated[float, Quantity("flank_roughness")] = Field(
+        default=0.4e-6, description="mean roughness Ra of both flanks, of the other laws"
+    )
+
+
+class FilmSpec(Spec):
+    """Squeeze film of oil between flanks that approach."""
+
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth"
+    )
+    roughness: Annotated[float, Quantity("film_roughness")] = Field(
+        default=1e-6, description="oil left between flanks that touch by their roughness, added to every gap"
+    )
+
+
+class ContactSpec(Spec):
+    """Tooth contact."""
+
+    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
+    damping: Annotated[float, Quantity("contact_damping")] = Field(
+        description="contact damping per metre of face width"
+    )
+    law: Literal["line"] = Field(default="line", description="contact law")
+    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
+    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
+    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
+
+
+class ChainSpec(Spec):
+    """Inertia, clutch and shaft compiled into a port."""
+
+    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
+    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
+    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
+    shaft_c: Damping = Field(description="damping of that shaft")
+
+
+class PortSpec(Spec):
+    """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
+
+    kind: Literal["spring", "torque", "fixed"] = Field(
+        default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed"
+    )
+    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
+    c: Damping | None = Field(default=None, description="damping of the port spring")
+    play: Annotated[float, Quantity("play")] = Field(
+        default=0.0, description="angle through which the port spring is free between both sides, as in a spline"
+    )
+    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    @property
+    def side(self) -> float:
+        """Angle (rad) from the middle of the play of the port spring to either side; 0 where there is no spring."""
+        return 0.5 * self.play if self.kind == "spring" else 0.0
+
+    @property
+    def no_spring(self) -> str:
+        """Why the port cannot be a spring that is turned from outside, and the remedy; empty where it can."""
+        if self.chain is not None:
+            return "a port with a clutch is driven in a scene: use 'gearfmu run'"
+        if self.kind == "fixed":
+            return "a fixed port does not turn: make it a spring or torque port with k and c"
+        return "" if self.k is not None and self.c is not None else "write k and c of its shaft into this table"
+
+    @model_validator(mode="after")
+    def _complete(self) -> PortSpec:
+        if self.kind == "spring" and (self.k is None or self.c is None):
+            raise refuse('a spring port needs k and c: add them, e.g. k = "20e3 N*m/rad", c = "0.1 N*m*s/rad"')
+        if self.kind != "spring" and self.chain is not None:
+            raise refuse('a chain hangs on a port spring: write kind = "spring" or leave the chain away')
+        return self
+
+
+class LevelSpec(Spec):
+    """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
+
+    fast_cut: Cut = Field(default=50e3, description="cut frequency of level fast")
+    standard_cut: Cut = Field(default=120e3, description="cut frequency of level standard")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LevelSpec:
+        if self.fast_cut > self.standard_cut:
+            raise refuse("fast_cut must not lie above standard_cut")
+        return self
+
+
+Place = Annotated[float, Quantity("place")]
+RadialSpring = Annotated[float, Quantity("bearing_stiffness", words=("rigid",))]
+AxialSpring = Annotated[float, Quantity("axial_stiffness", words=("rigid",))]
+TiltSpring = Annotated[float, Quantity("tilt_stiffness", words=("rigid",))]
+
+
+class SupportSpec(LaterFields):
+    """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
+    free. A rolling bearing has its own stiffness."""
+
+    later = ("bearing", "span", "carries")
+
+    name: Name = Field(description="name of the support")
+    body: Name = Field(description="body that is held")
+    to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
+    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    node: Name | None = Field(
+        default=None, description="node of a carrier: bore, bolt0, bolt1 …; of a housing: name of a seat or foot"
+    )
+    radial: RadialSpring | None = Field(default=None, description="stiffness along x and y")
+    axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
+    tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
+    torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
+    bearing: CatalogueName | None = Field(
+        default=None, description="rolling bearing in place of the stiffnesses: name of a table [bearings.NAME]"
+    )
+    span: Length | None = Field(
+        default=None, description="distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent"
+    )
+    carries: Side | None = Field(
+        default=None,
+        description="axial force of the shaft that an angular contact bearing (of two the left) carries",
+    )
+    damping_ratio: Ratio = Field(
+        default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
+    )
+
+    @model_validator(mode="after")
+    def _holds(self) -> SupportSpec:
+        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion, self.bearing)):
+            raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
+        return self

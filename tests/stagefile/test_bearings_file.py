@@ -1,0 +1,98 @@
+"""Rolling bearings in stage files: what is wrong is refused with field, value and remedy, all at once; files without
+them are what they were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from refused import refused
+
+from gearfmu.stagefile.proposals.new import new_stage
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import differences, restored, stored
+
+TRAIN, PAIR = "two_stage/stage_bearings", "helical_demo/stage_bearings"
+
+
+def problems(folder: Path, like: str, *changes: tuple[str, str]) -> dict[str, str]:
+    """Field → remedy of everything that is wrong."""
+    source = find_stage(like)
+    text = source.read_text(encoding="utf-8").replace(
+        'base = "stage.toml"', f'base = "{source.parent.as_posix()}/stage.toml"'
+    )
+    return {problem.field: problem.remedy for problem in refused(folder, text, *changes)}
+
+
+@pytest.mark.parametrize(
+    ("like", "change", "field", "says"),
+    [
+        (TRAIN, ('bearing = "6306"', 'bearing = "6307x"'), "supports.input_left.bearing", "there are 6210, 6306"),
+        (TRAIN, ('bearing = "6306"', 'bearing = "6306"\nradial = "1e8 N/m"'), "supports.input_left.radial", "away"),
+        (TRAIN, ('bearing = "6306"', 'bearing = "6306"\ncarries = "+z"'), "supports.input_left.carries", "away"),
+        (TRAIN, ('[operating]\ntorque = "100 N*m"', ""), "operating.torque", 'write torque = "100 N*m"'),
+        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\ncontact_angle = "9°"'), "supports.input_left.carries", "z"),
+        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\npreload = "300 N"'), "supports.input_left.carries", "pre"),
+        (TRAIN, ('outside = "72 mm"', 'outside = "28 mm"'), "bearings.6306", "larger than the bore"),
+        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nballs = 14'), "bearings.6306", "fewer"),
+        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nball_diameter = "25 mm"'), "bearings.6306", "smaller"),
+        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nclearence = "1 um"'), "bearings.6306.clearence", "clearance"),
+        (TRAIN, ('clearance = "10 um"', 'clearance = "10 mm"'), "bearings.6306.clearance", "out of range"),
+        (TRAIN, ('kind = "ball"', 'kind = "bal"'), "bearings.6306", "ball"),
+        (TRAIN, ('width = "16 mm"', 'width = "16 mm"\npreload = "9 N"'), "bearings.NU206", "negative clearance"),
+        (TRAIN, ('width = "16 mm"\n', ""), "bearings.NU206", 'width = "20 mm"'),
+        (TRAIN, ('bearing = "6306"', 'axial = "1e8 N/m"\nspan = "2 mm"'), "supports.input_left.span", "name one"),
+        (PAIR, ('rolling = "7305"', 'rolling = "7306"'), "gears.pinion.bearing.rolling", "write [bearings.7306]"),
+        (PAIR, ('span = "70 mm"', ""), "gears.pinion.bearing.carries", "has a contact angle"),
+        (PAIR, ('rolling = "7305"', 'rolling = "7305"\nspann = "1 mm"'), "gears.pinion.bearing.spann", "span"),
+        (PAIR, ('contact_angle = "30 deg"', 'contact_angle = "70 deg"'), "bearings.7305.contact_angle", "60 deg"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_refused(tmp_path: Path, like: str, change: tuple[str, str], field: str, says: str) -> None:
+    found = problems(tmp_path, like, change)
+    assert field in found and says in found[field], found
+
+
+def test_all_is_said_at_once(tmp_path: Path) -> None:
+    found = problems(
+        tmp_path,
+        TRAIN,
+        ('[operating]\ntorque = "100 N*m"', ""),
+        ('bearing = "6306"', 'bearing = "63O6"'),
+        ('bearing = "NU210"', 'bearing = "NU210"\ntilt = "1e4 N*m/rad"'),
+        ('clearance = "12 um"', 'clearance = "12"'),
+    )
+    assert set(found) == {
+        "operating.torque", "supports.input_left.bearing", "supports.output_right.tilt", "bearings.6210.clearance",
+    }  # fmt: skip
+
+
+def test_springs_of_a_base_are_left_aside() -> None:
+    pinion = load_stage(PAIR).written.gears[0].bearing
+    assert (pinion.rolling, pinion.span, pinion.damping_ratio) == ("7305", pytest.approx(0.07), 0.03)
+
+
+@pytest.mark.parametrize("like", [TRAIN, PAIR])
+def test_a_copy_and_a_stored_stage_say_the_same(tmp_path: Path, like: str) -> None:
+    """`gearfmu new --like`, and what an FMU holds of its stage."""
+    own = load_stage(like)
+    assert {field for field, *_ in differences(own, load_stage(new_stage("mine", like, tmp_path)))} == {"name"}
+    assert not differences(own, restored(stored(own.written), own.source))
+
+
+@pytest.mark.parametrize("name", ["fzg_c", "two_stage"])
+def test_a_file_without_them_is_stored_as_ever(name: str) -> None:
+    tables = stored(load_stage(name).written)
+    assert not {"bearings", "operating"} & set(tables)
+    assert not any({"bearing", "span", "carries"} & set(support) for support in tables.get("supports", []))
+
+
+def test_directions_of_rolling_bearings_count(tmp_path: Path) -> None:
+    """Balls hold five directions and rollers four; the kernel has room for 256."""
+    supports = "\n".join(
+        f'[[supports]]\nname = "more{k}"\nbody = "input_shaft"\nat = "{10 + k} mm"\nbearing = "NU206"'
+        for k in range(52)
+    )
+    found = problems(tmp_path, TRAIN, ("[[supports]]", f"{supports}\n\n[[supports]]"))
+    assert "256 directions" in found["supports"]

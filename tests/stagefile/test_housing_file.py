@@ -1,0 +1,119 @@
+"""What a stage file says of its housing, and how one that cannot be is refused."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from refused import refused
+
+from gearfmu.errors import SpecError
+from gearfmu.stagefile.forms.body import expected_hash
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
+
+HOUSED = "two_stage/stage_housed"
+FOOT = '\nbody = "housing"\nnode = "foot0"\n'
+
+
+def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
+    """Remedies by field, of the shipped file with these texts changed."""
+    path = find_stage(HOUSED)
+    for name in ("stage.toml", "housing.inp"):
+        shutil.copy(path.parent / name, folder / ("base.toml" if name == "stage.toml" else name))
+    text = path.read_text(encoding="utf-8")
+    found = refused(folder, text, ('base = "stage.toml"', 'base = "base.toml"'), *changes)
+    return {problem.field: problem.remedy for problem in found}
+
+
+def test_a_housing_stands_beside_the_rotors() -> None:
+    stage = load_stage(HOUSED)
+    assert [h.name for h in stage.housings] == ["housing"] and stage.files[-1] == "housing"
+    assert not any("housing" in rotor.bodies for rotor in stage.rotors.values())
+    plain = stage.on_rigid_ground()
+    assert plain.housings == () and {s.to for s in plain.supports} == {s.to for s in load_stage("two_stage").supports}
+    assert plain.supports == load_stage("two_stage").supports
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "words"),
+    [
+        ('node = "input_left"', 'node = "input_lef"', "supports.input_left.node", "its seats are input_left"),
+        ('to = "housing"\nnode = "input_left"', 'to = "housing"', "supports.input_left.node", "no node of housing"),
+        (FOOT, '\nbody = "housing"\nnode = "input_left"\n', "supports.foot0.node", "its feet are foot0, foot1"),
+        (FOOT, f'{FOOT}at = "10 mm"\n', "supports.foot0.at", "leave it away"),
+        (FOOT, f'{FOOT}to = "input_shaft"\n', "supports.foot0.to", "stands on the ground"),
+        ('seats = { input_left', 'seats = { foot0 = "FOOT0", input_left', "bodies.housing.import", "name foot0"),
+        ('top = "SENSOR_TOP"', 'a_name_that_is_too_long = "SENSOR_TOP"', "bodies.housing.import", "more than 20"),
+        ('file = "housing.inp"', 'file = "house.inp"', "bodies.housing.import.file", "no file"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, field: str, words: str) -> None:
+    found = problems(tmp_path, (old, new))
+    told = next((text for place, text in found.items() if place.startswith(field)), f"only {sorted(found)}")
+    assert words in told, told
+
+
+def test_a_free_housing_is_read_but_cannot_carry_a_load(tmp_path: Path) -> None:
+    """It can be reduced and put under a finished run; a run of its own has no equilibrium."""
+    text = find_stage(HOUSED).read_text(encoding="utf-8")
+    feet = text[text.index("\n[[supports]]                # assumed: bolted to a stiff frame") :]
+    for name in ("stage.toml", "housing.inp"):
+        shutil.copy(find_stage(HOUSED).parent / name, tmp_path / ("base.toml" if name == "stage.toml" else name))
+    path = tmp_path / "free.toml"
+    path.write_text(text.replace(feet, "\n").replace('base = "stage.toml"', 'base = "base.toml"'), encoding="utf-8")
+    stage = load_stage(path)
+    assert expected_hash(stage, "housing") == expected_hash(load_stage(HOUSED), "housing")
+    with pytest.raises(SpecError, match=r"bodies\.housing.*reaction torque.*\(foot0, foot1, foot2, foot3\), soft ones"):
+        stage.require_motion()
+
+
+def test_what_is_dynamic_does_not_make_a_body_stale() -> None:
+    """Nor the name of its springs; modes and node sets do."""
+    wanted = expected_hash(load_stage(HOUSED), "housing")
+    same = {"bodies.housing.dynamic_to": "3 kHz"}
+    assert expected_hash(load_stage(HOUSED, same), "housing") == wanted
+    for other in ({"bodies.housing.modes": 150}, {"bodies.housing.import.skin": "FOOT0"}):
+        assert expected_hash(load_stage(HOUSED, other), "housing") != wanted
+
+
+IN_SET = """
+[bodies.housing]
+kind = "housing"
+reduced = { file = "box.inp", length = "1 m", stiffness = "box.inp", mass = "box.inp", seats = { ring = 1 }, feet = { left = 2 } }
+
+[[supports]]
+name = "left"
+body = "housing"
+node = "left"
+radial = "1e8 N/m"
+"""  # noqa: E501
+
+
+MESH = 'import = { file = "box.inp", length = "1 m", seats = { a = "A" } }'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "words"),
+    [
+        ('to = "housing"', 'to = "house"', "ring.mounts.to", "no housing of this set: housing"),
+        ('node = "ring"', 'node = "rim"', "supports.ring_seat.node", "its seats are ring"),
+        ('name = "left"\nbody = "housing"', 'name = "left"\nbody = "sun"', "supports.left.body", "feet of a housing"),
+        ('mass = "box.inp", ', "", "bodies.housing.reduced", "stiffness and mass come together"),
+        (
+            "seats = { ring = 1 }, ",
+            'seats = { ring = 1 }, recovery = "box.inp", ',
+            "bodies.housing.reduced",
+            "recovered",
+        ),
+        ('kind = "housing"\nreduced', 'kind = "housing"\nmethod = "rubin"\nreduced', "bodies.housing", "leave method"),
+        ("\nreduced = {", f"\n{MESH}\nreduced = {{", "bodies.housing", "give the table import, or the table reduced"),
+    ],
+)
+def test_a_set_on_a_superelement_that_cannot_be(tmp_path: Path, old: str, new: str, field: str, words: str) -> None:
+    (tmp_path / "box.inp").write_text("", encoding="utf-8")
+    text = find_stage("planetary54").read_text(encoding="utf-8") + IN_SET
+    mounts = ("[ring.mounts]", '[ring.mounts]\nto = "housing"\nnode = "ring"')
+    found = {problem.field: problem.remedy for problem in refused(tmp_path, text, mounts, (old, new))}
+    assert words in found.get(field, ""), found

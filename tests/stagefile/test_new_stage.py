@@ -1,0 +1,162 @@
+"""New stage files and the JSON schema."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from gearfmu.errors import SpecError
+from gearfmu.stagefile.proposals.new import new_stage
+from gearfmu.stagefile.reading.base import read_toml
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.schema import general_schema, stage_schema
+from gearfmu.stagefile.stage import load_stage
+
+
+@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief", "two_stage"])
+def test_a_new_stage_is_the_old_one_under_its_name(tmp_path: Path, like: str) -> None:
+    path = new_stage("mine", like, tmp_path)
+    assert path == tmp_path / "mine" / "stage.toml"
+    made, old = load_stage(path), load_stage(like)
+    assert made.name == "mine"
+    assert made.description != old.description, "that of the other stage would be wrong"
+    same = ("name", "source", "description")
+    assert made.model_copy(update={field: getattr(old, field) for field in same}) == old
+    assert [entry.name for entry in path.parent.iterdir()] == ["stage.toml"]
+
+
+def test_every_field_has_a_comment_and_every_default_is_shown(tmp_path: Path) -> None:
+    text = new_stage("mine", "fzg_c", tmp_path).read_text(encoding="utf-8")
+    fields = [line for line in text.splitlines() if " = " in line and not line.startswith("# A line")]
+    assert all(re.search(r"= .*  # \S", line) for line in fields)
+    assert any(line.startswith("backlash = ") and line.endswith("[m]") for line in fields)
+    assert any(line.startswith('# law = "line"') for line in fields)
+    assert any(line.startswith("# helix_angle = ") for line in fields)
+
+
+def test_shown_defaults_are_the_defaults(tmp_path: Path) -> None:
+    path = new_stage("mine", "fzg_c/stage_relief", tmp_path)
+    before = load_stage(path)
+    text = re.sub(r"^# (\w+ = [^…]*?)$", r"\1", path.read_text(encoding="utf-8"), flags=re.M)
+    assert "\nhelix_angle = " in text and "\nlaw = " in text
+    path.write_text(text, encoding="utf-8")
+    assert load_stage(path) == before
+
+
+@pytest.mark.parametrize(("like", "gear"), [("fzg_c", "gears.pinion"), ("planetary54", "ring")])
+def test_an_optional_table_within_another_has_its_heading(tmp_path: Path, like: str, gear: str) -> None:
+    """What a reader takes the comment signs from is the stage with that table."""
+    path = new_stage("mine", like, tmp_path)
+    text = path.read_text(encoding="utf-8")
+    for comment, table in (("# ", "lead"), ("# # ", "lead.end_relief")):
+        start = text.index(f"\n{comment}[{gear}.{table}]")
+        end = text.index("\n\n", start)
+        part = re.sub(f"^{comment}", "", text[start:end], flags=re.M).replace("# crowning", "crowning")
+        part = part.replace('# amount = "… m"', 'amount = "9 um"').replace('# length = "… m"', 'length = "1 mm"')
+        text = text[:start] + part + text[end:]
+    path.write_text(text, encoding="utf-8")
+    found = load_stage(path)
+    lead = found.written.ring.lead if like == "planetary54" else found.gears[0].lead
+    assert lead.end_relief.amount == pytest.approx(9e-6) and lead.end_relief.length == 1e-3
+
+
+def test_an_existing_file_is_never_touched(tmp_path: Path) -> None:
+    path = new_stage("mine", "fzg_c", tmp_path)
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(SpecError, match="exists already"):
+        new_stage("mine", "fzg_c", tmp_path)
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert os.listdir(path.parent) == ["stage.toml"]
+
+
+@pytest.mark.parametrize("name", ["", "A", "../x", "a/b", "1a", "a" * 41])
+def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SpecError, match="small letters"):
+        new_stage(name, "fzg_c", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def resolve(schema: dict, part: dict) -> dict:
+    while "$ref" in part:
+        part = {key: value for key, value in part.items() if key != "$ref"} | schema["$defs"][
+            part["$ref"].split("/")[-1]
+        ]
+    return part
+
+
+def fits(schema: dict, part: dict, value: object) -> bool:
+    """A small judge of the JSON schema words that our schema uses."""
+    part = resolve(schema, part)
+    if "anyOf" in part:
+        return any(fits(schema, choice, value) for choice in part["anyOf"])
+    if "oneOf" in part:
+        return sum(fits(schema, choice, value) for choice in part["oneOf"]) == 1
+    if "enum" in part or "const" in part:
+        return value in part.get("enum", [part.get("const")])
+    kinds = {"object": dict, "string": str, "integer": int, "number": (int, float), "array": list}
+    if not isinstance(value, kinds[part["type"]]):
+        return False
+    if part["type"] == "string":
+        return re.search(part.get("pattern", ""), value) is not None
+    if part["type"] == "array":
+        items = part.get("prefixItems", [part.get("items")] * len(value))
+        return part.get("minItems", 0) <= len(value) == len(items) and all(
+            fits(schema, item, entry) for item, entry in zip(items, value, strict=True)
+        )
+    if part["type"] != "object":
+        return part.get("minimum", value) <= value <= part.get("maximum", value)
+    properties, other = part.get("properties", {}), part.get("additionalProperties", False)
+    for pattern, named in part.get("patternProperties", {}).items():
+        properties = properties | {key: named for key in value if re.search(pattern, key)}
+    known = all(key in properties or isinstance(other, dict) for key in value)
+    return (
+        known
+        and set(part.get("required", [])) <= set(value)
+        and all(fits(schema, properties.get(key, other), item) for key, item in value.items())
+    )
+
+
+def test_schema_accepts_the_shipped_files_and_refuses_slips() -> None:
+    schema = json.loads(json.dumps(stage_schema()))
+    raw = read_toml(find_stage("fzg_c"))
+    assert fits(schema, schema, raw)
+    assert set(schema["else"]["required"]) <= set(raw)
+    assert fits(schema, schema, read_toml(find_stage("fzg_c/stage_relief")) | {"gears": raw["gears"]})
+    for slip in ({"torque_max": 600}, {"torque_max": "600"}, {"torqe": "1 N*m"}, {"levels": {"fast_cut": 5}}):
+        assert not fits(schema, schema, raw | slip)
+
+
+def test_schema_of_a_general_stage_accepts_the_train_and_refuses_slips() -> None:
+    """Bodies are told apart by their kind; what stands in `supports` is no field of a body."""
+    schema = json.loads(json.dumps(general_schema()))
+    raw = read_toml(find_stage("two_stage"))
+    assert fits(schema, schema, raw) and set(schema["else"]["required"]) <= set(raw)
+    assert '"null"' not in json.dumps(schema) and "source" not in schema["properties"]
+    gear = raw["bodies"]["pinion1"]
+    wrong = ({"kind": "shaft"}, {"helix_angle": 20}, {"bearing": {"stiffness": "3e8 N/m"}}, {"name": "pinion1"})
+    slips = [{"bodies": raw["bodies"] | {"pinion1": gear | slip}} for slip in (*wrong, {"lenght": "1 m"})]
+    slips += [{"bodies": raw["bodies"] | {"Pinion": gear}}, {"engagements": []}, {"slices": 21}]
+    slips += [{"supports": [raw["supports"][0] | {"radial": "stiff"}]}, {"rotors": {"input": {"axis": ["0 mm"]}}}]
+    for slip in slips:
+        assert not fits(schema, schema, raw | slip), slip
+
+
+def test_schema_shows_units_meanings_and_defaults_as_in_a_file() -> None:
+    schema = stage_schema()
+    assert "source" not in schema["properties"]
+    gear = schema["$defs"]["GearSpec"]
+    assert gear["properties"]["tip_edge_radius"]["default"] == "0.0002 m"
+    assert gear["properties"]["face_width"]["unit"] == "m"
+    assert "name" not in gear["properties"]
+    assert '"null"' not in json.dumps(schema)
+    missing = [
+        f"{kind}.{name}"
+        for kind, part in schema["$defs"].items()
+        for name, field in part["properties"].items()
+        if not field.get("description")
+    ]
+    assert not missing
