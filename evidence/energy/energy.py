@@ -31,6 +31,7 @@ from gearfmu.stagefile.stage import load_stage
 
 STEPS = (5e-6, 7.5e-6, 10e-6)
 SLICES = (1, 5, 10)
+RELIEVED, HELICAL = "fzg_c/stage_relief", "helical_demo"
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 DG4, EM = 0, 1
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped (10 000 steps that round states to
@@ -56,8 +57,9 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Case:
-    """start: what is not random; builds: names of kernels it runs with; laws: 0 linear, 1 load-dependent; limit: drift
-    allowed, None: that of build and law; infinite: nothing promised; at_least: a control must drift by more."""
+    """start: what is not random; stage: of the pair; builds: names of kernels it runs with; laws: 0 linear, 1
+    load-dependent; limit: drift allowed, None: that of build and law; infinite: nothing promised; at_least: a control
+    must drift by more."""
 
     test: str
     start: Rattle
@@ -68,10 +70,11 @@ class Case:
     parameters: Mapping[str, float] = field(default_factory=dict)
     limit: float | None = None
     at_least: float = 0.0
+    stage: str = RELIEVED
 
 
 FREE = Rattle()
-HARD = (5,)
+HARD, PARTS = (5,), (5, 7)
 CASES = {
     "free rattle": Case("T1 T2 T6", FREE),
     "under load 10 N·m": Case("T3", Rattle(load=10.0)),
@@ -85,6 +88,15 @@ CASES = {
     "gamma = 0 (em)": Case("em", FREE, ("double",), slices=HARD, parameters={"integrator": EM}),
     "damped": Case("T9", Rattle(bearing_damping=600.0), slices=HARD, parameters=DAMPED),
     "damped under load": Case("T9", Rattle(load=10.0, bearing_damping=600.0), slices=HARD, parameters=DAMPED),
+    "helical": Case("T1 T2 T6", FREE, slices=PARTS, stage=HELICAL),
+    "helical, under load 10 N·m": Case("T3", Rattle(load=10.0), slices=PARTS, stage=HELICAL),
+    "helical, under load 150 N·m": Case("T3", Rattle(load=150.0), slices=PARTS, stage=HELICAL),
+    "helical, jammed 1 µm": Case("T4", Rattle(play=-1e-6), slices=PARTS, stage=HELICAL),
+    "helical, jammed 20 µm": Case("T4", Rattle(play=-20e-6), slices=PARTS, stage=HELICAL),
+    "helical, damped": Case("T9", Rattle(bearing_damping=600.0), slices=PARTS, parameters=DAMPED, stage=HELICAL),
+    "helical, damped under load": Case(
+        "T9", Rattle(load=10.0, bearing_damping=600.0), slices=PARTS, parameters=DAMPED, stage=HELICAL
+    ),
 }
 
 
@@ -182,8 +194,8 @@ def main() -> int:
     parser.add_argument("--cases", nargs="+", default=[], choices=[*CASES, *CONTROLS], metavar="NAME")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
-    spec = load_stage("fzg_c/stage_relief")
-    pair, bad = free_pair(spec, load_bodies(spec)), 0
+    pairs = {stage: free_pair(spec := load_stage(stage), load_bodies(spec)) for stage in (RELIEVED, HELICAL)}
+    bad = 0
     lines = kept(chosen.out, chosen.cases) if chosen.cases else []
     with tempfile.TemporaryDirectory() as folder:
         run = {
@@ -195,7 +207,7 @@ def main() -> int:
         for name in chosen.cases or [*CASES, *CONTROLS]:
             case = {**CASES, **CONTROLS}[name]
             for combination in combinations(case):
-                lines.append(row(pair, name, case, combination, run))
+                lines.append(row(pairs[case.stage], name, case, combination, run))
                 bad += not shown(case, lines[-1])
             write(chosen.out, lines)
     return bad

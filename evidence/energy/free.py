@@ -21,7 +21,7 @@ from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stage.assembly.fields import GEAR_NUMBERS, change_gear
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.gear import Bearing, GearSpec
+from gearfmu.stagefile.tables.gear import GearSpec
 from gearfmu.stagefile.tables.ports import PortSpec
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
@@ -112,9 +112,9 @@ def free_pair(spec: Stage, bodies: Sequence[Any]) -> FreePair:
 
 
 def _on_bearing(gear: GearSpec, mass: float, stiffness: float | None, damping: float) -> GearSpec:
-    """The gear on a bearing of that stiffness (None: its own) and damping (N·s/m)."""
+    """The gear on a bearing of that radial stiffness (None: its own) and damping (N·s/m)."""
     k = gear.bearing.stiffness if stiffness is None else stiffness
-    bearing = Bearing(stiffness=k, damping_ratio=damping / (2 * math.sqrt(k * mass)))
+    bearing = gear.bearing.model_copy(update={"stiffness": k, "damping_ratio": damping / (2 * math.sqrt(k * mass))})
     return gear.model_copy(update={"bearing": bearing})
 
 

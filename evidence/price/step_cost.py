@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -50,23 +51,26 @@ class Case:
         return {"level": LEVELS[self.level], "h": STEP, "slices": float(self.slices)}
 
 
-def stored_bodies(spec: Any) -> Any:
-    """The bodies of a stage, by the package that this process imports: earlier commits have another name for it."""
+def assembled(name: str) -> Any:
+    """The model of a stage, by the package that this process imports: earlier commits have other names."""
+    import gearfmu
     from gearfmu import body
+    from gearfmu.stage import assemble
 
-    return (body.load_stage_bodies if hasattr(body, "load_stage_bodies") else body.load_bodies)(spec)
+    here = (Path(gearfmu.__file__).parent / "stagefile").is_dir()
+    spec = import_module(f"gearfmu.{'stagefile' if here else 'spec'}.stage").load_stage(name)
+    bodies = (body.load_stage_bodies if hasattr(body, "load_stage_bodies") else body.load_bodies)(spec)
+    return assemble(spec, bodies)
 
 
 def write(folder: Path, case: Case) -> None:
     """Blob, library and arguments of the host program, by the package that this process imports."""
     from gearfmu.kernel.build import build_library
-    from gearfmu.stage import Steady, assemble
-    from gearfmu.stagefile.stage import load_stage
+    from gearfmu.stage import Steady
 
     build_library()  # where this package looks for it
     build_library(out=folder / "kernel.so")
-    spec = load_stage(case.stage)
-    model = assemble(spec, stored_bodies(spec))
+    model = assembled(case.stage)
     (folder / "blob").write_bytes(model.blob)
     known, drive = model.kernel().variables, Steady(model, SPEED, case.torque)
     start, next_one = drive(0.0), drive(H)
@@ -78,11 +82,9 @@ def write(folder: Path, case: Case) -> None:
 def least(folder: Path, case: Case) -> float:
     """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
     from gearfmu.kernel import Kernel
-    from gearfmu.stage import Steady, assemble
-    from gearfmu.stagefile.stage import load_stage
+    from gearfmu.stage import Steady
 
-    spec = load_stage(case.stage)
-    model = assemble(spec, stored_bodies(spec))
+    model = assembled(case.stage)
     drive = Steady(model, SPEED, case.torque)
     kernel = Kernel(model.blob, case.parameters, folder / "kernel.so")
     best, inputs = float("inf"), [drive(k * H) for k in range(PERIOD * TIMED)]

@@ -15,9 +15,10 @@ from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
-from gearfmu.body import Body
+from gearfmu.body import Body, load_bodies
 from gearfmu.stage import StageModel, Steady, simulate
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.stage import load_stage
 
 FAST = 1
 LOAD = 302.0
@@ -35,19 +36,36 @@ def pair_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 
+@pytest.fixture(scope="module")
+def helical_free() -> FreePair:
+    spec = load_stage(energy.HELICAL)
+    return free_pair(spec, load_bodies(spec))
+
+
+QUICK = ("helical", "helical, jammed 1 µm")
+
+
 @pytest.mark.parametrize("build", ["double", "shipped"])
-@pytest.mark.parametrize("name", [name for name, case in energy.CASES.items() if "double" in case.builds])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.full) if case.stage == energy.HELICAL and name not in QUICK else name
+        for name, case in energy.CASES.items()
+        if "double" in case.builds
+    ],
+)
 def test_invariant_holds_and_damping_never_adds(
-    pair_free: FreePair, libraries: dict[str, Path | None], name: str, build: str
+    request: pytest.FixtureRequest, libraries: dict[str, Path | None], name: str, build: str
 ) -> None:
     """Cases T1 to T6 and T9, both laws, one start, another number of slices and another step each; the whole table is
     `python -m evidence.energy.energy`."""
     case = energy.CASES[name]
+    pair: FreePair = request.getfixturevalue("helical_free" if case.stage == energy.HELICAL else "pair_free")
     if build not in case.builds:
         pytest.skip("a case of the double build only")
     for law in case.laws:
         slices, h = case.slices[law % len(case.slices)], case.steps[law]
-        line = energy.row(pair_free, name, case, (build, law, slices, h), {**SHORT, "libraries": libraries})
+        line = energy.row(pair, name, case, (build, law, slices, h), {**SHORT, "libraries": libraries})
         print(f"{name}, {build}: drift {line['drift']:.1e} ≤ {line['limit']:.0e}, growth {line['growth']:.1e}")
         assert energy.keeps(case, line)
 

@@ -188,11 +188,13 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
     assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
-def pendulum(spec: Stage, bodies: list[Body], torque: float) -> tuple[bytes, Kernel, Callable[[], None], float]:
+def pendulum(
+    spec: Stage, bodies: list[Body], torque: float, mu: float = MU
+) -> tuple[bytes, Kernel, Callable[[], None], float]:
     """Blob and kernel of the block with a weight on an arm that turns 60 times as far as the pinion; what sets its
     torque for the angle in the middle of the next step; the angle where it hangs."""
     blob = swinging(spec, bodies, PortSpec(kind="torque"))
-    kernel = Kernel(blob, {**FROZEN, "friction_coefficient": MU, "h": FALL_STEP})
+    kernel = Kernel(blob, {**FROZEN, "friction_coefficient": mu, "h": FALL_STEP})
     r_a, r_b = (gear.r_b for gear in spec.written.geometry.gears)
     kernel.set("wheel.tau", torque)
     kernel.set("pinion.tau", torque * r_a / r_b)
@@ -226,6 +228,15 @@ def test_a_flank_that_is_grazed_and_rubs_is_solved(spec: Stage, bodies: list[Bod
         kernel.step(i * FALL_STEP, FALL_STEP)
         flights += kernel.get("mesh.force") == 0.0
     assert kernel.get("solver.retried_steps") == 0 and flights > 20
+
+
+def test_friction_that_finds_no_side_is_told(spec: Stage, bodies: list[Body]) -> None:
+    """One step of this swing has none even without the scalar. A scalar that was found afterwards hid it."""
+    _, kernel, fall, _ = pendulum(spec, bodies, 7.5 * 1.003, 0.1)
+    for i in range(1200):
+        fall()
+        kernel.step(i * FALL_STEP, FALL_STEP)
+    assert kernel.get("solver.retried_steps") == 1 and int(kernel.get("solver.status")) & 4
 
 
 def test_below_the_limit_of_friction_nothing_moves(spec: Stage, bodies: list[Body]) -> None:

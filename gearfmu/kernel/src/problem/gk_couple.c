@@ -99,6 +99,14 @@ static void account_all(const gk_coupled *c)
         if (gk_is_within(c, e)) gk_friction_account(c->work->engaged[e].glide, &c->work->engaged[e].system);
 }
 
+/* Tells whether an island has not settled. The search for the scalar takes friction's statuses as they were found
+ * without it, and cannot tell whether these are right: the step does, by `unsettled`. */
+static void tell_unsettled(gk_coupled *c, const gk_island *island, int open)
+{
+    if (open) island->member[0]->limit_reached = 1;
+    if (!(fabs(island->member[0]->alpha) > 0.0)) c->unsettled = open;
+}
+
 /* an engagement that is alone: normal forces and friction in turns */
 static void rub(const gk_island *island)
 {
@@ -109,7 +117,7 @@ static void rub(const gk_island *island)
         change = solve_own(c, e, round, 0.5 * FRICTION_TOLERANCE);
     account_all(c);
     island->member[0]->dashpot.stand = 0;
-    if (!(change < FRICTION_TOLERANCE) && !hardly_rubs(c)) island->member[0]->limit_reached = 1;
+    tell_unsettled(c, island, !(change < FRICTION_TOLERANCE) && !hardly_rubs(c));
 }
 
 static void read_all(gk_coupled *c, int at_once)
@@ -164,7 +172,7 @@ static void sweep(const gk_island *island)
         part_all(c);
     }
     account_all(c);
-    if (!(next < enough) && !(gaps < enough && hardly_rubs(c))) island->member[0]->limit_reached = 1;
+    tell_unsettled(c, island, !(next < enough) && !(gaps < enough && hardly_rubs(c)));
 }
 
 gk_island gk_couple_island(gk_coupled *c)

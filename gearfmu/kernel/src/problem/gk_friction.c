@@ -213,11 +213,12 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands, d
     if (!round) guess_end(glide, s);
     find_sliding(glide, s);
     const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
-    glide->moved = gk_friction_express(glide, s);
-    if (round && !changed && !(glide->moved > enough * largest)) return glide->moved / largest;
+    const double expressed = glide->moved = gk_friction_express(glide, s);
+    if (round && !changed && !(expressed > enough * largest)) return expressed / largest;
     gk_friction_apply(glide, s);
     gk_solve_contacts(s);
     glide->moved = gk_friction_follow(glide, s);
+    if (changed) glide->moved = gk_max(glide->moved, expressed); /* by another status, which may not be the last one */
     if (changed || (!stands && !round)) return 1.0;
     return glide->moved / find_limits(glide, s);
 }

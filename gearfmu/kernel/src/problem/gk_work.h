@@ -213,6 +213,7 @@ typedef struct gk_coupled { /* an island in a step */
     int sweeps;        /* passes at most; 0: as many as a step may take */
     double rate;       /* by which a pass changed less than the one before */
     int read, known;   /* rows have read what the present forces do; it is known what engagements do to each other */
+    int unsettled;     /* where friction is at its limits has not been found */
 } gk_coupled;
 GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
 GK_HOT void gk_couple_recall(gk_coupled *coupled);
