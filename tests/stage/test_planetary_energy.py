@@ -63,7 +63,7 @@ CASES = {
     "T6 load-dependent law": Case(parameters={"effect.hertz": 1.0}),
     "T2 level fast": Case(parameters={"level": 1.0}),
 }
-DEAR = ("T2 ten slices", "T3 under 600 N·m", "T4 jammed 20 µm")  # one and five slices, 20 N·m and 1 µm stand beside
+DEAR = ("T2 ten slices", "T3 under 600 N·m", "T4 jammed 20 µm")  # quick: one and five slices, 20 N·m, 1 µm
 
 
 def each_standing_some_turning(names: Iterable[str]) -> list[Any]:
