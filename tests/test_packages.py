@@ -22,7 +22,7 @@ LARGER = {  # files that may be, up to 1.4 MB: tests/body/test_shipped.py
     "reduced_models/two_stage/pinion2.h5",
 }
 INSIDE = {  # sub-packages of a package in reading order; "" are its own files
-    "stagefile": ("reading", "tables", "forms", "", "proposals"),
+    "stagefile": ("reading", "tables", "forms", "checks", "", "proposals"),
     "stage": ("assembly", "run", ""),
     "reduction": ("cyclic", "imported"),
 }

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.hertz import largest_relative_radius
 
 
 class HasGeometry(Protocol):
@@ -80,6 +81,11 @@ class PairGeometry:
         start, end = self.opposite(self.gears[1].s_tip), self.gears[0].s_tip
         pitch = self.gears[0].r_b * math.tan(self.alpha_wt)
         return {"A": start, "B": end - self.base_pitch, "C": pitch, "D": start + self.base_pitch, "E": end}
+
+    def largest_relative_radius(self) -> float:
+        """Largest relative radius of curvature s (L − s)/L (m) along the path of contact."""
+        path = self.path
+        return largest_relative_radius(self.length, path["A"], path["E"])
 
     @property
     def contact_ratio(self) -> float:

@@ -18,8 +18,9 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.stagefile.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
-from gearfmu.stagefile.forms.shapes import gears_in_mesh
+from gearfmu.stagefile.checks.gears import rounded_up
+from gearfmu.stagefile.checks.meshes import STRIP_PER_HERTZ
+from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
     PITCH_SPEED,

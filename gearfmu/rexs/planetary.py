@@ -27,7 +27,7 @@ from gearfmu.rexs.pair import (
     put_rack_data,
     root_diameter,
 )
-from gearfmu.stagefile.forms.pair_checks import rounded_up
+from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")

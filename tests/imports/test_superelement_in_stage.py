@@ -120,7 +120,8 @@ def run(folder: Path, name: str, housing: str) -> tuple[Trace, Path, float]:
 @pytest.mark.full
 @pytest.mark.needs("ccx")
 def test_a_train_in_a_housing_of_calculix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forces, accelerations, report and sound power. Bounds: the files have ten digits or more."""
+    """Forces, accelerations, report and sound power. Margin: 9e-6 of a sensor, 1e-7 of the mesh
+    force, 5e-7 dB."""
     monkeypatch.setattr("gearfmu.body.sound.PATCHES", 150)
     library = find_stage("two_stage").parent
     shutil.copy(library / "stage.toml", tmp_path / "base.toml")
@@ -143,5 +144,4 @@ def test_a_train_in_a_housing_of_calculix(tmp_path: Path, monkeypatch: pytest.Mo
     for group, ending in ends.items():
         own = [name for name in one.channels if name.startswith(group) and name.endswith(ending)]
         found, wanted = (np.stack([of[name] for name in own]) for of in (other, one))
-        print(group, np.abs(found - wanted).max() / np.abs(wanted).max(), power, heard)
         assert np.abs(found - wanted).max() < 1e-4 * np.abs(wanted).max(), group

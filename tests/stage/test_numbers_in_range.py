@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import gearfmu as gf
+import gearfmu.scenefile
 import gearfmu.stagefile
 from gearfmu.cli import outcome
 from gearfmu.errors import GearfmuError, Problem, SpecError
@@ -35,9 +36,10 @@ FILE = "some.toml"
 
 def classes(kind: type[Spec] = Spec) -> set[type[Spec]]:
     """Every class of a table that a file may hold."""
-    for module in pkgutil.iter_modules(gearfmu.stagefile.__path__):
-        importlib.import_module(f"gearfmu.stagefile.{module.name}")
-    own = kind.__module__.startswith("gearfmu.stagefile") and bool(kind.model_fields)
+    for package in (gearfmu.stagefile, gearfmu.scenefile):
+        for module in pkgutil.iter_modules(package.__path__):
+            importlib.import_module(f"{package.__name__}.{module.name}")
+    own = kind.__module__.startswith(("gearfmu.stagefile", "gearfmu.scenefile")) and bool(kind.model_fields)
     return ({kind} if own else set()).union(*(classes(inner) for inner in kind.__subclasses__()))
 
 
@@ -236,11 +238,11 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
 
 
 def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file(tmp_path: Path) -> None:
-    from gearfmu.stagefile.forms.general_checks import general_problems
+    from gearfmu.stagefile.checks.stage import stage_problems
 
     stage = gf.load("two_stage")
     many = stage.model_copy(update={"engagements": stage.engagements[:1] * 13})
-    found = {problem.field: problem.remedy for problem in general_problems(FILE, many)}
+    found = {problem.field: problem.remedy for problem in stage_problems(many)}
     assert "the kernel holds at most 12 meshes" in found["engagements"]
 
 

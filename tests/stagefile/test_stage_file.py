@@ -14,8 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.errors import SpecError
+from gearfmu.stagefile.checks.gears import at_most
 from gearfmu.stagefile.forms.pair import StageSpec
-from gearfmu.stagefile.forms.pair_checks import at_most, largest_half_width
+from gearfmu.stagefile.forms.shapes import largest_half_width
 from gearfmu.stagefile.proposals.new import stage_text
 from gearfmu.stagefile.reading.base import read_toml
 from gearfmu.stagefile.reading.files import find_stage, model_folder, shipped_stages

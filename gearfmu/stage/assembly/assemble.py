@@ -27,9 +27,8 @@ from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.assembly.observed import observed_number, observed_sections
 from gearfmu.stage.assembly.rolling import Settled, Statics, Tangents, settle
 from gearfmu.stage.assembly.slices import smeared, smeared_tip
-from gearfmu.stage.assembly.spinning import turn_rates
+from gearfmu.stage.assembly.spinning import turn_rates, whirl_rows
 from gearfmu.stage.assembly.teeth import ROLLS, gear_section, mismatches, stored_points
-from gearfmu.stage.assembly.whirls import whirl_rows
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stored import stored, stored_files

@@ -16,11 +16,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as sl
 
 from gearfmu.body.body import Body
+
+if TYPE_CHECKING:
+    from gearfmu.stage.assembly.groups import Group, Layout
 
 RX, RY, RZ, RIGID = 3, 4, 5, 6
 HIGHEST = 2 * math.pi * 100e3  # rad/s: patterns above it feel 2Ω/ω < 2e-3 at 600 rad/s, and are left out
@@ -86,3 +90,24 @@ def skew_pairs(matrix: np.ndarray) -> np.ndarray:
         x, y = (basis[:, i + 1], basis[:, i]) if size[i] > 0 else (basis[:, i], basis[:, i + 1])
         pairs.append(np.sqrt(abs(size[i])) * np.stack([x, y]))
     return np.array(pairs).reshape(-1, 2, len(matrix))
+
+
+def whirl_rows(group: Group) -> tuple[np.ndarray, np.ndarray]:
+    """Rotors (p,) and rows x, y (p, 2, n): those of the bodies' own rotors and of the axes that they stand in.
+    Speeds change by −2Ω (y x·v − x y·v), Ω the rotor's speed."""
+    layout, rotors, rows = group.layout, [], []
+    for r, rotor in enumerate(layout.rotors):
+        for body in rotor if r not in layout.stands else ():
+            free, frame = layout.bodies[body], layout.frame_of(body)
+            own = free.spinning or rigid_spinning(free.mass, free.omega.size)
+            for turns, matrix in ((r, own.gyroscopic), (frame, own.coriolis)):
+                if turns >= 0:
+                    found = skew_pairs(matrix[np.ix_(*2 * [_unknowns(layout, body)])]) @ group.shapes[group.at[body]]
+                    rotors += len(found) * [turns]
+                    rows += list(found)
+    return np.array(rotors, int), np.array(rows).reshape(-1, 2, group.omega.size)
+
+
+def _unknowns(layout: Layout, body: int) -> np.ndarray:
+    """Which of the rigid motions and patterns of a body are unknowns."""
+    return np.array([*layout.freedoms(body), *range(6, 6 + layout.bodies[body].omega.size)], int)

@@ -12,8 +12,7 @@ from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
-from gearfmu.stagefile.forms.planetary_checks import mesh_torque, ring_half_width
-from gearfmu.stagefile.forms.shapes import carrier_geometry, mesh_shape, set_carrier, set_geometry
+from gearfmu.stagefile.forms.shapes import carrier_geometry, largest_half_width, mesh_shape, set_carrier, set_geometry
 
 
 def derived(stage: Stage) -> dict[str, Any]:
@@ -59,6 +58,7 @@ def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
     g = set_geometry(spec)
     shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
     carrier = carrier_geometry(set_carrier(spec))
+    torque = spec.mesh_torque * spec.planet.teeth / spec.sun.teeth
     return {
         "speed_ratio_sun_to_carrier": g.ratio,
         "working_pressure_angle_deg": {
@@ -67,8 +67,8 @@ def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
         "contact_ratio": {"sun_planet": g.sun_mesh.contact_ratio, "planet_ring": g.ring_mesh.contact_ratio},
         "ring_least_tip_radius": g.ring_mesh.least_tip_radius,
         "gap_between_planets": g.neighbour_clearance,
-        "sun_torque_in_one_mesh": mesh_torque(spec),
-        "largest_hertz_half_width_planet_ring": ring_half_width(spec, g.ring_mesh),
+        "sun_torque_in_one_mesh": spec.mesh_torque,
+        "largest_hertz_half_width_planet_ring": largest_half_width(spec.gears[1:], g.ring_mesh, torque),
         "carrier_mass": carrier.volume * spec.carrier.material.density,
         **_radii(shapes),
         **(_derived_set_helix(spec, g) if spec.set.helix_angle else {}),

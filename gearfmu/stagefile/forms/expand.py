@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,11 +19,9 @@ from gearfmu.stagefile.forms.general import (
     RotorSpec,
     Stage,
 )
-from gearfmu.stagefile.forms.general_checks import with_relief_rolls
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
-from gearfmu.stagefile.forms.planetary_checks import mesh_torque
-from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier
+from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier, with_relief_rolls
 from gearfmu.stagefile.reading.base import Spec
 from gearfmu.stagefile.tables.bearings import Bearing, RollingMount
 from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
@@ -33,10 +31,21 @@ CARRIER = "carrier"
 
 
 def expand(form: Form | Stage) -> Stage:
-    """The stage that a file says, which keeps what is written there."""
+    """The stage that a file says, which keeps what is written there. ValueError where axes are too near for its
+    meshes (`laid_out` makes such a stage too)."""
+    stage = laid_out(form)
+    if not isinstance(form, PlanetarySpec):
+        return stage
+    rolled = with_relief_rolls(stage)
+    rolled._origin = stage._origin
+    return rolled
+
+
+def laid_out(form: Form | Stage) -> Stage:
+    """The stage that a file says, whatever is wrong with it: reliefs begin where the file says, if in words."""
     if isinstance(form, PlanetarySpec):
-        return expand_set(form)
-    return form if isinstance(form, Stage) else expand_pair(form)
+        return _expanded_set(form)
+    return form if isinstance(form, Stage) else _expanded_pair(form)
 
 
 def rewritten(stage: Stage, **fields: Any) -> Stage:
@@ -66,7 +75,7 @@ def with_bores(stage: Stage, coupling: str) -> Stage:
     return rewritten(stage, gears=tuple(_coupled(gear, coupling) for gear in form.gears))
 
 
-def expand_pair(spec: StageSpec) -> Stage:
+def _expanded_pair(spec: StageSpec) -> Stage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
@@ -77,7 +86,7 @@ def expand_pair(spec: StageSpec) -> Stage:
         source=spec.source,
         slices=spec.contact.slices,
         nodal=spec.contact.nodal,
-        bodies={gear.name: _pair_gear(gear, pair, hand) for gear, hand in zip(spec.gears, (1, -1), strict=True)},
+        bodies={gear.name: gear for gear in pair_gears(pair, spec.gears)},
         rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
         engagements=(
             EngagementSpec(
@@ -98,11 +107,15 @@ def expand_pair(spec: StageSpec) -> Stage:
         ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
-    stage._origin = Origin(spec, {g.name: f"gears.{g.name}" for g in spec.gears}, limits=spec.limits)
+    places = {f"bodies.{gear.name}": f"gears.{gear.name}" for gear in spec.gears}
+    places |= {f"supports.{gear.name}": f"gears.{gear.name}.bearing" for gear in spec.gears}
+    places |= {f"supports.{gear.name}.bearing": f"gears.{gear.name}.bearing.rolling" for gear in spec.gears}
+    places |= {f"rotors.{wheel.name}.axis": "pair.center_distance", "engagements.mesh.backlash": "pair.backlash"}
+    stage._origin = Origin(spec, places, limits=spec.limits)
     return stage
 
 
-def expand_set(spec: PlanetarySpec) -> Stage:
+def _expanded_set(spec: PlanetarySpec) -> Stage:
     """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
     carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
     springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
@@ -122,7 +135,7 @@ def expand_set(spec: PlanetarySpec) -> Stage:
     )
     bodies |= spec.bodies
     bodies[CARRIER] = set_carrier(spec)
-    own: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
+    cut: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
         name=spec.name,
         description=spec.description,
@@ -136,10 +149,14 @@ def expand_set(spec: PlanetarySpec) -> Stage:
             for name, port in spec.ports.items()
         },
         levels=spec.levels,
-        **own,
+        **cut,
     )
-    stage, shared = with_relief_rolls(stage), dict.fromkeys(planets, "planet")
-    places = {name: name for name in (*bodies, "planet")} | shared
+    shared = dict.fromkeys(planets, "planet")
+    places = {f"bodies.{name}": shared.get(name, name) for name in (*bodies, "planet") if name not in spec.bodies}
+    own = [k for k in spec.set.planet_eccentricity if k < len(planets)]
+    places |= {f"bodies.{planets[k]}.eccentricity": f"set.planet_eccentricity.{k}" for k in own}
+    places |= {f"rotors.{name}.axis": "set.center_distance" for name in (*planets, "ring")}
+    places |= {f"engagements.sun_{name}.backlash": "set.backlash" for name in planets}
     mounts, limits = spec.ring.mounts, spec.limits
     stage._origin = Origin(spec, places, shared, mounts, limits, spec.set.load_sharing, missing)
     return stage
@@ -195,7 +212,7 @@ def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
     contact = {name: getattr(spec.contact, name, None) for name in ("damping", "friction", "film")}
     common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
-    torque, relative = mesh_torque(spec), (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
+    torque, relative = spec.mesh_torque, (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
     moves = spec.contact is not None and spec.speed_max is not None
     made = EngagementSpec if moves else partial(EngagementSpec.model_construct, misalignment=None)
     return tuple(
@@ -252,9 +269,10 @@ def _coupled(gear: Any, coupling: str) -> Any:
     return gear.model_copy(update={"imported": gear.imported.model_copy(update={"bore_coupling": coupling})})
 
 
-def _pair_gear(gear: GearSpec, pair: PairSpec, hand: int) -> GearBody:
-    """A gear of a pair in the terms of any stage; hand : sign of its helix angle over that of the pair."""
-    return GearBody(**_fields(GearSpec, gear) | {"bearing": None}, **_angles(pair, hand))
+def pair_gears(pair: PairSpec, gears: Sequence[GearSpec]) -> list[GearBody]:
+    """The gears of a pair in the terms of any stage: helix angles of opposite hands."""
+    hands = zip(gears, (1, -1), strict=True)
+    return [GearBody(**_fields(GearSpec, gear) | {"bearing": None}, **_angles(pair, hand)) for gear, hand in hands]
 
 
 def _set_gear(gear: SetGearSpec, of: SetSpec, **changes: Any) -> GearBody:

@@ -163,9 +163,9 @@ class PlacedPort(PortSpec):
 class Origin:
     """The file of a pair or of a set, which a stage was expanded from; of a general stage nothing.
 
-    form: the file's own tables; places: of bodies, their tables there; files: of bodies that share one reduced body,
-    its name; mounts: of the ring of a set; limits, load_sharing: of the stage as a whole; missing: fields that it needs
-    to move."""
+    form: the file's own tables; places: names there of tables and fields that have others in the stage; files: of
+    bodies that share one reduced body, its name; mounts: of the ring of a set; limits, load_sharing: of the stage as a
+    whole; missing: fields that it needs to move."""
 
     form: Form | None = None
     places: Mapping[str, str] = field(default_factory=dict)
@@ -265,7 +265,15 @@ class Stage(LaterFields):
 
     def table_of(self, body: str) -> str:
         """The table of a body in the stage file: "bodies.wheel1", "gears.pinion", "sun"."""
-        return self._origin.places.get(body, f"bodies.{body}")
+        return self.in_file(f"bodies.{body}")
+
+    def in_file(self, field: str) -> str:
+        """The name of a field in the stage file: "bodies.sun.teeth" of a set is "sun.teeth" there."""
+        keys = field.split(".")
+        for size in range(len(keys), 0, -1):
+            if (place := self._origin.places.get(".".join(keys[:size]))) is not None:
+                return ".".join([place, *keys[size:]])
+        return field
 
     @property
     def files(self) -> tuple[str, ...]:

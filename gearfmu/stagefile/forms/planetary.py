@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
+from gearfmu.geometry.planetary import set_ratio
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables
 from gearfmu.stagefile.tables.bearings import LaterFields
 from gearfmu.stagefile.tables.flanks import Eccentricity, Toothing
@@ -249,6 +250,12 @@ class PlanetarySpec(LaterFields):
     def limits(self) -> Limits:
         """Torque and speed of the carrier that the model is made for."""
         return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
+
+    @property
+    def mesh_torque(self) -> float:
+        """Torque (N·m) on the sun in its mesh with the most loaded planet at torque_max, K_γ T_s/N."""
+        sun = self.torque_max / set_ratio(self.sun.teeth, self.ring.teeth)
+        return self.set.load_sharing * sun / self.set.planets
 
     @property
     def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:

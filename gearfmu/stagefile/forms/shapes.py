@@ -5,18 +5,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.hertz import common_width
+from gearfmu.geometry.hertz import common_width, contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import HANDS, CarrierGeometry, PlanetaryGeometry, RingMesh
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.stagefile.tables.flanks import Toothing
 from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
 
 GearShape = GearGeometry | InternalGearGeometry
 MeshShape = PairGeometry | RingMesh
+Loaded: TypeAlias = GearSpec | SetGearSpec | RingSpec  # has a material and a face width
+Tooth = TypeVar("Tooth", bound=Toothing)
 Rack: TypeAlias = PairSpec | SetSpec | GearBody | RingBody  # has normal module, pressure angle and helix angle
 
 
@@ -103,6 +106,37 @@ def mesh_shape(stage: Stage, mesh: EngagementSpec) -> MeshShape:
     if isinstance(b, InternalGearGeometry):
         return RingMesh(a, b, distance, mesh.backlash)
     return PairGeometry((a, b), distance, mesh.backlash)
+
+
+def largest_half_width(gears: Sequence[Loaded], mesh: MeshShape, torque: float) -> float:
+    """Largest Hertz half-width b (m) along the path of contact.
+
+    One tooth pair carries the whole torque (N·m) on gear A over the common face width. Of helical flanks the normal
+    force and the length of its line of contact both grow by 1/cos β_b, the radius of curvature normal to it too.
+    """
+    first, (a, b) = mesh.gears[0], (gear.material for gear in gears)
+    e_star = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
+    load = torque / first.r_b / common_width(gears)
+    return half_width(load, mesh.largest_relative_radius() / math.cos(first.beta_b), e_star)
+
+
+def with_rolls(gear: Tooth, mesh: MeshShape, index: int) -> Tooth:
+    """The same gear with points of single contact turned into rolls. mesh: in which it is gear `index`."""
+    points = {"tip_relief": mesh.outer_single_contact, "root_relief": mesh.inner_single_contact}
+    found: dict[str, Any] = {}
+    for field, relief in (("tip_relief", gear.tip_relief), ("root_relief", gear.root_relief)):
+        if relief is not None and isinstance(relief.start_roll, str):
+            found[field] = relief.model_copy(update={"start_roll": points[field](index)})
+    return gear.model_copy(update=found) if found else gear
+
+
+def with_relief_rolls(stage: Stage) -> Stage:
+    """The same stage with points of single contact turned into rolls, those of a gear's first engagement."""
+    bodies = dict(stage.bodies)
+    for mesh in reversed(stage.engagements):
+        for index, name in enumerate(mesh.gears):
+            bodies[name] = with_rolls(toothed(stage, name), mesh_shape(stage, mesh), index)
+    return stage.model_copy(update={"bodies": bodies})
 
 
 def toothed(stage: Stage, name: str) -> ToothedBody:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearfmu.errors import Problem
-from gearfmu.stagefile.forms.pair_checks import rounded_up
+from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.reading.files import find_stage, read_layers
 
 LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears

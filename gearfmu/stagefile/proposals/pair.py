@@ -8,7 +8,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.hertz import largest_relative_radius
 from gearfmu.geometry.pair import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
-from gearfmu.stagefile.forms.pair_checks import rounded_down, rounded_up
+from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,

@@ -18,7 +18,7 @@ from gearfmu.geometry.shifts import (
     sum_of_shifts,
 )
 from gearfmu.ranges import range_of
-from gearfmu.stagefile.forms.pair_checks import rounded_up
+from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,

@@ -1,18 +1,16 @@
-"""Problems of a file all at once: what cannot be read is put right where it is plain what was meant, so that the rest
-can be judged beside it."""
+"""What a file means that cannot be read: what is wrong is put right where that is plain, so that the rest can be judged
+beside it."""
 
 from __future__ import annotations
 
 import copy
 import difflib
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
-from gearfmu.errors import Problem, UnitError
-from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path, validate
+from gearfmu.errors import UnitError
+from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path
 from gearfmu.units import to_si
 
 _ROUNDS = 4  # a key put right may bring further ones to light
@@ -20,25 +18,7 @@ _MISSING = object()
 _BESIDE_TEETH = ("kg/m^3", "N/m", "N*m/rad", "N*m*s/rad", "N*s/m^2", "kg*m^2", "Hz", "rad/s")  # shape no tooth
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """problems, and whether the object could be judged as a whole."""
-
-    problems: list[Problem]
-    judged: bool
-
-
-def read_and_judge(
-    kind: type[SpecType], raw: dict[str, Any], file: str, judge: Callable[[SpecType], list[Problem]]
-) -> tuple[SpecType | None, Verdict]:
-    """`raw` tables of `file` as an object of class `kind` and everything that is wrong with it: what `judge` finds in
-    the object stands beside the fields that cannot be read, as far as it does not depend on them."""
-    spec, problems = validate(kind, raw, file)
-    meant = spec if spec is not None else _as_meant(kind, raw)
-    return spec, Verdict(problems + ([] if meant is None else judge(meant)), meant is not None)
-
-
-def _as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
+def as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
     """The object without keys that nobody knows (a misspelt one under its name), with bare numbers in SI, with numbers
     that shape no tooth within their range, with the first of the words that are allowed, without optional fields and
     tables that cannot be read; None where a field that must be there cannot."""

@@ -1,44 +1,39 @@
-"""Can a general stage be put together? Names that must exist, places on shafts, axes, and every mesh as a pair. Nothing
-here stops at the first problem."""
+"""What is wrong with a stage, under the names of its file: names that must exist, places on shafts, axes, bearings, the
+housing, and every mesh. Nothing here stops at the first problem."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 
 from gearfmu.errors import Problem
 from gearfmu.ranges import kernel_limits
-from gearfmu.stagefile.forms.bearing_checks import unused_problems, use_problems, uses_of_supports
-from gearfmu.stagefile.forms.flank_checks import with_rolls
-from gearfmu.stagefile.forms.general import EngagementSpec, RingBody, Stage, ToothedBody
-from gearfmu.stagefile.forms.housing_checks import housing_problems
-from gearfmu.stagefile.forms.pair_checks import geometry_problems, millimetres
-from gearfmu.stagefile.forms.planetary_checks import RingPair, ring_pair_problems
-from gearfmu.stagefile.forms.shapes import centre_distance, mesh_shape, toothed
+from gearfmu.stagefile.checks.gears import millimetres, shown
+from gearfmu.stagefile.checks.meshes import Meshed, mesh_problems
+from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
+from gearfmu.stagefile.forms.shapes import centre_distance, toothed
 from gearfmu.stagefile.tables.bearings import BallBearing, RollerBearing
-from gearfmu.stagefile.tables.gear import PairSpec
 from gearfmu.stagefile.tables.housing import HousingBody
+from gearfmu.stagefile.tables.ports import SupportSpec
 from gearfmu.stagefile.tables.shaft import ShaftBody
 
-Found = Iterator[tuple[str, str, str]]
+Found = Iterator[tuple[str, str, str]]  # field of the stage, value, remedy
 _SAME_RACK = ("normal_module", "pressure_angle")
+_SPRINGS = ("radial", "axial", "tilt", "torsion")
 
 
-def general_problems(file: str, stage: Stage) -> list[Problem]:
+def stage_problems(stage: Stage) -> list[Problem]:
     """Everything that is wrong with a stage whose single fields can be read."""
-    rolling = (
-        *use_problems(uses_of_supports(stage.supports), stage.bearings, stage.operating),
-        *unused_problems(stage.supports),
-    )
-    problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage), *rolling)]
-    problems += [Problem(file, *entry) for entry in housing_problems(stage)]
-    known = _what_can_be_judged(stage)
-    problems += [Problem(file, *entry) for entry in (*_places(known), *_held(known))]
-    for engagement in known.engagements:
-        problems += _mesh(file, known, engagement)
-    return list(dict.fromkeys(problems))
+    found = [*_rolling(stage), *_housing(stage)]
+    if isinstance(stage.written, Stage):  # the others are built, and have names and places of their own
+        found = [*_counts(stage), *_rotors(stage), *_names(stage), *found]
+        stage = _what_can_be_judged(stage)
+        found += [*_places(stage), *_held(stage)]
+    for engagement in stage.engagements:
+        found += _mesh(stage, engagement)
+    file = str(stage.source)
+    return list(dict.fromkeys(Problem(file, stage.in_file(field), value, remedy) for field, value, remedy in found))
 
 
 def _what_can_be_judged(stage: Stage) -> Stage:
@@ -196,55 +191,111 @@ def _joined(stage: Stage, bodies: list[str]) -> set[str]:
     return joined
 
 
-def _mesh(file: str, stage: Stage, mesh: EngagementSpec) -> list[Problem]:
-    """One engagement as the pair that it is; fields under their names here."""
-    a, b = (stage.bodies[name] for name in mesh.gears)
-    assert isinstance(a, ToothedBody) and isinstance(b, ToothedBody)
-    field = f"engagements.{mesh.name}"
-    if isinstance(a, RingBody):
-        return [
-            Problem(file, f"{field}.gears", ", ".join(mesh.gears), "a ring is gear B of its meshes: name it second")
-        ]
+def _rolling(stage: Stage) -> Found:
+    """Rolling bearings: known, on the side that they carry, in place of springs between a shaft or gear and ground."""
+    for support in stage.supports:
+        place = f"supports.{support.name}"
+        if support.bearing is None:
+            for field, value in support:
+                if field in ("span", "carries") and value is not None:
+                    remedy = 'it is about a rolling bearing: name one, bearing = "…", or leave it away'
+                    yield f"{place}.{field}", f"{value}", remedy
+            continue
+        if stage.operating is None:
+            used = f"{stage.in_file(place)} has a rolling bearing, which is linearised at a load"
+            yield "operating.torque", "missing", f'{used}: write torque = "100 N*m"'
+        if support.bearing in stage.bearings:
+            yield from _sides(support, stage.bearings[support.bearing])
+        else:
+            known = ", ".join(sorted(stage.bearings)) or "none"
+            remedy = f"no such bearing: write [bearings.{support.bearing}]; there are {known}"
+            yield f"{place}.bearing", support.bearing, remedy
+        for field, value in support:
+            if field in _SPRINGS and value is not None:
+                yield f"{place}.{field}", f"{value}", f"{support.bearing} has its own stiffness: leave it away"
+        if support.to is not None:
+            yield f"{place}.to", support.to, "a rolling bearing rests on the ground: leave it away"
+
+
+def _sides(support: SupportSpec, bearing: BallBearing | RollerBearing) -> Found:
+    """Bearings that carry one axial direction say which."""
+    angled = bearing.contact_angle > 0
+    sided, field = angled or bearing.preload > 0, f"supports.{support.name}.carries"
+    if sided and support.carries is None and support.span is None:
+        why = "has a contact angle" if angled else "is preloaded"
+        remedy = f'{support.bearing} {why}: say which axial force of the shaft it carries, carries = "+z" or "-z"'
+        yield field, "missing", remedy
+    if not sided and support.carries is not None:
+        yield field, support.carries, f"{support.bearing} has no contact angle and no preload: leave it away"
+
+
+def _housing(stage: Stage) -> Found:
+    """One housing, seats and feet that exist. Where seats lie is known from its mesh (stage/assembly/housed.py); what
+    hangs freely is refused by `Stage.require_motion`."""
+    for other in stage.housings[1:]:
+        yield f"bodies.{other.name}.kind", "housing", f"{stage.housings[0].name} is one already: keep one housing"
+    for housing in stage.housings[:1]:
+        yield from _on_no_rotor(stage, housing)
+        for support in stage.supports:
+            if housing.name in (support.body, support.to):
+                yield from _on_housing(stage, housing, support)
+
+
+def _on_no_rotor(stage: Stage, housing: HousingBody) -> Found:
+    for name, rotor in stage.rotors.items():
+        if housing.name in rotor.bodies:
+            yield f"rotors.{name}.bodies.{housing.name}", housing.name, "a housing stands: name it in no rotor"
+    for name, port in stage.ports.items():
+        if port.body == housing.name:
+            yield f"ports.{name}.body", housing.name, "a housing does not turn: name a shaft or a gear"
+
+
+def _on_housing(stage: Stage, housing: HousingBody, support: SupportSpec) -> Found:
+    place, foot = f"supports.{support.name}", support.body == housing.name
+    known, what = (housing.made_of.feet, "feet") if foot else (housing.made_of.seats, "seats")
+    if foot and support.to is not None:
+        yield f"{place}.to", support.to, f"a foot of {housing.name} stands on the ground: leave `to` away"
+    if foot and support.bearing is not None:
+        yield f"{place}.bearing", support.bearing, "a foot has springs: write radial, axial, tilt and torsion"
+    if foot and support.at is not None:
+        yield f"{place}.at", f"{support.at:g}", "its node set says where a foot lies: leave it away"
+    if support.node not in known:
+        remedy = f"no node of {housing.name}: its {what} are {', '.join(known) or f'not named in its {housing.table}'}"
+        yield f"{place}.node", support.node or "missing", remedy
+    spins = not foot and support.body in stage.bodies and not stage.rotors[stage.rotor_of(support.body)].stands
+    if spins and support.torsion is not None:
+        yield f"{place}.torsion", f"{support.torsion}", "a bearing on a housing cannot hold a spin: leave it away"
+
+
+def _mesh(stage: Stage, mesh: EngagementSpec) -> Found:
+    """One engagement and its gears."""
+    a, b = (toothed(stage, name) for name in mesh.gears)
+    field, gears = f"engagements.{mesh.name}", ", ".join(mesh.gears)
+    if not isinstance(a, GearBody):
+        yield f"{field}.gears", gears, "a ring is gear B of its meshes: name it second"
+        return
     if stage.rotor_of(a.name) == stage.rotor_of(b.name):
-        return [Problem(file, f"{field}.gears", ", ".join(mesh.gears), "two gears of one rotor: name gears of two")]
+        yield f"{field}.gears", gears, "two gears of one rotor: name gears of two"
+        return
     differ = [key for key in _SAME_RACK if not math.isclose(getattr(a, key), getattr(b, key), abs_tol=1e-12)]
-    if differ:
+    for key in differ:
         remedy = f"{a.name} and {b.name} differ in it: gears in mesh share the basic rack"
-        return [Problem(file, f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy) for key in differ]
+        yield f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy
     hands, same = ("one hand", 1) if isinstance(b, RingBody) else ("opposite hands", -1)
-    if not math.isclose(a.helix_angle, same * b.helix_angle, abs_tol=1e-12):
+    if not differ and not math.isclose(a.helix_angle, same * b.helix_angle, abs_tol=1e-12):
         what = "a ring and a gear in it have" if isinstance(b, RingBody) else "gears in mesh have"
         remedy = f"{what} {hands}: write {math.degrees(same * a.helix_angle):g} deg, as {a.name} asks"
-        return [Problem(file, f"bodies.{b.name}.helix_angle", f"{math.degrees(b.helix_angle):g} deg", remedy)]
-    places = [stage.place(gear.name, None) for gear in (a, b)]
-    found = []
-    if abs(places[0] - places[1]) > 1e-9:
-        apart = millimetres(abs(places[0] - places[1]))
-        remedy = f"{a.name} and {b.name} lie {apart} apart along the axis: give both one place"
-        found.append(Problem(file, f"{field}.gears", ", ".join(mesh.gears), remedy))
-    pair = PairSpec.model_construct(
-        center_distance=centre_distance(stage, mesh), normal_module=a.normal_module, pressure_angle=a.pressure_angle,
-        backlash=mesh.backlash, helix_angle=a.helix_angle,
-    )  # fmt: skip
-    axis = f"rotors.{stage.rotor_of(b.name)}.axis"
-    names = {"pair.center_distance": axis, "pair.backlash": f"{field}.backlash"}
-    if isinstance(b, RingBody):
-        problems = ring_pair_problems(file, RingPair(pair, a, b, mesh.torque_max))
-    else:
-        problems = geometry_problems(file, pair, (a, b), mesh.torque_max)
-    for problem in problems:
-        name = names.get(problem.field, problem.field.replace("gears.", "bodies.", 1).replace("pair.", f"{field}.", 1))
-        found.append(replace(problem, field=name))
-    return found
-
-
-def with_relief_rolls(stage: Stage) -> Stage:
-    """The same stage with points of single contact turned into rolls, those of a gear's first engagement."""
-    bodies = dict(stage.bodies)
-    for mesh in reversed(stage.engagements):
-        for index, name in enumerate(mesh.gears):
-            bodies[name] = with_rolls(toothed(stage, name), mesh_shape(stage, mesh), index)
-    return stage.model_copy(update={"bodies": bodies})
+        yield f"bodies.{b.name}.helix_angle", f"{math.degrees(b.helix_angle):g} deg", remedy
+    elif not differ:
+        apart = abs(stage.place(a.name, None) - stage.place(b.name, None))
+        if apart > 1e-9:
+            remedy = f"{a.name} and {b.name} lie {millimetres(apart)} apart along the axis: give both one place"
+            yield f"{field}.gears", gears, remedy
+        carried = stage.frame_of(mesh) is not None
+        meshed = Meshed((a, b), centre_distance(stage, mesh), mesh.backlash, mesh.torque_max, carried)
+        names = {"distance": f"rotors.{stage.rotor_of(b.name)}.axis", "backlash": f"{field}.backlash"}
+        for key, value, remedy in mesh_problems(meshed):
+            yield names.get(key, key), shown(value), remedy
 
 
 def _unknown_body(stage: Stage) -> str:
