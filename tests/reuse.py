@@ -7,6 +7,7 @@ result of its own. Kept arrays cannot be written to.
 from __future__ import annotations
 
 import ctypes
+import mmap
 import sys
 import weakref
 from collections import OrderedDict
@@ -22,7 +23,8 @@ import gearfmu.stage.assembly.assemble as assembly
 from gearfmu.kernel import instance
 
 SHIPPED = Path(__file__).resolve().parents[1] / "reduced_models"
-PREPARED = 6e9  # bytes of the largest setups of the kernels that are kept; a tenth of them is used
+PREPARED = 2e9  # bytes of the pages that kept kernels have touched; a planetary set at level fast takes .1e9
+PAGE = mmap.PAGESIZE
 MODELS = 24  # opened models, and assembled ones of the same bodies
 
 
@@ -87,26 +89,39 @@ def _assembled_once(assemble: Callable[..., object]) -> Callable[..., object]:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Memory of a prepared kernel, with its work as prepared, but for the zeros behind `head`."""
+    """Memory of a prepared kernel; `head`: what its work holds then, by address, zero elsewhere; size: of the pages
+    that both have touched, bytes."""
 
     setup: tuple[ctypes.Array, int]
     work: tuple[ctypes.Array, int]
-    head: bytes
+    head: list[tuple[int, bytes]]
     size: int
     warning: str
     model: object  # kept open
 
+    @classmethod
+    def of(cls, kernel: instance.Kernel) -> Prepared:
+        setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
+        head = [(start, ctypes.string_at(start, length)) for start, length in _touched(work[0])]
+        size = sum(length for _, length in _touched(setup[0])) + sum(len(own) for _, own in head)
+        return cls(setup, work, head, size, kernel.warning, kernel._opened)
+
+    def put_back(self) -> None:
+        for start, length in _touched(self.work[0]):
+            ctypes.memset(start, 0, length)
+        for start, own in self.head:
+            ctypes.memmove(start, own, len(own))
+
 
 def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[instance.Kernel], None]:
     """gk_prepare reads the model and its parameters and fills setup and work. A kernel that is prepared as a former
-    one, which is no more, takes over its memory: setup is constant since, the head of work is put back."""
+    one, which is no more, takes over its memory: setup is constant since, work is put back."""
     free: OrderedDict[tuple[object, ...], list[Prepared]] = OrderedDict()
-    value = instance.Kernel.get  # of the product, whatever a test puts in its place
 
     def give_back(key: tuple[object, ...], memory: Prepared) -> None:
         free.setdefault(key, []).append(memory)
         free.move_to_end(key)
-        while sum(len(one.setup[0]) for ones in free.values() for one in ones) > PREPARED:
+        while sum(one.size for ones in free.values() for one in ones) > PREPARED:
             free.popitem(last=False)
 
     @wraps(prepare)
@@ -116,17 +131,13 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
             kernel._setup_keep, kernel._setup = instance.aligned(len(kernel._setup_keep))
             kernel._work_keep, kernel._work = instance.aligned(len(kernel._work_keep))
             return prepare(kernel)
-        key = (id(kernel._opened), *(value(kernel, name) for name in _parameters(kernel)))
+        key = (id(kernel._opened), _parameters(kernel))
         if ones := free.get(key):
             memory = ones.pop()
-            ctypes.memmove(memory.work[1], memory.head, len(memory.head))
-            ctypes.memset(memory.work[1] + len(memory.head), 0, memory.size - len(memory.head))
+            memory.put_back()
         else:
             prepare(kernel)
-            size = len(kernel._work_keep) - (kernel._work - ctypes.addressof(kernel._work_keep))
-            used = _used(kernel._work, size)
-            setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
-            memory = Prepared(setup, work, ctypes.string_at(kernel._work, used), size, kernel.warning, kernel._opened)
+            memory = Prepared.of(kernel)
         (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work) = memory.setup, memory.work
         kernel.warning = memory.warning
         kernel._gives_back = weakref.finalize(kernel, give_back, key, memory)
@@ -135,21 +146,30 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
     return found
 
 
-def _used(start: int, size: int) -> int:
-    """Bytes up to the last one that is not zero, in whole pages."""
-    page = 1 << 16
-    for end in range(-(-size // page) * page, 0, -page):
-        words = (ctypes.c_uint64 * (min(page, size - end + page) // 8)).from_address(start + end - page)
-        if np.frombuffer(words, np.uint64).any():
-            return min(end, size)
-    return 0
+def _parameters(kernel: instance.Kernel) -> bytes:
+    """The values of all its parameters."""
+    references = kernel.references(name for name, own in kernel.variables.items() if own.causality == "parameter")
+    values = (ctypes.c_double * len(references))()
+    kernel.get_many(references, values)
+    return bytes(values)
+
+
+def _touched(memory: ctypes.Array) -> list[tuple[int, int]]:
+    """Address and length of all runs of pages that were read or written; zero elsewhere. Linux tells; all of the memory
+    where the system does not."""
+    first, last = ctypes.addressof(memory) // PAGE, -(-(ctypes.addressof(memory) + len(memory)) // PAGE)
+    assert first * PAGE == ctypes.addressof(memory), "mapped, so of whole pages"
+    try:
+        with open("/proc/self/pagemap", "rb") as pages:
+            pages.seek(8 * first)
+            there = np.frombuffer(pages.read(8 * (last - first)), np.uint64) >> 62  # in memory or swapped out
+    except OSError:
+        return [(ctypes.addressof(memory), len(memory))]
+    edges = np.flatnonzero(np.diff((there > 0).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    return [((first + begin) * PAGE, (end - begin) * PAGE) for begin, end in edges.tolist()]
 
 
 def keep(kernel: instance.Kernel) -> None:
     """For a test that writes to a setup: nobody takes this one over."""
     if gives_back := kernel.__dict__.pop("_gives_back", None):
         gives_back.detach()
-
-
-def _parameters(kernel: instance.Kernel) -> list[str]:
-    return [name for name, variable in kernel.variables.items() if variable.causality == "parameter"]

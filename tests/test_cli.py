@@ -121,15 +121,15 @@ def test_a_bad_stage_file_lists_every_problem(tmp_path: Path) -> None:
     assert code == 1 and "torque_max" in err and "centre_distance" in err and "unit is missing" in err
 
 
-def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path) -> None:
-    assert process("new", "my_pair", cwd=tmp_path).returncode == 0
+def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call("new", "my_pair")[0] == 0
     before = (tmp_path / "my_pair" / "stage.toml").read_bytes()
-    again = process("new", "my_pair", cwd=tmp_path)
-    assert again.returncode == 1 and "exists" in again.stderr
+    code, _, err = call("new", "my_pair")
+    assert code == 1 and "exists" in err
     assert (tmp_path / "my_pair" / "stage.toml").read_bytes() == before
     assert b"made like fzg_c; describe it here" in before and b"FZG type C" not in before, "a description of its own"
-    shown = process("inspect", "my_pair", "--json", cwd=tmp_path)
-    assert json.loads(shown.stdout)["derived"]["contact_ratio"] > 1
+    assert json.loads(call("inspect", "my_pair", "--json")[1])["derived"]["contact_ratio"] > 1
 
 
 @pytest.mark.parametrize("verb", ["simulate", "te", "modes", "frf", "import", "run"])
@@ -286,7 +286,7 @@ def test_reduce_tells_degrees_of_freedom_time_and_memory(tmp_path: Path) -> None
     code, out, _ = call("reduce", "fzg_c")
     assert code == 0
     for gear in ("pinion", "wheel"):
-        made = json.loads(process("inspect", ROOT / "reduced_models" / "fzg_c" / f"{gear}.h5", "--json").stdout)
+        made = json.loads(call("inspect", ROOT / "reduced_models" / "fzg_c" / f"{gear}.h5", "--json")[1])
         size, cost = made["mesh"], made["provenance"]
         assert f"{size['dof_body']} DOF, {made['facts']['teeth']} sectors of {size['dof_sector']}" in out
         assert f"{cost['cpu_s']:g} s CPU time and {cost['peak_memory_GB']:g} GB" in out

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -206,13 +207,20 @@ Element = Callable[[Section, Steel, _Products], tuple[np.ndarray, np.ndarray]]
 
 
 def _products(length: float) -> _Products:
-    points, weights = np.polynomial.legendre.leggauss(ORDER + 1)
-    basis = np.linalg.inv(np.vander(element_nodes(), increasing=True))  # coefficients of the Lagrange polynomials
-    values = np.vander(points, ORDER + 1, increasing=True) @ basis
-    powers = np.arange(1, ORDER + 1) * np.vander(points, ORDER, increasing=True)
-    slopes = powers @ basis[1:] * 2 / length
+    values, slopes, weights = _shape_functions()
+    slopes = slopes * 2 / length
     weights = weights[:, None] * length / 2
     return _Products(values.T @ (weights * values), slopes.T @ (weights * slopes), slopes.T @ (weights * values))
+
+
+@cache
+def _shape_functions() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values and slopes (ORDER + 1, ORDER + 1) of the Lagrange polynomials at the Gauss points of −1 … 1, and the
+    weights of these."""
+    points, weights = np.polynomial.legendre.leggauss(ORDER + 1)
+    basis = np.linalg.inv(np.vander(element_nodes(), increasing=True))
+    powers = np.arange(1, ORDER + 1) * np.vander(points, ORDER, increasing=True)
+    return np.vander(points, ORDER + 1, increasing=True) @ basis, powers @ basis[1:], weights
 
 
 def element_nodes() -> np.ndarray:

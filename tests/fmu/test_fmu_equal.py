@@ -112,7 +112,7 @@ def test_two_runtimes_agree_under_fmpys_own_master(native, python):
     assert runs[0].dtype == runs[1].dtype and runs[0].tobytes() == runs[1].tobytes()
 
 
-@pytest.mark.parametrize("mode", ["RTLD_LOCAL", "RTLD_GLOBAL"])
+@pytest.mark.parametrize("mode", [pytest.param("RTLD_LOCAL", marks=pytest.mark.full), "RTLD_GLOBAL"])
 def test_two_stages_in_one_process(unpacked, unpacked_other, mode):
     """Also with all symbols global (RTLD_GLOBAL): the second FMU must not run the first one's kernel."""
     alone = []

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from decks import STEEL
+from verbs import call
 
 from gearfmu.body import load_body
 from gearfmu.fem import solids
@@ -35,30 +36,15 @@ def test_the_deck_of_the_page_is_the_one_that_mesh_writes(tmp_path: Path) -> Non
     command = re.search(r"`gearfmu (mesh fzg_c .*?)`", (ROOT / "docs" / "howto-import.md").read_text(encoding="utf-8"))[
         1
     ]
-    run = [sys.executable, "-m", "gearfmu.cli", *command.split(), "--out", str(tmp_path)]
-    subprocess.run(run, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert call(*command.split(), "--out", tmp_path)[0] == 0
     assert (tmp_path / "pinion.inp").read_text(encoding="utf-8") == DECK.read_text(encoding="utf-8")
 
 
-def test_import_prints_the_section(tmp_path: Path) -> None:
-    run = [
-        sys.executable,
-        "-m",
-        "gearfmu.cli",
-        "import",
-        str(DECK),
-        "fzg_c",
-        "pinion",
-        "--length",
-        "1 mm",
-        "--bore",
-        "BORE",
-    ]
-    done = subprocess.run(
-        run, check=True, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}
-    )
-    assert '[gears.pinion.import]\nfile = "pinion.inp"\nlength = "1 mm"\nbore = "BORE"' in done.stdout
-    assert re.search(r"base_radius_m +0\.0338289", done.stdout) and re.search(r"method +cyclic", done.stdout)
+def test_import_prints_the_section(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = call("import", DECK, "fzg_c", "pinion", "--length", "1 mm", "--bore", "BORE")
+    assert code == 0 and '[gears.pinion.import]\nfile = "pinion.inp"\nlength = "1 mm"\nbore = "BORE"' in out
+    assert re.search(r"base_radius_m +0\.0338289", out) and re.search(r"method +cyclic", out)
     assert not list(tmp_path.iterdir())
 
 

@@ -14,7 +14,7 @@ LONG = (  # more than ten seconds
     "pair_ten_million_steps", "train_closing_clutch", "train_reversal", "train_torque_step", "pair_for_long_rubbing",
     "pair_standstill_rubbing", "pair_run_up_and_down", "pair_standstill",
 )  # fmt: skip
-OF_SETS = ("set_jammed", "set_floating_sun", "set_planet_without_contact")
+OF_SETS = ("set_floating_sun", "set_planet_without_contact")
 SHORT = [name for name in SCENES if name in OF_SETS or not (name.startswith("set_") or name in LONG)]
 
 

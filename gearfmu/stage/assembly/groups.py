@@ -382,8 +382,8 @@ def _turn_cluster(vectors: np.ndarray) -> np.ndarray:
     while left.shape[1]:
         size = np.linalg.norm(left, axis=1)
         lead = int(np.flatnonzero(size > 0.5 * size.max())[0])
-        turn = sl.qr(left[lead][:, None])[0]
-        left = left @ turn
+        if left.shape[1] > 1:
+            left = left @ sl.qr(left[lead][:, None])[0]
         result.append(left[:, 0] * np.sign(left[lead, 0]))
         left = left[:, 1:]
     return np.stack(result, axis=1)

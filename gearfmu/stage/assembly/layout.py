@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -26,6 +27,8 @@ SAME_PLACE = 1e-9  # m
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
+_KEPT = 4  # ways to read a body that are remembered
+_READ: WeakKeyDictionary[Body, dict[Hashable, GroundPart]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -98,11 +101,10 @@ def stage_layout(
     the even grid of ROLLS where None; tangents: (d, d) stiffness of rolling bearings by the names of their supports."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     points = even_grids(stage, bodies, ROLLS) if points is None else points
-    free: list[GroundPart] = []
-    for i, gear in enumerate(stage.gears):
-        same = next((k for k in range(i) if bodies[k] is bodies[i] and np.array_equal(points[k], points[i])), None)
-        free.append(_gear(stage, bodies[i], degrees, points[i]) if same is None else free[same])
-        free[i] = replace(free[i], name=gear.name)  # a body's file may come from another stage
+    free = [
+        replace(_gear(stage, body, degrees, own), name=gear.name)  # a body's file may come from another stage
+        for gear, body, own in zip(stage.gears, bodies, points, strict=True)
+    ]
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
     free += [replace(ground_part(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
@@ -140,8 +142,15 @@ def even_grids(stage: Stage, bodies: Sequence[Body], rolls: int) -> list[np.ndar
 
 
 def _gear(stage: Stage, body: Body, degrees: np.ndarray, weights: np.ndarray) -> GroundPart:
+    """Remembered: only its body, the form of its flank and the levels decide it."""
     chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
-    return ground_part(body, Reading(chosen, degrees, weights, stage.levels))
+    key = (chosen.tobytes(), degrees.tobytes(), weights.tobytes(), stage.levels)
+    known = _READ.setdefault(body, {})
+    if key not in known:
+        while len(known) >= _KEPT:
+            known.pop(next(iter(known)))
+        known[key] = ground_part(body, Reading(chosen, degrees, weights, stage.levels))
+    return known[key]
 
 
 def _all_modes(body: Body, degrees: np.ndarray) -> np.ndarray:
