@@ -13,6 +13,7 @@ import pytest
 import reuse
 from builds import double_library as double_build
 from builds import inner_library as inner_build
+from hypothesis import settings
 
 REMEDY = {
     "chromium": "apt-get install chromium",
@@ -34,6 +35,8 @@ PARTS = {  # of the full tests: 1 has every scene of the hard cases, what nobody
 BUDGET = 20.0  # core-minutes of the tests that are not full; the aim is 12
 SPENT = pytest.StashKey[list[float]]()
 
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 reuse.share()  # before the modules of tests import what is replaced
 
 

@@ -35,7 +35,7 @@ def test_solution_is_that_of_a_general_solver(kind):
     )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(cells=st.tuples(*[st.integers(1, 5)] * 3))
 def test_every_node_is_eliminated_once_and_separators_separate(cells):
     nodes, elements = box(cells, (1.0, 1.3, 1.7))

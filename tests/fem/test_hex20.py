@@ -36,7 +36,7 @@ def test_shape_functions_interpolate_and_their_gradients_are_derivatives(module,
         assert np.allclose(module.shape_gradient(xi)[:, axis], slope, atol=1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000))
 def test_patch_linear_fields_are_exact_on_distorted_elements(seed):
     nodes, elements, outside = distorted_box(0.15, seed)

@@ -98,14 +98,14 @@ def valid_mesh_or_a_reason(scale: float, numbers: dict) -> None:
         check_meshes(pair, gears, scale)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.fixed_dictionaries(PAIRS))
 def test_valid_mesh_or_a_reason(numbers: dict) -> None:
     valid_mesh_or_a_reason(0.3, numbers)
 
 
 @pytest.mark.full
-@settings(max_examples=3000, deadline=None)
+@settings(max_examples=3000)
 @given(st.fixed_dictionaries(PAIRS), st.sampled_from([0.2, 0.5, 1.0]))
 def test_valid_mesh_or_a_reason_at_length(numbers: dict, scale: float) -> None:
     valid_mesh_or_a_reason(scale, numbers)
@@ -120,7 +120,7 @@ HELICAL = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.fixed_dictionaries(HELICAL))
 def test_helical_sectors_of_any_angle_are_sound(numbers: dict) -> None:
     """Up to 35° and face widths of 15 modules: positive Jacobians, the volume of the section times the width, cuts one

@@ -154,7 +154,7 @@ def test_bolts_without_room_are_refused():
         carrier_sector(crowded, CarrierMeshSpec(scale=0.5))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(
     z=st.integers(36, 160), x=st.floats(-0.3, 0.5), tip=st.floats(0.5, 0.9), fillet=st.floats(0.1, 0.3),
     rim=st.floats(1.1, 6), scale=st.sampled_from([0.5, 1.0]),

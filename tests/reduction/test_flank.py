@@ -23,7 +23,7 @@ def rows(side: int, rolls, functions: int = 5, half_width: float = 3e-4) -> np.n
     return flank_loads(MESH.nodes, MESH.flank[side].quads, flank(half_width), side, points)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(share=st.floats(0, 1), side=st.integers(0, 1), half_width=st.floats(1e-4, 2e-3))
 def test_a_unit_load_is_one_newton_on_the_line_of_action(share, side, half_width):
     roll = GEAR.s_form + share * (GEAR.s_tip - GEAR.s_form)

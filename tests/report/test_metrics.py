@@ -16,7 +16,7 @@ def sine(frequency: float, peak: float, n: int = 4000, phase: float = 0.0) -> np
     return peak * np.sin(2 * np.pi * frequency * np.arange(n) * STEP + phase)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(line=st.integers(3, 1900), peak=st.floats(1e-6, 1e6), phase=st.floats(0, 6.2), offset=st.floats(-1e3, 1e3))
 def test_sine_on_a_line_has_its_exact_rms(line: int, peak: float, phase: float, offset: float) -> None:
     spectrum = metrics.amplitude_spectrum(sine(line * 2.5, peak, phase=phase) + offset, STEP)
@@ -29,7 +29,7 @@ def test_sine_of_one_newton_is_minus_3_dB() -> None:
     assert metrics.level(spectrum.amplitude).max() == pytest.approx(-3.0103, abs=1e-4)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(frequency=st.floats(50, 4900))
 def test_sine_between_lines_loses_at_most_the_hann_scallop(frequency: float) -> None:
     """Scalloping loss of Hann is 1.42 dB at half a line; the band level loses nothing."""

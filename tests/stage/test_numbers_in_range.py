@@ -150,7 +150,7 @@ def test_the_limits_themselves_are_taken_and_nothing_beyond(number: Number) -> N
         assert any("out of range" in p.remedy for p in number.problems(limit + outwards * off))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(st.sampled_from(NUMBERS), st.booleans(), st.floats(1e-6, 1e6))
 def test_a_number_beyond_its_range_is_refused_by_name(number: Number, above: bool, factor: float) -> None:
     own = number.range

@@ -32,7 +32,7 @@ def example(n: int = 50) -> Trace:
     return Trace(t, channels, {"scene": "x", "n_dyn": np.int64(28), "h": 1e-5, "hashes": {"wheel": "ab"}})
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     values=hnp.arrays(np.float64, 7, elements=FINITE),
     unit=st.text(min_size=0, max_size=5).filter(lambda s: "\0" not in s),

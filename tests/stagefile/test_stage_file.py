@@ -380,7 +380,7 @@ FIELDS = [
 ]  # fmt: skip
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.dictionaries(st.sampled_from(FIELDS), leaves, min_size=1, max_size=3))
 def test_whatever_stands_in_the_file_it_loads_or_lists_problems(write: Write, changes: dict[str, Any]) -> None:
     try:
