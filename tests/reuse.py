@@ -24,6 +24,8 @@ from gearfmu.kernel import instance
 
 SHIPPED = Path(__file__).resolve().parents[1] / "reduced_models"
 PREPARED = 2e9  # bytes of the pages that kept kernels have touched; a planetary set at level fast takes .1e9
+MAPPED = 10e9  # bytes of kept memory, touched or not: a fork has to find room for all of it
+LIMITS = (("size", PREPARED), ("mapped", MAPPED))
 PAGE = mmap.PAGESIZE
 MODELS = 24  # opened models, and assembled ones of the same bodies
 
@@ -90,12 +92,13 @@ def _assembled_once(assemble: Callable[..., object]) -> Callable[..., object]:
 @dataclass(frozen=True)
 class Prepared:
     """Memory of a prepared kernel; `head`: what its work holds then, by address, zero elsewhere; size: of the pages
-    that both have touched, bytes."""
+    that both have touched, bytes; mapped: of all of it."""
 
     setup: tuple[ctypes.Array, int]
     work: tuple[ctypes.Array, int]
     head: list[tuple[int, bytes]]
     size: int
+    mapped: int
     warning: str
     model: object  # kept open
 
@@ -104,7 +107,7 @@ class Prepared:
         setup, work = (kernel._setup_keep, kernel._setup), (kernel._work_keep, kernel._work)
         head = [(start, ctypes.string_at(start, length)) for start, length in _touched(work[0])]
         size = sum(length for _, length in _touched(setup[0])) + sum(len(own) for _, own in head)
-        return cls(setup, work, head, size, kernel.warning, kernel._opened)
+        return cls(setup, work, head, size, len(setup[0]) + len(work[0]), kernel.warning, kernel._opened)
 
     def put_back(self) -> None:
         for start, length in _touched(self.work[0]):
@@ -121,7 +124,7 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
     def give_back(key: tuple[object, ...], memory: Prepared) -> None:
         free.setdefault(key, []).append(memory)
         free.move_to_end(key)
-        while sum(one.size for ones in free.values() for one in ones) > PREPARED:
+        while any(sum(getattr(one, what) for ones in free.values() for one in ones) > most for what, most in LIMITS):
             free.popitem(last=False)
 
     @wraps(prepare)
@@ -157,16 +160,16 @@ def _parameters(kernel: instance.Kernel) -> bytes:
 def _touched(memory: ctypes.Array) -> list[tuple[int, int]]:
     """Address and length of all runs of pages that were read or written; zero elsewhere. Linux tells; all of the memory
     where the system does not."""
-    first, last = ctypes.addressof(memory) // PAGE, -(-(ctypes.addressof(memory) + len(memory)) // PAGE)
-    assert first * PAGE == ctypes.addressof(memory), "mapped, so of whole pages"
+    start, end = ctypes.addressof(memory), ctypes.addressof(memory) + len(memory)
+    first, last = start // PAGE, -(-end // PAGE)
     try:
         with open("/proc/self/pagemap", "rb") as pages:
             pages.seek(8 * first)
             there = np.frombuffer(pages.read(8 * (last - first)), np.uint64) >> 62  # in memory or swapped out
     except OSError:
-        return [(ctypes.addressof(memory), len(memory))]
-    edges = np.flatnonzero(np.diff((there > 0).astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    return [((first + begin) * PAGE, (end - begin) * PAGE) for begin, end in edges.tolist()]
+        return [(start, len(memory))]
+    edges = PAGE * (first + np.flatnonzero(np.diff((there > 0).astype(np.int8), prepend=0, append=0)).reshape(-1, 2))
+    return [(begin, past - begin) for begin, past in np.clip(edges, start, end).tolist()]
 
 
 def keep(kernel: instance.Kernel) -> None:

@@ -30,7 +30,7 @@ def made(**changes: object) -> StageModel:
     return assemble(rewritten(spec, **changes), load_bodies(spec))
 
 
-@pytest.mark.parametrize("stage", ["fzg_c", "helical_demo"])
+@pytest.mark.parametrize("stage", ["fzg_c", pytest.param("helical_demo", marks=pytest.mark.full)])
 def test_other_rounding_leaves_the_guid(stage: str) -> None:
     """Two sets of routines of one linear algebra stand for two versions of numpy: the numbers differ, the GUID does
     not. Where a processor knows one of them only, the hashes agree as well and the test says nothing."""

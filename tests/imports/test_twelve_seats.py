@@ -19,6 +19,8 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
+pytestmark = pytest.mark.full  # six seats stand in tests/stage/test_housing.py
+
 LEVELS = (12, 40, 80, 110)  # mm; a seat is where a bore meets one
 SEATS = {f"{bore}{k}": (bore, z) for bore in BORES for k, z in enumerate(LEVELS)}
 HOUSING = """[bodies.housing]
@@ -88,7 +90,7 @@ def in_order(body: Body, seats: list[str]) -> Body:
     return replace(body, nodes=nodes, rows=body.rows[rows], static=body.static[np.ix_(rows, rows)], sensors=felt)
 
 
-@pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.full)], ids=["drawn", "reduced"])
+@pytest.fixture(scope="module", params=[False, True], ids=["drawn", "reduced"])
 def runs(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[Trace]:
     """Of 0.4 ms, in the order of the table and in the other: of a housing with drawn modes, and of one reduced anew."""
     found = []

@@ -347,7 +347,7 @@ def test_shares_are_what_stiffer_springs_raise(fzg: Stage, group: int) -> None:
     assert raised == pytest.approx(shares, rel=2e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ["fzg_c", "two_stage"])
+@pytest.mark.parametrize("name", ["fzg_c", pytest.param("two_stage", marks=pytest.mark.full)])
 def test_shares_add_up_and_frequencies_ascend(stages: dict[str, Stage], name: str) -> None:
     stage = stages[name]
     found = stage_modes(stage.model, stage.bodies, largest_torque(stage.model), 20, positions=3)

@@ -17,7 +17,8 @@ SLICES = 5
 ROUNDING = 1e-14  # m; levers are some 1e-2 m
 
 
-@pytest.mark.parametrize("name", KINDS)
+# of the sets the helical one is quick
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.full) if n == "set" else n for n in KINDS])
 def test_sliding_by_tilt_is_that_of_a_rigid_body(inner_library: Path, name: str) -> None:
     stage = KINDS[name].stage
     inner = Inner(inner_library, KINDS[name].model().blob, {"slices": SLICES, "effect.friction": 1.0})
