@@ -79,7 +79,12 @@ static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work
         gk_film_begin_rates(setup, work, e, rate);
     }
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, &work->room.explicit_rows, i, 0, 0, GK_FIRST_RATE, 0, 0, 0};
+        gk_coupled coupled = {.model = model,
+                              .setup = setup,
+                              .work = work,
+                              .k = &work->room.explicit_rows,
+                              .island = i,
+                              .rate = GK_FIRST_RATE};
         const gk_island island = gk_couple_island(&coupled);
         gk_balance_plain(&island);
     }

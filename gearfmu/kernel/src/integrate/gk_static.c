@@ -44,7 +44,13 @@ static int press(gk_equilibrium *r)
             if (!gk_engage(r->model, &r->setup, work, r->data, &how, e)) return 0;
             gk_memory_recall(r->model, &r->setup, work, r->data, e);
         }
-    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0, 0, 0, 0};
+    gk_coupled coupled = {.model = r->model,
+                          .setup = &r->setup,
+                          .work = work,
+                          .k = &r->k,
+                          .island = r->island,
+                          .sweeps = STATIC_SWEEPS,
+                          .rate = 1.0};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
     return 1;

@@ -105,7 +105,7 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
                             const gk_coefficients *k)
 {
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, k, i, 0, 0, GK_FIRST_RATE, 0, 0, 0};
+        gk_coupled coupled = {.model = model, .setup = setup, .work = work, .k = k, .island = i, .rate = GK_FIRST_RATE};
         const gk_island island = gk_couple_island(&coupled);
         if (island.count > 1) gk_couple_recall(&coupled);
         gk_balance_solve(&island);

@@ -46,9 +46,9 @@ static int takes_part(const gk_system *s, int i)
  * add up */
 static balance defect(const gk_system *s)
 {
-    const gk_account *was = &s->energy;
-    const double owed = was->correction + was->rubbing + was->shift0 - was->shift;
-    balance b = {owed - was->stored0, 0.0, 0.0, fabs(was->stored0), 0.0};
+    const gk_account *account = &s->energy;
+    const double owed = account->correction + account->rubbing + account->shift0 - account->shift;
+    balance b = {owed - account->stored0, 0.0, 0.0, fabs(account->stored0), 0.0};
     if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
@@ -339,7 +339,7 @@ void gk_balance_solve(const gk_island *island)
     for (int attempt = 0; attempt < 4; attempt++) {
         gk_balance_plain(island);
         const int changed = any_changed(island);
-        if (changed) aim(island, attempt == 0);
+        if (changed || attempt) aim(island, attempt == 0);
         if (!changed && !curved) return;
         const balance b = defect_of_all(island);
         if (!open_balance(&b, changed ? changing : steady)) {
