@@ -17,7 +17,7 @@ static const double NEAR = 50e-6;                         /* m: flanks that coun
 
 /* ---- an engagement ----------------------------------------------------------------------------------------------- */
 /* X = S (1 + Γ S)⁻¹ of a block (n, n), by Gauss elimination of (1 + S Γ) X = S */
-static void yielding(const double *S, const double *damping, int n, double *X)
+static void what_yields(const double *S, const double *damping, int n, double *X)
 {
     double B[MAX_SLICES * MAX_SLICES];
     for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * AT_NYQUIST * damping[i % n] + (i / n == i % n);
@@ -48,7 +48,7 @@ void gk_closed_compliance(const gk_system *s, const double *Q, double full, int 
         for (int a = 0; a < strips; a++)
             S[a * strips + a] += gk_law_slope(s, first + a, full * s->flank.width[first + a]);
         if (dashpots)
-            yielding(S, s->dashpot.coefficient + first, strips, X);
+            what_yields(S, s->dashpot.coefficient + first, strips, X);
         else
             memcpy(X, S, (size_t)(strips * strips) * sizeof *X);
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
@@ -249,22 +249,24 @@ static int form_block(const island *of, const gk_coefficients *k, int e, motion 
     return 1;
 }
 
-/* M (rows, rows) += factor times what a force of a row does at once to the rows of other engagements */
-static void add_coupling(const island *of, const gk_coefficients *k, double factor, double *M)
+/* M (rows, rows) ← μC − K between engagements: what a force of a row does at once to the rows of those before its own,
+ * and μ − 1 times what of that no oscillator does */
+static void fill_coupling(const island *of, const gk_coefficients *k, double mu, double *M)
 {
     const gk_coupled coupled = {.model = of->model, .setup = of->setup, .work = of->work, .k = k, .island = of->number};
     gk_far_list(&coupled);
+    memset(M, 0, (size_t)of->rows * (size_t)of->rows * sizeof *M);
     for (int from = 0; from < of->model->engagements; from++)
-        for (int i = 0; within(of, from) && i < of->work->engaged[from].system.n; i++) {
+        for (int i = 0; within(of, from) && from > of->first && i < of->work->engaged[from].system.n; i++) {
             if (!gk_row_is_stiff(&of->work->engaged[from].system, i)) continue;
             gk_pass_unit(&coupled, from, i);
             for (int to = 0; to < from; to++) {
                 const gk_system *s = &of->work->engaged[to].system;
                 if (!within(of, to)) continue;
-                const double *read = of->work->engaged[to].moved[YIELDED];
+                const double *read = of->work->engaged[to].moved[YIELDED], *fixed = of->work->engaged[to].moved[WHOLE];
+                double *row = M + (size_t)(of->at[from] + i) * (size_t)of->rows + of->at[to];
                 for (int j = 0; j < s->n; j++)
-                    if (gk_row_is_stiff(s, j))
-                        M[(size_t)(of->at[from] + i) * of->rows + of->at[to] + j] += factor * read[j];
+                    if (gk_row_is_stiff(s, j)) row[j] = read[j] + (mu - 1.0) * fixed[j];
             }
         }
 }
@@ -291,11 +293,7 @@ static int holds_at(island *of, const gk_coefficients *k, double mu)
     if (!form_island(of, k)) return 0;
     const size_t size = (size_t)of->rows * (size_t)of->rows;
     double *const coupling = of->work->island, *const L = coupling + size;
-    memset(coupling, 0, size * sizeof *coupling);
-    if (of->rows > of->work->engaged[of->first].system.n) {
-        add_coupling(of, k, 1.0, coupling);
-        add_coupling(of, &of->work->room.explicit_rows, mu - 1.0, coupling);
-    }
+    fill_coupling(of, k, mu, coupling);
     for (motion slides = rubs ? FORWARDS : FRICTIONLESS; slides <= (rubs ? STICKING : FRICTIONLESS); slides++) {
         memcpy(L, coupling, size * sizeof *L);
         if (!positive(of, k, mu, slides, L)) return 0;

@@ -16,7 +16,7 @@ static const double WARNED = 0.7; /* γ */
 static int holds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
                  double gamma)
 {
-    return gk_closed_holds(model, setup, work, data, gk_flow_for(model, setup, &work->room, h, gamma), MU_MOST);
+    return setup->holds(model, setup, work, data, gk_flow_for(model, setup, &work->room, h, gamma), MU_MOST);
 }
 
 /* γ for which μ′ stays at its bound */
@@ -55,7 +55,7 @@ void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, c
 {
     GK_ASSERT(h > 0.0);
     if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == h) return;
-    if (h != setup->h) gk_closed_keep(model, setup, work, data);
+    if (h != setup->h) setup->keep(model, setup, work, data);
     work->run_gamma = h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, data, h);
     work->run_h = h;
 }
@@ -99,7 +99,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
     const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work, data)
                                                        : INFINITY; /* explicit: a limit of stability */
     double limit = gk_min(gk_longest_step(model), WITHIN * stable), h = wished;
-    if (corrected) gk_closed_keep(model, setup, work, data);
+    if (corrected) setup->keep(model, setup, work, data);
     if (!(wished > 0.0)) h = default_step(model, setup, work, data, limit, corrected);
     if (h > period / 8.0) {
         snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h,

@@ -20,7 +20,7 @@ static const double FRICTION_TOLERANCE = 1e-7; /* of the largest normal force */
 #endif
 static const double SOON = 1e-4; /* from here on the next pass may be the last, and reads what stores energy */
 static const double BENT = 0.01, ROUGHLY = 1e-5; /* of what others do anew, of all: what a local law may bend yet */
-static const double NEGLIGIBLE = 1e-12;          /* m, rad: of a gap and deflection that are none */
+static const double NEGLIGIBLE = 1e-9; /* m, rad: of a gap and deflection of which a pass reads nothing but rounding */
 
 /* Takes what a pass has read, less what the engagement's own matrices say. Returns how much that has changed, against
  * the largest gap and deflection: of contacts where there are any, else of joints. A joint's gap may be the angle of a

@@ -28,6 +28,17 @@ void gk_far_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
+/* no loads: nothing has moved */
+void gk_far_rest(const gk_setup *setup, gk_engaged *engaged)
+{
+    for (int w = 0; w < 2; w++)
+        for (int p = 0; p < engaged->places && setup->far_on[setup->mesh[engaged->index].side[w].gear]; p++) {
+            gk_far_tooth *tooth = &engaged->far_tooth[w][p];
+            tooth->loaded = 0;
+            ((gk_half *)tooth->moved)[0] = ((gk_half *)tooth->moved)[1] = (gk_half){0};
+        }
+}
+
 /* forces of contacts as loads on the patterns of their teeth */
 void gk_far_push(const gk_setup *setup, gk_engaged *engaged, const double *force)
 {

@@ -3,10 +3,10 @@
  * (gk_couple.c). Forces come as those of the step, z; λ + f_d, under which what is quasi-static in it yields; λ alone,
  * whose deflection stores energy. */
 #include "problem/gk_pass.h"
-#include "force/gk_turn.h"
 #include "problem/gk_exchange.h"
 #include "problem/gk_far.h"
 #include "problem/gk_felt.h"
+#include "problem/gk_pass_read.h"
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
 /* a clutch knows no A; friction counts with all that forces do */
@@ -36,12 +36,13 @@ void gk_pass_forces(const gk_coupled *c, gk_moment when)
 }
 
 /* ---- pushing ----------------------------------------------------------------------------------------------------- */
-/* where forces on a side's part of the ground group are summed, and what moves is read: patterns or oscillators */
-static gk_real *ground_of(const gk_coupled *c, const gk_engaged *engaged, int w, gk_real *const *oscillators,
-                          gk_real (*patterns)[MAX_GEARS][MOST_PATTERNS], int t)
+/* where forces on a side's part of the ground group are summed: patterns or oscillators */
+static gk_real *pushed_of(const gk_coupled *c, const gk_engaged *engaged, int w, int t)
 {
     const gk_mesh *mesh = &c->setup->mesh[engaged->index];
-    return engaged->by_patterns[w] ? patterns[t][mesh->side[w].gear] : oscillators[t] + mesh->part[w].from;
+    gk_work *work = c->work;
+    return engaged->by_patterns[w] ? work->push_pattern[t][mesh->side[w].gear]
+                                   : work->push_ground[t] + mesh->part[w].from;
 }
 
 static void clear_halves(gk_real *x, int n)
@@ -192,7 +193,7 @@ static void push_rows(const gk_coupled *c, const gk_engaged *engaged, const acti
         const int halves = gk_halves(engaged->wide[w]);
         sum_all(ground, (gk_span){at, halves}, out, parts);
         for (int t = parts == 2 ? AT_ONCE : STEP; t <= (parts & 2 ? AT_ONCE : ONCE); t++) {
-            gk_half *to = (gk_half *)ground_of(c, engaged, w, work->push_ground, work->push_pattern, t);
+            gk_half *to = (gk_half *)pushed_of(c, engaged, w, t);
             for (int k = 0; k < halves; k++) to[k] += by[t][k];
         }
     }
@@ -254,137 +255,40 @@ static void move_ground(const gk_coupled *c, gk_span span)
 #undef FOUR
 }
 
-/* ---- reading ----------------------------------------------------------------------------------------------------- */
-typedef struct seen { /* displacements, and rows on them, `width` halves each */
-    const gk_half *row, *y;
-    int width, halves;
-} seen;
-
-/* `each` rows side by side, whose sums do not wait for each other */
-GK_INLINE void read_some(const seen *parts, int count, int i, double *read, const int each)
-{
-    gk_half sum[5];
-    for (int l = 0; l < each; l++) sum[l] = (gk_half){0};
-    for (int p = 0; p < count; p++) {
-        const int width = parts[p].width;
-        const gk_half *rows = parts[p].row + i * width, *y = parts[p].y;
-        int k = 0;
-        for (; k + 2 <= parts[p].halves; k += 2)
-            for (int l = 0; l < each; l++)
-                sum[l] = (sum[l] + rows[l * width + k] * y[k]) + rows[l * width + k + 1] * y[k + 1];
-        for (int l = 0; l < each && k < parts[p].halves; l++) sum[l] += rows[l * width + k] * y[k];
-    }
-    for (int l = 0; l < each; l++) read[i + l] += gk_across(&sum[l]);
-}
-
-static void read_parts(const seen *parts, int count, int i, int end, double *read)
-{
-    for (; i + 5 <= end; i += 5) read_some(parts, count, i, read, 5);
-    for (; i + 3 <= end; i += 3) read_some(parts, count, i, read, 3);
-    for (; i < end; i++) read_some(parts, count, i, read, 1);
-}
-
-/* adds what rows read of ground group and modes: those of the gaps, joints included, or of the sliding */
-static void read_group(const gk_coupled *c, const gk_engaged *engaged, int t, int along, double *read)
-{
-    gk_work *work = c->work;
-    gk_real *const *basis = along ? engaged->glide->basis : engaged->basis,
-                   *turned[2] = {work->turned, work->turned_next};
-    const gk_system *s = &engaged->system;
-    seen parts[6];
-    int count = 0, at = 0;
-    for (int w = 0; w < 2; w++) {
-        const int g = c->setup->mesh[engaged->index].side[w].gear, width = 2 * GK_LANES(c->setup, g) / LANES;
-        const int yields = gk_halves(c->k->flow[g].softest);
-        const gk_half *row = (const gk_half *)basis[w], *y = (const gk_half *)turned[w];
-        if (!width || c->k->timeless || (t == YIELDED && !yields)) continue;
-        gk_turn_back(&c->setup->modal[g], engaged->position[w].tooth, work->move_modes[t][g], turned[w]);
-        if (t == WHOLE) {
-            parts[count++] = (seen){row, y, width, width};
-            continue;
-        }
-        parts[count++] = (seen){row, y, width, yields};
-        parts[count++] = (seen){row + width / 2, y + width / 2, width, yields};
-    }
-    const int modes = count;
-    for (int w = 0; w < 2; at += gk_halves(engaged->wide[w++])) {
-        const gk_half *y = (const gk_half *)ground_of(c, engaged, w, work->move_ground, work->move_pattern, t);
-        const gk_half *row = (const gk_half *)(along ? engaged->glide->near : engaged->near) + at;
-        parts[count++] = (seen){row, y, engaged->halves, gk_halves(engaged->wide[w])};
-    }
-    read_parts(parts, count, 0, s->contacts, read);
-    if (!along) read_parts(parts + modes, count - modes, s->contacts, s->n, read);
-}
-
-static void read_bores(const gk_coupled *c, const gk_engaged *engaged, int t, double *read)
-{
-    gk_bores others;
-    for (int p = 0; p < c->model->ports; p++) {
-        others.moment[p] = c->work->push_bores[t].moment[p] - engaged->own_bores[t].moment[p];
-        others.turned[p] = c->work->push_bores[t].turned[p] - engaged->own_bores[t].turned[p];
-    }
-    gk_exchange_read_bores(c->setup, engaged, &others, read);
-}
-
-/* what rows of an engagement read: WHOLE or YIELDED; far: of far teeth */
-static void read_rows(const gk_coupled *c, int e, int t, const double *far)
-{
-    gk_engaged *engaged = &c->work->engaged[e];
-    const gk_mesh *mesh = &c->setup->mesh[e];
-    const gk_system *s = &engaged->system;
-    double *read = engaged->moved[t];
-    gk_solve_times(s, engaged->rest, engaged->forces.of[t == WHOLE ? ONCE : AT_ONCE], read);
-    read_group(c, engaged, t, 0, read);
-    for (int l = 0; l < mesh->spins; l++) {
-        gk_axpy(c->work->move_spin[t][mesh->spin[l]], s->rigid[l], read, 0, s->stride / 4);
-        for (int i = s->n - s->joint.clutches; i < s->n && t == WHOLE; i++)
-            read[i] += c->work->yield_spin[mesh->spin[l]] * s->rigid[l][i];
-    }
-    read_bores(c, engaged, t, read);
-    gk_axpy(1.0, far, read, 0, s->stride / 4);
-}
-
-/* what the sliding of contacts reads, without what is not dynamic in their own engagement */
-static void read_along(const gk_coupled *c, int e)
-{
-    gk_engaged *engaged = &c->work->engaged[e];
-    const gk_mesh *mesh = &c->setup->mesh[e];
-    gk_clear(engaged->glide->moved_along, engaged->system.stride / 4);
-    read_group(c, engaged, WHOLE, 1, engaged->glide->moved_along);
-    for (int l = 0; l < mesh->spins; l++)
-        gk_axpy(c->work->move_spin[WHOLE][mesh->spin[l]], engaged->glide->rigid[l], engaged->glide->moved_along, 0,
-                engaged->system.stride / 4);
-}
-
 /* ---- the pass ---------------------------------------------------------------------------------------------------- */
-static void push_all(const gk_coupled *c, int parts)
+static void push_nothing(const gk_coupled *c)
 {
     gk_work *work = c->work;
     memset(work->push_spin, 0, sizeof work->push_spin);
     memset(work->push_bores, 0, sizeof work->push_bores);
     for (int g = 0; g < c->model->gears; g++) clear_gear(c, g);
-    for (int e = 0; e < c->model->engagements; e++)
-        if (gk_is_within(c, e)) push_engagement(c, e, parts);
 }
 
-void gk_pass(const gk_coupled *c, int whole, int at_once)
+static void move_all(const gk_coupled *c, int whole, int at_once)
 {
-    GK_ASSERT(whole || at_once);
     const gk_base *base = &c->setup->base;
-    GK_LAP(c->work, PHASE_SOLVE);
-    push_all(c, whole + 2 * at_once);
     move_spins(c);
     for (int g = 0; g < c->model->gears; g++)
         if (!c->work->by_tables || !base->patterns[g]) move_ground(c, (gk_span){base->from[g], base->width[g]});
     if (c->work->by_tables) gk_felt_move(c, whole, at_once);
     gk_far_move(c->work);
+}
+
+void gk_pass(const gk_coupled *c, int whole, int at_once)
+{
+    GK_ASSERT(whole || at_once);
+    GK_LAP(c->work, PHASE_SOLVE);
+    push_nothing(c);
+    for (int e = 0; e < c->model->engagements; e++)
+        if (gk_is_within(c, e)) push_engagement(c, e, whole + 2 * at_once);
+    move_all(c, whole, at_once);
     for (int e = 0; e < c->model->engagements; e++) {
         double far[MAX_STRIDE];
         if (!gk_is_within(c, e)) continue;
         gk_far_read(c->setup, &c->work->engaged[e], far);
-        if (whole) read_rows(c, e, WHOLE, far);
-        if (at_once) read_rows(c, e, YIELDED, far);
-        if (whole && GK_ON(c->setup, friction)) read_along(c, e);
+        if (whole) gk_pass_read(c, e, WHOLE, far);
+        if (at_once) gk_pass_read(c, e, YIELDED, far);
+        if (whole && GK_ON(c->setup, friction)) gk_pass_read_along(c, e);
     }
     GK_LAP(c->work, PHASE_PASS);
 }
@@ -392,8 +296,18 @@ void gk_pass(const gk_coupled *c, int whole, int at_once)
 void gk_pass_unit(const gk_coupled *c, int from, int row)
 {
     GK_ASSERT(gk_is_within(c, from) && row < c->work->engaged[from].system.n);
-    for (int e = 0; e < c->model->engagements; e++)
-        memset(&c->work->engaged[e].forces, 0, sizeof c->work->engaged[e].forces);
-    c->work->engaged[from].forces.of[AT_ONCE][row] = 1.0;
-    gk_pass(c, 0, 1);
+    gk_engaged *pushed = &c->work->engaged[from];
+    memset(&pushed->forces, 0, sizeof pushed->forces);
+    pushed->forces.of[AT_ONCE][row] = 1.0;
+    push_nothing(c);
+    for (int e = 0; e < c->model->engagements; e++) {
+        gk_engaged *engaged = &c->work->engaged[e];
+        if (!gk_is_within(c, e)) continue;
+        gk_far_rest(c->setup, engaged);
+        memset(engaged->own_bores, 0, sizeof engaged->own_bores);
+    }
+    push_engagement(c, from, 2);
+    move_all(c, 0, 1);
+    for (int e = 0; e < from; e++)
+        if (gk_is_within(c, e)) gk_pass_read_unit(c, e);
 }

@@ -14,6 +14,7 @@ static inline int gk_is_within(const gk_coupled *c, int e) { return c->setup->me
 GK_HOT void gk_pass_forces(const gk_coupled *c, gk_moment when);
 /* whole: what forces do in the step; at_once: what λ deflects */
 GK_HOT void gk_pass(const gk_coupled *c, int whole, int at_once);
-/* a unit force of one row, at once, and nothing else */
+/* what a unit force of one row does at once to the rows of engagements before its own: moved[YIELDED]; of that what no
+ * oscillator does: moved[WHOLE] */
 GK_HOT void gk_pass_unit(const gk_coupled *c, int from, int row);
 #endif

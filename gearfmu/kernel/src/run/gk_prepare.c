@@ -82,14 +82,14 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(work, 0, sizeof *work);
     gk_layout_work(model, setup, work);
     setup->step = hot->step[setup->integrator], setup->count = hot->count, setup->moves = hot->moves;
-    setup->supports = hot->supports;
+    setup->supports = hot->supports, setup->keep = hot->keep, setup->holds = hot->holds;
     gk_setup_fill(model, setup, &work->room, data, which);
     for (int e = 0; e < model->engagements; e++) {
         gk_law_bounds(model, setup, &setup->mesh[e]);
         if (model->engagement[e].kind != MESH_FLAT) gk_flank_clearance(model, setup, &setup->mesh[e]);
     }
     fill_sides(model, setup, &work->room, hot->fill);
-    gk_patterns_find(model, setup, work->room.columns);
+    hot->patterns(model, setup, work->room.columns);
     outcome = gk_limit_choose(model, setup, work, data, message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;

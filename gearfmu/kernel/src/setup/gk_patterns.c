@@ -63,7 +63,7 @@ typedef struct rows { /* of all sides of a gear */
     int count[2 * MAX_ENGAGEMENTS], sides, width;
 } rows;
 
-static rows rows_of(const gk_model *model, gk_setup *setup, int g, const double *weight, double *room)
+static rows rows_on(const gk_model *model, gk_setup *setup, int g, const double *weight, double *room)
 {
     rows all = {.width = setup->base.width[g]};
     for (int side = 0; side < 2 * model->engagements; side++) {
@@ -126,7 +126,7 @@ static void close_rows(const rows *all, const double *pattern, int count, int ea
 }
 
 /* patterns of gear g; 0: they are too many to be worth it, and the rows stay */
-static int find(const gk_model *model, gk_setup *setup, int g, double *room)
+static int find_patterns(const gk_model *model, gk_setup *setup, int g, double *room)
 {
     gk_base *base = &setup->base;
     const int width = base->width[g], most = MOST_PATTERNS - FIRST_PATTERN;
@@ -138,7 +138,7 @@ static int find(const gk_model *model, gk_setup *setup, int g, double *room)
         inverse[i] = sqrt(base->omega2[base->from[g] + i] + 1.0 / (SHORT * SHORT));
         weight[i] = 1.0 / inverse[i];
     }
-    const rows all = rows_of(model, setup, g, weight, room);
+    const rows all = rows_on(model, setup, g, weight, room);
     double longest = 0.0, left = INFINITY;
     int count = 0;
     for (; count <= most; count++) {
@@ -168,7 +168,7 @@ void gk_patterns_find(const gk_model *model, gk_setup *setup, double *room)
     for (int g = 0; g < model->gears; g++) {
         setup->base.patterns[g] = 0;
         if (setup->on.elastic && !GK_ON(setup, friction) && setup->base.pattern[g] && suits(model, setup, g))
-            setup->base.patterns[g] = find(model, setup, g, room);
+            setup->base.patterns[g] = find_patterns(model, setup, g, room);
     }
 }
 

@@ -8,8 +8,9 @@
 #include "setup/gk_setup.h"
 
 /* room: doubles as in gk_side_scratch */
-void gk_patterns_find(const gk_model *model, gk_setup *setup, double *room);
+typedef void gk_patterns_function(const gk_model *model, gk_setup *setup, double *room);
+GK_HOT gk_patterns_function gk_patterns_find;
 /* between: (2, patterns of the second, of the first) of each pair of gears that meet, in the step k */
-void gk_patterns_between(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
-                         gk_real *(*between)[MAX_GEARS]);
+GK_HOT void gk_patterns_between(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
+                                gk_real *(*between)[MAX_GEARS]);
 #endif

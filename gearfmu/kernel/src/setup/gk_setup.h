@@ -201,6 +201,9 @@ typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, con
 typedef void gk_supports_function(const gk_model *model, const gk_setup *setup, const double *moved,
                                   const double *speed, double *out);
 typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_room *room, const gk_coefficients *k);
+typedef int gk_holds_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                              const gk_coefficients *k, double mu);
+typedef void gk_keep_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
 
@@ -237,7 +240,9 @@ struct gk_setup {
     gk_tally_function *count;            /* what is summed after every step, likewise */
     gk_moves_function *moves;            /* tables of a step's length, likewise */
     gk_supports_function *supports;      /* forces on supports by motion, likewise */
-    size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
+    gk_keep_function *keep;              /* the limit of the step (integrate/gk_closed.c), likewise */
+    gk_holds_function *holds;
+    size_t amplitudes; /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
 
