@@ -18,7 +18,7 @@ NUMBER = r"(\d[\d.]*(?:e[+-]?\d+)?)"
 STUDY, SETS, STEPS = "evidence/study/study.csv", "evidence/study/sets.csv", "evidence/price/steps.csv"
 PAIR = {"scene": "pair_loaded", "level": "fast", "h_s": "6.66667e-06", "slices": "5", "integrator": "dg4"}
 PAIR_STEP = {"stage": "fzg_c/stage_relief", "level": "fast", "h_s": "6.66667e-06"}
-PLANETS = {"planets": "4", "level": "fast", "h_s": "5e-06", "speed": "85", "slices": "5", "off": ""}
+PLANETS = {"planets": "4", "level": "fast", "h_s": "1e-05", "speed": "85", "slices": "5", "off": ""}
 Cell = tuple[str, dict[str, str], str]
 QUOTES: dict[str, tuple[tuple[Cell, ...], float]] = {
     "At its default step a second of the loaded pair takes # s, # thousand instructions a step, at # % error in "
