@@ -252,3 +252,11 @@ def test_power_of_the_ports_of_a_drawn_stage_is_what_is_stored_and_lost(seed: in
     """Seen by it: a planet whose teeth are placed by a branch of atan2 overlaps its neighbours, and the stage gains up
     to 6 % of what passes."""
     keeps_its_energy(drawn(seed), DRAWN_WORK)
+
+
+@pytest.mark.parametrize("name", DEAR)
+def test_a_stage_without_load_leaves_no_step_unsolved(name: str) -> None:
+    """Forces near zero are no measure of what has settled (gk_couple.c, NEGLIGIBLE)."""
+    kind = KINDS[name]
+    trace = kind.run(kind.model(), scale=0.0)
+    assert trace["solver.retried_steps"][-1] == 0 and trace["solver.steps"][-1] > 90
