@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gearfmu.stage.assembly.fields import SIZES
+from gearfmu.stage.assembly.blob import SIZES
 from gearfmu.stage.assembly.ground_part import turn_tables
 
 

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import CarrierGeometry
+from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
+from gearfmu.geometry.mesh import CarrierGeometry
 
 
 def half_outline(gear: GearGeometry | InternalGearGeometry, intervals: int = 32) -> np.ndarray:

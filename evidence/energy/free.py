@@ -17,8 +17,7 @@ import numpy as np
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage import assemble
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import GEAR_NUMBERS, change_gear
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, change_gear, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.gear import GearSpec

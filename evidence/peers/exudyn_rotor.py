@@ -36,9 +36,8 @@ from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.stage.assembly.ground_part import GroundPart
+from gearfmu.stage.assembly.ground_part import GroundPart, body_spinning, turn_rates, whirl_rows
 from gearfmu.stage.assembly.groups import Layout, Support, mount
-from gearfmu.stage.assembly.spinning import body_spinning, turn_rates, whirl_rows
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.gear import MeshSpec
 

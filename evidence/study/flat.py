@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gearfmu.stage.assembly.assemble import MODEL_VERSION
-from gearfmu.stage.assembly.blob import write_blob
+from gearfmu.stage.assembly.blob import gear_numbers, order_sections, write_blob
 from gearfmu.stage.assembly.compact import residual_sections
-from gearfmu.stage.assembly.fields import gear_numbers, order_sections
 from gearfmu.stage.assembly.teeth import OFFSETS
 
 GRID = 4  # rolls of the tables: all equal

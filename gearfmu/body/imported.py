@@ -19,7 +19,7 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import Progress, elastic_modes
 from gearfmu.reduction.cyclic.statics import Statics, static_tables

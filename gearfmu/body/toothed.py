@@ -24,7 +24,7 @@ from gearfmu.body.parts import (
     tooth_flank,
 )
 from gearfmu.femesh import mesh_report, sector_mesh
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import elastic_modes

@@ -51,7 +51,7 @@ def _numbers(stage: str) -> dict[str, str]:
     """Data of a stage for each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.stage.assembly.flanks import FlankField
+    from gearfmu.stage.assembly.teeth import FlankField
     from gearfmu.stage.effects import torque_on_flanks_alone
     from gearfmu.stagefile.forms.shapes import face_width, gear_shape, mesh_shape
 

@@ -30,7 +30,7 @@ from gearfmu.femesh.lattice import (
 )
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.quality import scaled_jacobian
-from gearfmu.geometry.planetary import CarrierGeometry
+from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 
 _CORE = 0.55  # reach of the core in parts of the bolt's radius

@@ -17,7 +17,7 @@ from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, flank_rolls, rim_parameters, section_of
 from gearfmu.femesh.sector import gear_sector, sector_of
 from gearfmu.geometry import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.tables.gear import MeshSpec
 
 

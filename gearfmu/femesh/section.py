@@ -18,7 +18,7 @@ import numpy as np
 from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.tables.gear import MeshSpec
 
 ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it

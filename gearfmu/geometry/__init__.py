@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.pair import PairGeometry
+from gearfmu.geometry.mesh import PairGeometry
 from gearfmu.geometry.relief import ReliefCurve
 
 __all__ = ["GearGeometry", "PairGeometry", "ReliefCurve"]

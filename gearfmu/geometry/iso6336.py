@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gearfmu.geometry.pair import PairGeometry
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import PairGeometry, RingMesh
 
 C_M = 0.8  # of measured over theoretical stiffness, solid discs
 STEEL = 206e9  # Pa, of which the formula is

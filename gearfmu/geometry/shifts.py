@@ -13,10 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.pair import PairGeometry
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
+from gearfmu.geometry.mesh import PairGeometry, RingMesh
 
 ADDENDUM, DEDENDUM, FILLET = 1.0, 1.25, 0.38  # of the basic rack (ISO 53, profile A); the fillet where it fits
 CLEARANCE = DEDENDUM - ADDENDUM

@@ -12,7 +12,7 @@ from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry.planetary import mount_spaces
+from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.forms.general import GearBody, RingBody

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gearfmu.report.style import COLOURS, MUTED, WIDTH, styled, written
-from gearfmu.stage.assembly.flanks import FlankField
+from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stage.run.te import TeResult
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
-from gearfmu.geometry.planetary import MOUNTS, set_ratio
+from gearfmu.geometry.mesh import MOUNTS, set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -188,7 +188,7 @@ def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, 
 def _tip_that_clears(draft: Draft, distance: float) -> float:
     """Smallest tip radius (m) of the ring that does not meet the planet below its form circle; 0 where that cannot be
     told before the rest is put right."""
-    from gearfmu.geometry.planetary import HANDS, RingMesh
+    from gearfmu.geometry.mesh import HANDS, RingMesh
     from gearfmu.stagefile.forms.planetary import RingSpec, SetGearSpec, SetSpec
     from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
     from gearfmu.stagefile.reading.base import validate

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.geometry.planetary import HANDS
+from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.checks.forms import form_problems, judged
 from gearfmu.stagefile.checks.gears import shown
 from gearfmu.stagefile.checks.meshes import Meshed, mesh_problems

@@ -17,8 +17,8 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh import FeMesh, mesh_report, ring_sector, scaled_jacobian, volume
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
-from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import CarrierGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.stagefile.stage import load_stage

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.geometry.shifts import (
     CLEARANCE,
     OpenPair,

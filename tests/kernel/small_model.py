@@ -23,8 +23,7 @@ from gearfmu.stage.assembly.assemble import (
     port_compliances,
     set_sections,
 )
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import gear_numbers, order_sections
+from gearfmu.stage.assembly.blob import gear_numbers, order_sections, read_blob, write_blob
 from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.assembly.groups import Group, Layout, Support, mount
 from gearfmu.stagefile.tables.ports import LevelSpec

@@ -11,8 +11,7 @@ import pytest
 from inner import Inner, Place
 from small_model import BASE, PSI, TEETH, TIP, WORKING, _coast_shift, pair_blob
 
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import change_gear
+from gearfmu.stage.assembly.blob import change_gear, read_blob, write_blob
 
 REFERENCE = json.loads((Path(__file__).parent.parent / "reference" / "hertz_line.json").read_text())
 DRIVE, COAST = 0, 1

@@ -11,8 +11,7 @@ from small_model import pair_blob
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import SIZES
+from gearfmu.stage.assembly.blob import SIZES, read_blob, write_blob
 
 SECTIONS = read_blob(pair_blob())
 Change = Callable[[Any], Any]

@@ -12,8 +12,7 @@ from small_model import pair_blob, with_nodes
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import order_sections
+from gearfmu.stage.assembly.blob import order_sections, read_blob, write_blob
 
 DG4, RK45, CENTRAL = 0, 2, 3
 FULL, PAPER = 3, 4

@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import parts
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
-from gearfmu.stage.assembly import assemble, blob, compact, flanks, meshes, teeth
+from gearfmu.stage.assembly import assemble, blob, compact, meshes, teeth
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
@@ -39,7 +39,7 @@ def shape(field: str) -> list[str]:
         ("gk.h", "GK_ABI", binding.ABI),
         ("gk.h", "GK_MESSAGE", binding.MESSAGE),
         ("gk_model.c", "MODEL_VERSION", assemble.MODEL_VERSION),
-        ("gk_model.h", "LEADS", flanks.WIDTHS),
+        ("gk_model.h", "LEADS", teeth.FLANK_WIDTHS),
         ("gk_model.h", "OFFSETS", len(teeth.OFFSETS)),
         ("gk_model.h", "OFFSETS", 2 * parts._OFFSETS + 1),
         ("gk_setup.h", "FAR", compact.RANK),
@@ -66,8 +66,8 @@ def test_arrays_of_the_blob_are_as_long_as_the_kernel_reads_them() -> None:
 
 def test_python_keeps_below_the_capacities() -> None:
     assert said("gk_model.h", "MAX_FUNCTIONS") >= teeth.MOST_FUNCTIONS
-    assert said("gk_model.h", "MAX_FLANK_ROLLS") >= flanks.ROLLS
-    assert said("gk_model.h", "MAX_FLANK_PLACES") >= flanks.WIDTHS
+    assert said("gk_model.h", "MAX_FLANK_ROLLS") >= teeth.FLANK_ROLLS
+    assert said("gk_model.h", "MAX_FLANK_PLACES") >= teeth.FLANK_WIDTHS
 
 
 def test_laws_of_friction_are_in_one_order() -> None:

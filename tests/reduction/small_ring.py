@@ -14,7 +14,7 @@ from blocks import free_body
 from gearfmu.body.parts import tooth_flank
 from gearfmu.fem import hex20
 from gearfmu.femesh import ring_sector
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.sector import SectorBody

@@ -13,7 +13,7 @@ from small_ring import STEEL, coarse, geometry, turn, whole, whole_rows
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.geometry import GearGeometry
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.reduction.cyclic.flank import ToothFlank
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.statics import static_tables

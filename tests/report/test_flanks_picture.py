@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu.report.te import write_flanks
-from gearfmu.stage.assembly.flanks import FlankField
+from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stage import load_stage

@@ -9,9 +9,8 @@ from flank_reader import full_tables
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble
 from gearfmu.stage.assembly.assemble import general_sections, mount_sets
-from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, SIZES, read_blob
 from gearfmu.stage.assembly.compact import residual_sections
-from gearfmu.stage.assembly.fields import GEAR_NUMBERS, SIZES
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.assembly.teeth import ROLLS, blend, resampling
 from gearfmu.stagefile.stage import load_stage

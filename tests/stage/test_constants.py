@@ -14,8 +14,7 @@ from small_model import pair_blob
 
 import gearfmu as gf
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stage.assembly.blob import read_blob
-from gearfmu.stage.assembly.fields import GEAR_NUMBERS
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob
 
 BENEDICT_KELLEY, ISO_TR_14179 = 1.0, 2.0
 

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from gearfmu.stage import StageModel, simulate
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import ENGAGEMENT_NUMBERS, GEAR_NUMBERS, change_gear
+from gearfmu.stage.assembly.blob import ENGAGEMENT_NUMBERS, GEAR_NUMBERS, change_gear, read_blob, write_blob
 
 H, DURATION = 60e-6, 4e-3
 GEARS = (0, 1)

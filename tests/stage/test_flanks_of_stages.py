@@ -13,8 +13,8 @@ import gearfmu as gf
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble
 from gearfmu.stage.assembly.blob import read_blob
-from gearfmu.stage.assembly.flanks import FlankField
 from gearfmu.stage.assembly.meshes import tooth_phases
+from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import loaded_te, statics_of
 from gearfmu.stagefile.forms.expand import rewritten

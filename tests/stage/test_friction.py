@@ -18,8 +18,7 @@ from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, simulate
-from gearfmu.stage.assembly.blob import read_blob
-from gearfmu.stage.assembly.fields import GEAR_NUMBERS
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob
 from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage

@@ -11,7 +11,7 @@ import pytest
 
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.assemble import MODEL_VERSION, general_sections
-from gearfmu.stage.assembly.fields import order_sections
+from gearfmu.stage.assembly.blob import order_sections
 from gearfmu.stage.assembly.groups import mount
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.assembly.meshes import tooth_phases

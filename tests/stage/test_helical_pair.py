@@ -12,8 +12,7 @@ import pytest
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stage.assembly.fields import change_gear
+from gearfmu.stage.assembly.blob import change_gear, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage

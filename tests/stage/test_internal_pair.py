@@ -18,7 +18,7 @@ from gearfmu.body import Body
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stagefile.forms.general import Stage

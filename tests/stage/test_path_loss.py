@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gearfmu as gf
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stage import StageModel, Steady, simulate
 from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.te import statics_of

@@ -20,8 +20,8 @@ from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.compact import DISTANCES, between_functions
 from gearfmu.stage.assembly.layout import width_degrees
-from gearfmu.stage.assembly.slices import DISTANCES, between_functions
 from gearfmu.stage.run.te import mesh_harmonics, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage

@@ -10,9 +10,8 @@ import scipy.linalg as sl
 from test_trains import STEEL, bearing, disc, train
 
 from gearfmu.body.beam import Section, Shaft, reduce_shaft
-from gearfmu.stage.assembly.ground_part import ground_part
+from gearfmu.stage.assembly.ground_part import ground_part, skew_pairs, whirl_rows
 from gearfmu.stage.assembly.groups import Group, Layout, Support, mount
-from gearfmu.stage.assembly.spinning import skew_pairs, whirl_rows
 
 LENGTH, SECTION = 0.3, Section(0.3, 0.04, 0.01)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.geometry.planetary import mount_spaces
+from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.stagefile.forms.expand import motion_problems
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.proposals.numbers import Wish, draft_of, new_from_numbers

@@ -27,8 +27,7 @@ from evidence.peers.calculix.ring_section import ring_plane
 from evidence.peers.calculix.section import Fineness, gear_plane
 from evidence.peers.calculix.solid import extruded
 from gearfmu.body import reduce_bodies
-from gearfmu.geometry.hertz import contact_modulus, half_width
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh, contact_modulus, half_width
 from gearfmu.stage import TeResult, assemble, loaded_te
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape

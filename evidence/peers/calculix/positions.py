@@ -33,7 +33,8 @@ from evidence.peers.calculix.sun_planet import TORQUES as OF_SET
 from evidence.peers.calculix.sun_planet import set_bodies, sun_planet
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
-from gearfmu.geometry import PairGeometry, hertz
+from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.mesh import contact_modulus, half_width, largest_relative_radius
 from gearfmu.stage import TeResult, assemble, loaded_te
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
@@ -70,14 +71,14 @@ def te_of_gearfmu(spec: Stage, bores: str) -> TeResult:
 def case_at(spec: Stage, pair: PairGeometry, torque: float, bores: str) -> Case:
     """Fine zone as wide as contact at this torque (N·m) needs it."""
     materials = [gear.material for gear in spec.gears]
-    e_star = hertz.contact_modulus(
+    e_star = contact_modulus(
         (materials[0].youngs_modulus, materials[1].youngs_modulus),
         (materials[0].poisson_ratio, materials[1].poisson_ratio),
     )
-    radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    radius = largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
     load = torque / pair.gears[0].r_b / spec.gears[0].face_width
-    half_width = hertz.half_width(load, radius, e_star)
-    fine = Fineness(patch=PATCH * half_width, size=SIZE * half_width)
+    wide = half_width(load, radius, e_star)
+    fine = Fineness(patch=PATCH * wide, size=SIZE * wide)
     return Case("positions", bores=bores, fine=fine, penalty=PENALTY)
 
 

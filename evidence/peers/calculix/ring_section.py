@@ -25,7 +25,7 @@ from evidence.peers.calculix.section import (
 )
 from gearfmu.femesh.section import graded, transfinite
 from gearfmu.geometry import involute
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 
 
 def ring_surface(ring: InternalGearGeometry, u: np.ndarray) -> np.ndarray:

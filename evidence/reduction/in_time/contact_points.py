@@ -18,7 +18,7 @@ from gearfmu.fem import surface
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.mesh import FlankGrid
 from gearfmu.geometry import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 
 
 @dataclass(frozen=True)

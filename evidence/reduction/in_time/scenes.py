@@ -20,8 +20,7 @@ from evidence.reduction.in_time.transient import Assembly, Joints, Member
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import rotated
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry.hertz import contact_modulus, half_width
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.geometry.mesh import PlanetaryGeometry, contact_modulus, half_width
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface

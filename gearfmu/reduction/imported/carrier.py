@@ -15,7 +15,7 @@ import numpy as np
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.geometry.planetary import CarrierGeometry
+from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.reduction.couplings import Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling

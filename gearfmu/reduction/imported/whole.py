@@ -15,7 +15,7 @@ from gearfmu.fem import solids
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.geometry.planetary import mount_spaces
+from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling

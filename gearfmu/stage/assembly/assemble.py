@@ -13,11 +13,9 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
-from gearfmu.stage.assembly.blob import origin, with_guid, write_blob
-from gearfmu.stage.assembly.compact import far_sections, flank_tables, ground_tables, is_mirrored
-from gearfmu.stage.assembly.fields import order_sections
-from gearfmu.stage.assembly.flanks import deviation_sections
-from gearfmu.stage.assembly.ground_part import PartFlank
+from gearfmu.stage.assembly.blob import order_sections, origin, with_guid, write_blob
+from gearfmu.stage.assembly.compact import far_sections, flank_tables, ground_tables, is_mirrored, smeared, smeared_tip
+from gearfmu.stage.assembly.ground_part import PartFlank, turn_rates, whirl_rows
 from gearfmu.stage.assembly.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.assembly.housed import Sensed, sensor_sections, widened
 from gearfmu.stage.assembly.layout import stage_layout, stage_nodes, width_degrees
@@ -26,9 +24,7 @@ from gearfmu.stage.assembly.meshes import film_starts, friction_starts, nodal_se
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.assembly.observed import observed_number, observed_sections
 from gearfmu.stage.assembly.rolling import Settled, Statics, Tangents, settle
-from gearfmu.stage.assembly.slices import smeared, smeared_tip
-from gearfmu.stage.assembly.spinning import turn_rates, whirl_rows
-from gearfmu.stage.assembly.teeth import ROLLS, gear_section, mismatches, stored_points
+from gearfmu.stage.assembly.teeth import ROLLS, deviation_sections, gear_section, mismatches, stored_points
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stored import stored, stored_files
@@ -117,8 +113,10 @@ def general_sections(
             sections[f"smeared_tip{i}"] = smeared_tip(gear, shape, degrees)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
-        sections |= widened(set_sections(s, group, nodes), s, len(layout.support_names()))
-    sections |= sensor_sections(_sensed(stage, carriers, layout), groups[0])
+        found = set_sections(s, group, nodes)
+        sections |= widened(found, s, len(layout.support_names())) if stage.housings else found
+    if stage.housings:
+        sections |= sensor_sections(_sensed(stage, carriers, layout), groups[0])
     lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.simulate import Steady, simulate

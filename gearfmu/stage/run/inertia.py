@@ -14,9 +14,9 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.stage.assembly.assemble import stage_group
+from gearfmu.stage.assembly.ground_part import turn_rates, whirl_rows
 from gearfmu.stage.assembly.groups import Group
 from gearfmu.stage.assembly.observed import gear_bodies
-from gearfmu.stage.assembly.spinning import turn_rates, whirl_rows
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.forms.turning import turns

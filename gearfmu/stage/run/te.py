@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gearfmu.geometry.iso6336 import mesh_stiffness
-from gearfmu.geometry.planetary import set_ratio
+from gearfmu.geometry.mesh import set_ratio
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.assembly.shown import Card, Shown, plot_over

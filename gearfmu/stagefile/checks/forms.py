@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from gearfmu.geometry.planetary import least_apart
+from gearfmu.geometry.mesh import least_apart
 from gearfmu.ranges import range_of
 from gearfmu.stagefile.checks.gears import millimetres
 from gearfmu.stagefile.forms.general import Form, Stage

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from itertools import accumulate
 
 from gearfmu.geometry import GearGeometry, involute
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.ranges import kernel_limits
 from gearfmu.stagefile.forms.general import GearBody, RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape, gear_shape

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
-from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stagefile.checks.gears import Found, at_most, gear_problems, millimetres, rounded_down, rounded_up
 from gearfmu.stagefile.forms.general import GearBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape, MeshShape, gear_shape, largest_half_width

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.hertz import common_width
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.geometry.mesh import PlanetaryGeometry, common_width
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.planetary import HANDS
+from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.forms.general import (
     EngagementSpec,
     Form,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gearfmu.geometry.planetary import HANDS
+from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.forms.body import hash_of
 from gearfmu.stagefile.forms.general import GearBody, RingBody, Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from gearfmu.geometry.planetary import set_ratio
+from gearfmu.geometry.mesh import set_ratio
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables
 from gearfmu.stagefile.tables.bearings import LaterFields
 from gearfmu.stagefile.tables.flanks import Eccentricity, Toothing

@@ -8,9 +8,16 @@ from collections.abc import Sequence
 from typing import Any, TypeAlias, TypeVar
 
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.hertz import common_width, contact_modulus, half_width
-from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import HANDS, CarrierGeometry, PlanetaryGeometry, RingMesh
+from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.mesh import (
+    HANDS,
+    CarrierGeometry,
+    PlanetaryGeometry,
+    RingMesh,
+    common_width,
+    contact_modulus,
+    half_width,
+)
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.stagefile.tables.flanks import Toothing

@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.hertz import contact_modulus, half_width
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
+from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, distance_of_shifts, flank_length
 from gearfmu.ranges import range_of, range_problems
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up

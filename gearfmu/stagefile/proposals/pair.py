@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.hertz import largest_relative_radius
-from gearfmu.geometry.pair import PairGeometry
+from gearfmu.geometry.mesh import PairGeometry, largest_relative_radius
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.hertz import largest_relative_radius
-from gearfmu.geometry.planetary import MOUNTS, RingMesh, least_apart, set_ratio
+from gearfmu.geometry.mesh import MOUNTS, RingMesh, largest_relative_radius, least_apart, set_ratio
 from gearfmu.geometry.shifts import (
     DEDENDUM,
     RING_FILLET,

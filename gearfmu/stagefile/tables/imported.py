@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field, model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.planetary import HANDS
+from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.reading.base import Quantity, Spec, Text, refuse
 from gearfmu.stagefile.reading.files import Layers
 
