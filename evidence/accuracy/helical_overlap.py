@@ -37,7 +37,7 @@ from gearfmu.stage import assemble, loaded_te
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import GearSpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, MeshSpec
 
 OVERLAPS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 WIDTH = 28e-3  # m

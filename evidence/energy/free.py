@@ -20,8 +20,8 @@ from gearfmu.stage import assemble
 from gearfmu.stage.assembly.blob import GEAR_NUMBERS, change_gear, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.gear import GearSpec
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.bodies import GearSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 

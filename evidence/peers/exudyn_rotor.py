@@ -39,7 +39,7 @@ from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage.assembly.ground_part import GroundPart, body_spinning, turn_rates, whirl_rows
 from gearfmu.stage.assembly.groups import Layout, Support, mount
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 COARSE = MeshSpec(flank=2, thickness=1, root=2, rim=1, width=2)
 MODES, SPEEDS, STEPS = 18, (300.0, 600.0, 1200.0), (1e-6, 5e-7, 2.5e-7)

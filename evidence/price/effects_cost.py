@@ -32,7 +32,7 @@ from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import Eccentricity, ProfileSpec
+from gearfmu.stagefile.tables.bodies import Eccentricity, ProfileSpec
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "gearfmu" / "stage" / COSTS

@@ -12,7 +12,7 @@ from evidence.stability.checks import Expected, at_least, lost, statistics
 from evidence.stability.motion import RPM, Constant, Step
 from evidence.stability.pair import Pair
 from evidence.stability.train import Train
-from gearfmu.stagefile.tables.ports import ChainSpec, PortSpec
+from gearfmu.stagefile.tables.connections import ChainSpec, PortSpec
 
 LOCKINGS, PERIOD = 100, 5e-3  # number, s
 CLUTCHED = (

@@ -18,7 +18,7 @@ from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, Plane
 from evidence.stability.record import Record, Watched
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import ChainSpec, PortSpec
+from gearfmu.stagefile.tables.connections import ChainSpec, PortSpec
 
 EFFECTS = (
     "residual", "hertz", "coast_flank", "contact_damping", "tip_relief", "tip_contact", "bearings", "modal_damping",

@@ -19,9 +19,8 @@ from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
-from gearfmu.stagefile.tables.lead import LeadSpec
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.bodies import DeviationClass, Eccentricity, LeadSpec, ProfileSpec, Wobble
+from gearfmu.stagefile.tables.connections import PortSpec
 
 RELIEVED, PLAIN = "fzg_c/stage_relief", "fzg_c"
 SHAFTS = ("pinion", "wheel")

@@ -23,8 +23,8 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import RingSpec
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 SET = "planetary54"
 PLANETS, SHAFTS = 4, ("carrier", "sun")

@@ -16,7 +16,7 @@ from evidence.stability.motion import RPM, Constant, Step, Swinging, UpAndDown
 from evidence.stability.pair import PLAIN, Pair
 from evidence.stability.planetary import ALL_MESHES, RATIO, SPEED, TORQUE, PlanetSet
 from evidence.stability.train import Train
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 PAIR, TRAIN, SET = Pair(), Train(), PlanetSet()
 MU = 0.1

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gearfmu.body import load_bodies
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import LevelSpec
+from gearfmu.stagefile.tables.connections import LevelSpec
 from gearfmu.study.bench import Point, default_step, measure, models_for, paired_price
 from gearfmu.study.ladder import base_point, fitting
 from gearfmu.study.norm import errors

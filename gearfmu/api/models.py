@@ -18,7 +18,7 @@ from gearfmu.stagefile.forms.expand import with_bores, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.reading.files import Changes, model_folder
 from gearfmu.stagefile.stage import load_stage as load_stage_file
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 BORES = ("averaging", "rigid")
 PORT_KINDS = ("spring", "torque", "fixed")

@@ -21,11 +21,11 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.hdf5 import format_of
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
-from gearfmu.stagefile.forms.body import ALGORITHMS, expected_hash
-from gearfmu.stagefile.forms.former import former_hash
+from gearfmu.stagefile.former import former_hash
 from gearfmu.stagefile.forms.general import Reduced, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.reading.files import model_folder
+from gearfmu.stagefile.stored import ALGORITHMS, expected_hash
 from gearfmu.stagefile.tables.housing import HousingBody
 
 Folder: TypeAlias = "str | os.PathLike[str] | None"

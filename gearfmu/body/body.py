@@ -15,10 +15,12 @@ from gearfmu.body.layout import Entry, entries_of, value_of
 from gearfmu.errors import BodyError
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
-from gearfmu.reduction.display import Picture
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.stagefile.forms.body import ALGORITHMS, body_hash
 from gearfmu.stagefile.forms.general import Reduced
+from gearfmu.stagefile.stored import ALGORITHMS, body_hash
+
+if TYPE_CHECKING:
+    from gearfmu.body.parts import Outline
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 _FORMER = {  # names of earlier versions, told by the AttributeError
@@ -38,7 +40,7 @@ _FORMER = {  # names of earlier versions, told by the AttributeError
 
 @dataclass(frozen=True)
 class How:
-    """What a body was made from. hash: `spec.forms.body.body_hash`, 64 hex digits; method: of reduction; material: SI;
+    """What a body was made from. hash: `stagefile.stored.body_hash`, 64 hex digits; method: of reduction; material: SI;
     mesh: plain facts; provenance: program versions, time and memory; algorithm: its version, 0 where none made it."""
 
     hash: str
@@ -112,6 +114,31 @@ class Skin:
     def skin_modes(self) -> np.ndarray:
         """(P, 3, 6 + n): `modes`, by points."""
         return self.modes.transpose(1, 2, 0)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; loads (p, P, 3):
+    displacement under a unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m; shapes: a sector in all
+    modes, None where none was made."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    loads: np.ndarray
+    load_roll: np.ndarray
+    shapes: Shapes | None = None
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Drawn surface of one sector and how it moves in every mode of the gear, float32. points (S, 3) m; quads (T, 4)
+    numbers of its points, normals outward, and ahead (T, 4): 1 where the point meant is that of the next sector; modes
+    (n, S, 3), kg^-½: displacement on sector 0, of the second mode of a pair its own."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    ahead: np.ndarray
+    modes: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -335,3 +362,19 @@ def _pairs_sound(flank: Flank) -> bool:
     return bool(np.all((flank.part >= 0) & (flank.part <= 2))) and bool(
         np.all(second == follows) and np.all(same[second])
     )
+
+
+def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (z·P, 3) and quads (z·Q, 4) of all sectors."""
+    per_sector = len(sector.points)
+    quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
+    points = turn_sectors(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
+    return points.reshape(-1, 3), np.concatenate(quads)
+
+
+def turn_sectors(vectors: np.ndarray) -> np.ndarray:
+    """Sector-frame vectors (…, z, P, 3) in the body frame."""
+    angle = 2 * np.pi * np.arange(vectors.shape[-3]) / vectors.shape[-3]
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1)

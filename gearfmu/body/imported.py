@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gearfmu.body.body import Picture, whole_surface
 from gearfmu.body.parts import (
     DRAWN,
     Parts,
+    outline,
     pictured_loads,
     rim_sensor,
     sector_picture,
@@ -23,7 +25,6 @@ from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import Progress, elastic_modes
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
-from gearfmu.reduction.display import Picture, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier

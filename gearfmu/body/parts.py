@@ -12,15 +12,18 @@ from typing import Any
 
 import numpy as np
 import scipy
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
-from gearfmu.body.body import Flank, Sensors, Tangent
+from gearfmu.body.body import Flank, Picture, Sensors, Shapes, Tangent, turn_sectors, whole_surface
+from gearfmu.fem import surface
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
-from gearfmu.reduction.display import Outline, Picture, Shapes, unfold_sectors, whole_surface
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 _PICTURE_LOADS = 5
@@ -156,3 +159,42 @@ def _peak_memory() -> float | None:
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return round(peak / (1e9 if sys.platform == "darwin" else 1e6), 2)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The drawn surface of one sector: points (P, 3) drawn once a sector, quads (Q, 4) of their numbers, `ahead` (Q,
+    4): true where the point meant is that of the next sector; sample (P, N): displacement of the points from that of
+    the finite-element nodes."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    ahead: np.ndarray
+    sample: sp.csr_array
+
+
+def outline(drawn: FeMesh, nodes: np.ndarray) -> Outline:
+    """Surface of the coarse sector mesh `drawn`: the corners of its outer faces.
+
+    nodes (N, 3): the finite-element mesh of the same sector, from whose four nearest nodes the points take their
+    displacement (inverse squares of the distance: good enough to look at).
+    """
+    quads = surface.outer_faces(drawn.elements, drawn.cut_minus, drawn.cut_plus)[:, :4]
+    stand_in = np.arange(len(drawn.nodes))
+    stand_in[drawn.cut_plus] = drawn.cut_minus
+    used, local = np.unique(stand_in[quads], return_inverse=True)
+    points = drawn.nodes[used]
+    return Outline(points, local.reshape(quads.shape), stand_in[quads] != quads, _sampling(points, nodes))
+
+
+def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:
+    """Displacement (z·P, 3) from that of every sector in its own frame, (z, 3N)."""
+    return turn_sectors(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
+
+
+def _sampling(points: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
+    distance, nearest = cKDTree(nodes).query(points, k=4)
+    weight = 1 / (distance**2 + (1e-6 * np.ptp(nodes)) ** 2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(len(points)), 4)
+    return sp.coo_array((weight.ravel(), (rows, nearest.ravel())), (len(points), len(nodes))).tocsr()

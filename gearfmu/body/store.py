@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.body import Body, Flank, How, Node, Sensors, Skin, Tangent
+from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Shapes, Skin, Tangent, whole_surface
 from gearfmu.body.former import FORMATS, former_values
 from gearfmu.body.layout import (
     BODY,
@@ -26,7 +26,6 @@ from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
-from gearfmu.reduction.display import Picture, Shapes, whole_surface
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms

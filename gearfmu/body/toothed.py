@@ -17,6 +17,7 @@ from gearfmu.body.parts import (
     Parts,
     drawn_counts,
     flank_of,
+    outline,
     pictured_loads,
     provenance,
     rim_sensor,
@@ -30,7 +31,6 @@ from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
-from gearfmu.reduction.display import outline
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.stagefile.forms.general import ToothedBody

@@ -9,7 +9,7 @@ from gearfmu.cosim.network import Network
 from gearfmu.cosim.signals import Signal
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 Loads = Mapping[str, ShaftLoad]
 Rest = Callable[[Mapping[str, float]], Mapping[str, float]]  # torques (N·m) on ports → bores (rad) at rest

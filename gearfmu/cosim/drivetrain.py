@@ -15,7 +15,7 @@ from gearfmu.cosim.signals import Constant, Ramp, Signal
 from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stagefile.forms.turning import Shafts
-from gearfmu.stagefile.tables.ports import ChainSpec, PortSpec
+from gearfmu.stagefile.tables.connections import ChainSpec, PortSpec
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens

@@ -14,7 +14,7 @@ from gearfmu.fmu.opened import OpenedFmu
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": "kg*m^2"}
 UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}

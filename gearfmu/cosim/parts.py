@@ -26,7 +26,7 @@ from gearfmu.scenefile.parts import GROUND, Drivetrain
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import rolling, solved, undriven
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 SAME = 1e-9  # relative to the largest speed: speeds that do not differ
 SMALL = 1e-9  # N·m: torques that are none

@@ -29,7 +29,7 @@ from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import turns, undriven
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on

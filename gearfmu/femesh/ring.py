@@ -18,7 +18,7 @@ from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, f
 from gearfmu.femesh.sector import gear_sector, sector_of
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.gear import InternalGearGeometry
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 
 def ring_sector(geometry: InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:

@@ -19,7 +19,7 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
 RIM_SHARE = 0.45  # … and in parts of the rim

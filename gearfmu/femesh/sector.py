@@ -13,7 +13,7 @@ from gearfmu.femesh.mesh import FeMesh, FlankGrid
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.femesh.section import Section, build_section
 from gearfmu.geometry import GearGeometry
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 
 def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:

@@ -29,7 +29,7 @@ from gearfmu.stage.assembly.groups import Group
 from gearfmu.stage.run.limits import places_of
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import rolling
-from gearfmu.stagefile.tables.shaft import ShaftBody
+from gearfmu.stagefile.tables.bodies import ShaftBody
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 EVERY = {"level": 3.0, "h": 1e-7}  # full, at a step that resolves every oscillator

@@ -9,7 +9,7 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
 
 _BASE = 0.2e9  # bytes of the program with its packages, and of small arrays
 _FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.body import Body
+from gearfmu.body.body import Picture
 from gearfmu.geometry.gear import ReferenceGear
 from gearfmu.modes.deformed import DeformedGear
-from gearfmu.reduction.display import Picture
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale

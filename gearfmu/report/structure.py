@@ -8,8 +8,8 @@ import numpy as np
 
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.tables.bodies import ShaftBody
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.shaft import ShaftBody
 
 AROUND = 40  # sectors of a surface of revolution
 Profile = Sequence[tuple[float, float]]

@@ -18,8 +18,7 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.checks.meshes import STRIP_PER_HERTZ
+from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
@@ -32,7 +31,7 @@ from gearfmu.stagefile.proposals.draft import (
     usual_torque,
 )
 from gearfmu.stagefile.reading.base import validate
-from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
 from gearfmu.units import to_si
 
 NAMES = ("pinion", "wheel")

@@ -1,32 +1,44 @@
-"""stage.toml → Stage, read and checked with the geometry."""
+"""stage.toml → Stage, read and checked with the geometry.
+
+The stage is judged by `checks`, whatever kind of file it is from. Problems of the file alone are found here: in fields
+of a pair or of a planetary set that the general stage does not have, and files that are missing."""
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.geometry.mesh import HANDS
-from gearfmu.stagefile.checks.forms import form_problems, judged
-from gearfmu.stagefile.checks.gears import shown
-from gearfmu.stagefile.checks.meshes import Meshed, mesh_problems
+from gearfmu.geometry.mesh import HANDS, least_apart
+from gearfmu.ranges import range_of
+from gearfmu.stagefile.checks.gears import Meshed, mesh_problems, millimetres, shown
 from gearfmu.stagefile.checks.stage import stage_problems
 from gearfmu.stagefile.forms.expand import expand, laid_out, pair_gears
 from gearfmu.stagefile.forms.general import Form, Stage
 from gearfmu.stagefile.forms.pair import StageSpec, in_order
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
-from gearfmu.stagefile.forms.shapes import gear_shape, with_relief_rolls, with_rolls
+from gearfmu.stagefile.forms.shapes import (
+    carrier_geometry,
+    gear_shape,
+    planet_angles,
+    set_carrier,
+    with_relief_rolls,
+    with_rolls,
+)
 from gearfmu.stagefile.reading.base import Spec, validate
 from gearfmu.stagefile.reading.files import Changes, Layers, changed_tables, find_stage, read_layers
 from gearfmu.stagefile.reading.judge import as_meant
-from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
-from gearfmu.stagefile.tables.imported import missing_files
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
+from gearfmu.stagefile.tables.imported import FILES
 from gearfmu.stagefile.tables.topography import read_topography
 from gearfmu.units import to_si
 
 Table = TypeVar("Table", bound=Spec)
+Found = Iterator[tuple[str, str, str]]
+ROLLING = "by its rolling bearing"
 
 
 def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Stage:
@@ -40,7 +52,7 @@ def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) ->
     kind = stage_class(layers.tables)
     layers = layers.changed(changed_tables(kind, changes or {}))
     form, problems = _read(kind, layers)
-    problems += missing_files(layers)
+    problems += _missing_files(layers)
     if form is None or problems:
         raise SpecError(layers.attributed(problem) for problem in problems)
     found = expand(_with_rolls(_with_paths(form, layers)))
@@ -114,7 +126,7 @@ def _located(part: Table, layers: Layers, place: str) -> Table:
         if field in ("imported", "reduced") and value is not None:
             found[field] = value.located(layers, f"{place}.{'import' if field == 'imported' else field}")
         elif field == "topography" and value is not None:
-            found[field] = str(layers.holder(f"{place}.{field}").parent / value)
+            found[field] = str(layers.named(f"{place}.{field}", value))
     return part.model_copy(update=found) if found else part
 
 
@@ -138,3 +150,141 @@ def _topography_problems(stage: Stage, layers: Layers) -> list[Problem]:
                 problems = [Problem(str(layers.path), field, path.name, problems[0].remedy)]
             found += problems
     return list(dict.fromkeys(found))  # planets share a table
+
+
+def form_problems(form: Form | Stage) -> Found:
+    """(field, value, remedy) of everything that is wrong with a file besides what is wrong with its stage."""
+    if isinstance(form, StageSpec):
+        yield from _held_along(form)
+    elif isinstance(form, PlanetarySpec):
+        yield from _assembly(form)
+        yield from _carrier(form)
+        yield from _mounts(form)
+
+
+def judged(form: Form | Stage) -> Form | Stage:
+    """What is expanded to be judged: a set whose planets have no places that fit, with equally spaced ones."""
+    if isinstance(form, PlanetarySpec) and not _positions_fit(form):
+        return form.model_copy(update={"set": form.set.model_copy(update={"positions": None})})
+    return form
+
+
+def _held_along(spec: StageSpec) -> Found:
+    """Gears that move along their axes and tilt are held there; both gears of a pair move alike."""
+    names = [(gear, field) for gear in spec.gears for field in ("axial", "tilt")]
+    given = [(gear, field) for gear, field in names if dict(gear.bearing).get(field, ROLLING) is not None]
+    if not given and spec.pair.helix_angle == 0:
+        return
+    why = "a helical gear" if spec.pair.helix_angle else "a gear whose mate or other direction is held so"
+    example = {"axial": '"1e8 N/m"', "tilt": '"5e4 N*m/rad"'}
+    for gear, field in names:
+        if (gear, field) not in given:
+            yield f"gears.{gear.name}.bearing.{field}", "missing", f"{why} needs it: write {field} = {example[field]}"
+
+
+def _assembly(spec: PlanetarySpec) -> Found:
+    teeth, planets, positions = spec.sun.teeth + spec.ring.teeth, spec.set.planets, spec.set.positions
+    if positions is None and teeth % planets:
+        most = int(range_of("planets").high)
+        fitting = [n for n in range(2, most + 1) if teeth % n == 0]
+        nearest = ", ".join(str(round(k * teeth / planets)) for k in range(planets))
+        remedy = (
+            f"the set cannot be assembled with equally spaced planets: (z_sun + z_ring)/planets = {teeth}/{planets} is "
+            f"no integer; possible are {', '.join(map(str, fitting)) or 'none'}, or other tooth numbers, or planets "
+            f"that are not equally spaced: write positions = [{nearest}]"
+        )
+        yield "set.planets", str(planets), remedy
+    if positions is not None and not _positions_fit(spec):
+        shown = f"[{', '.join(map(str, positions))}]"
+        remedy = f"one for each of the {planets} planets, ascending from 0 and below z_sun + z_ring = {teeth}"
+        yield "set.positions", shown, remedy
+        return
+    room = 2 * spec.set.center_distance * math.sin(least_apart(planet_angles(spec)) / 2)
+    if room <= spec.planet.tip_diameter:
+        remedy = f"neighbouring planets touch: their axes are {millimetres(room)} apart, the tip diameter is "
+        yield "set.planets", str(planets), f"{remedy}{millimetres(spec.planet.tip_diameter)}; fewer or smaller planets"
+    for field in ("pin_errors", "planet_eccentricity"):
+        for pin in getattr(spec.set, field):
+            if pin >= planets:
+                yield f"set.{field}.{pin}", str(pin), f"no such pin: the {planets} are 0 to {planets - 1}"
+
+
+def _positions_fit(spec: PlanetarySpec) -> bool:
+    """Whether `positions` are places of the planets, in steps of 2π/(z_sun + z_ring), or left to equal spacing."""
+    positions: Sequence[int] | None = spec.set.positions
+    if positions is None:
+        return True
+    ascending = all(a < b for a, b in zip(positions, positions[1:], strict=False))
+    teeth = spec.sun.teeth + spec.ring.teeth
+    return len(positions) == spec.set.planets and positions[0] == 0 and ascending and positions[-1] < teeth
+
+
+def _mounts(spec: PlanetarySpec) -> Found:
+    mounts = spec.ring.mounts
+    if mounts is not None and mounts.points > spec.ring.teeth:
+        yield "ring.mounts.points", str(mounts.points), f"at most one a tooth space: up to {spec.ring.teeth}"
+    if mounts is not None and mounts.to is not None and mounts.to not in spec.bodies:
+        known = ", ".join(spec.bodies) or "none: write [bodies.housing]"
+        yield "ring.mounts.to", mounts.to, f"no housing of this set: {known}"
+    if mounts is not None and mounts.to is not None and "ring" in spec.ports:
+        yield "ring.mounts.to", mounts.to, "a ring with a port turns: it stands on no housing; leave the port away"
+    for support in spec.supports:
+        if support.body not in spec.bodies:
+            yield f"supports.{support.name}.body", support.body, "here are feet of a housing alone"
+
+
+def _carrier(spec: PlanetarySpec) -> Found:
+    g, carrier = carrier_geometry(set_carrier(spec)), spec.carrier
+    half = g.a * math.sin(least_apart(g.angles) / 2)
+    if 2 * g.r_bolt >= spec.planet.bore_diameter:
+        remedy = f"does not fit the planet's bore: less than {millimetres(spec.planet.bore_diameter)}"
+        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
+    if g.r_bore >= g.a - g.r_bolt:
+        remedy = f"cuts into the bolts: less than {millimetres(2 * (g.a - g.r_bolt))}"
+        yield "carrier.bore_diameter", millimetres(carrier.bore_diameter), remedy
+    if g.r_o <= g.a + g.r_bolt:
+        remedy = f"the bolts reach over the edge: more than {millimetres(2 * (g.a + g.r_bolt))}"
+        yield "carrier.outer_diameter", millimetres(carrier.outer_diameter), remedy
+    if 0 < half <= g.r_bolt:
+        remedy = f"neighbouring bolts touch: less than {millimetres(2 * half)}"
+        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
+    if carrier.imported is not None and len(set(carrier.imported.bolts)) != g.planets:
+        named = ", ".join(carrier.imported.bolts) or "none"
+        yield "carrier.import.bolts", named, f"one node set for each of the {g.planets} bolts, each its own"
+    known = ["bore", *(f"bolt{k}" for k in range(g.planets))]
+    bolts = [name for name in known[1:] if name in carrier.coupling]
+    if bolts and len(bolts) < g.planets:
+        left = ", ".join(name for name in known[1:] if name not in carrier.coupling)
+        yield "carrier.coupling", ", ".join(bolts), f"{left} would be rigid unsaid: name it too, rigid or averaging"
+    for name in carrier.coupling:
+        if name not in known:
+            yield f"carrier.coupling.{name}", carrier.coupling[name], f"no such interface: known are {', '.join(known)}"
+
+
+def _missing_files(layers: Layers) -> list[Problem]:
+    """A problem for every file that a section `import` or `reduced` names and that is not there, whatever else is wrong
+    with the stage file."""
+    return [
+        Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
+        for place, section in _sections(layers.tables).items()
+        for field in FILES
+        if isinstance(name := section.get(field), str) and name
+        if not (path := layers.named(f"{place}.{field}", name)).is_file()
+    ]
+
+
+def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables `import` and `reduced` of a stage file by their place."""
+    bodies = {
+        f"{group}.{name}": table
+        for group in ("gears", "bodies")
+        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
+    }
+    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
+    found = {
+        f"{place}.{key}": table.get(key)
+        for place, table in bodies.items()
+        if isinstance(table, dict)
+        for key in ("import", "reduced")
+    }
+    return {place: section for place, section in found.items() if isinstance(section, dict)}

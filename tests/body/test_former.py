@@ -14,10 +14,10 @@ from gearfmu.body.layout import FORMAT_VERSION, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import format_of
-from gearfmu.stagefile.forms.body import ALGORITHMS, expected_hash
-from gearfmu.stagefile.forms.former import former_hash
+from gearfmu.stagefile.former import former_hash
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import ALGORITHMS, expected_hash
 
 FORMER = Path(__file__).with_name("former")
 TINY = {"mesh.flank": 3, "mesh.thickness": 1, "mesh.root": 2, "mesh.rim": 1, "mesh.width": 2}

@@ -24,7 +24,7 @@ from gearfmu.errors import BodyError
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")

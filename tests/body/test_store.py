@@ -22,7 +22,7 @@ from gearfmu.hdf5 import seal
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 TINY = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=2)
 

@@ -16,7 +16,7 @@ from gearfmu.errors import SpecError
 from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 SHIFT = "planetary_shift"
 PAIR = """

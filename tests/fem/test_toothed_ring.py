@@ -15,7 +15,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh import ring_sector
 from gearfmu.geometry.gear import InternalGearGeometry
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 WIDTH, RIM = 8e-3, 40e-3
 

@@ -12,10 +12,11 @@ from sections import section
 
 from gearfmu.femesh import gear_sector, scaled_jacobian, volume
 from gearfmu.geometry import GearGeometry, involute
-from gearfmu.stagefile.checks.meshes import Meshed, mesh_problems
+from gearfmu.stagefile.checks.gears import Meshed, mesh_problems
 from gearfmu.stagefile.forms.expand import pair_gears
 from gearfmu.stagefile.forms.shapes import gear_geometry
-from gearfmu.stagefile.tables.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, GearSpec, Material, MeshSpec, PairSpec
+from gearfmu.stagefile.tables.connections import Bearing
 
 Found = tuple[str, float | str, str]  # field, value, remedy
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)

@@ -22,7 +22,7 @@ from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 SPEC = load_stage("planetary54")
 RING, WIDTH = ring_geometry(SPEC.written.ring, SPEC.written.set), SPEC.written.ring.face_width

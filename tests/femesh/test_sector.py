@@ -15,7 +15,7 @@ from gearfmu.femesh.section import graded, transfinite
 from gearfmu.geometry import GearGeometry
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 STAGE = load_stage("fzg_c")
 SHAPES = [gear_geometry(gear, STAGE.written.pair) for gear in STAGE.gears]

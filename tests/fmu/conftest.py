@@ -8,7 +8,7 @@ import pytest
 from small_stage import small_model, unpack
 
 from gearfmu.fmu import export
-from gearfmu.stagefile.tables.ports import ChainSpec
+from gearfmu.stagefile.tables.connections import ChainSpec
 
 
 @pytest.fixture(scope="session")

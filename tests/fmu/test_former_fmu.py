@@ -19,8 +19,7 @@ from gearfmu.fmu import export
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.stage_file import STAGE_FILE, read_stage_file
 from gearfmu.stage import assemble
-from gearfmu.stagefile.forms.body import expected_hash
-from gearfmu.stagefile.stored import restored
+from gearfmu.stagefile.stored import expected_hash, restored
 
 FORMER = Path(__file__).with_name("former")
 FMU = FORMER / "pair.fmu"

@@ -16,7 +16,7 @@ from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
-from gearfmu.stagefile.forms.body import expected_hash
+from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 TABLES = ("flank.static", "flank.node", "static", "mass")

@@ -25,11 +25,11 @@ from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 BOLTS = ["PIN_A", "PIN_B", "PIN_C", "PIN_D"]
 CARRIER = '[carrier.import]\nfile = "carrier.inp"\nlength = "1 mm"\nbore = "SHAFT"\n'

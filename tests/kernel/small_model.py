@@ -26,7 +26,7 @@ from gearfmu.stage.assembly.assemble import (
 from gearfmu.stage.assembly.blob import gear_numbers, order_sections, read_blob, write_blob
 from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.assembly.groups import Group, Layout, Support, mount
-from gearfmu.stagefile.tables.ports import LevelSpec
+from gearfmu.stagefile.tables.connections import LevelSpec
 
 NAMES = ("pinion", "wheel")
 OFFSETS = np.arange(-3, 4)

@@ -12,7 +12,7 @@ from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import Material
+from gearfmu.stagefile.tables.bodies import Material
 
 COUNT = 10
 

@@ -15,12 +15,12 @@ import pytest
 import small_gear
 
 from gearfmu.body import load_bodies
-from gearfmu.body.parts import DRAWN, sector_shapes
+from gearfmu.body.body import turn_sectors
+from gearfmu.body.parts import DRAWN, outline, sector_shapes
 from gearfmu.femesh import gear_sector
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.modes.vtu import write_series
 from gearfmu.reduction.cyclic.modal import elastic_modes
-from gearfmu.reduction.display import outline, turn_sectors
 from gearfmu.stage.run.deformation import Deformation, DeformationError, GearMotion
 from gearfmu.stagefile.stage import load_stage
 

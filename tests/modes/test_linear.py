@@ -24,7 +24,7 @@ from gearfmu.stage.run.limits import largest_torque, places_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import ChainSpec
+from gearfmu.stagefile.tables.connections import ChainSpec
 
 TORQUE = 302.0
 FREE = {name: {"kind": "torque", "chain": None} for name in ("pinion", "wheel")}

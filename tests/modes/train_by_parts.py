@@ -24,7 +24,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.stage.assembly.teeth import resampling
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
-from gearfmu.stagefile.tables.shaft import ShaftBody
+from gearfmu.stagefile.tables.bodies import ShaftBody
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out

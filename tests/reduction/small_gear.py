@@ -15,7 +15,7 @@ from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, flank_loads
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 WIDTH = 8e-3

@@ -18,7 +18,7 @@ from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 BETA = math.radians(20)
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)

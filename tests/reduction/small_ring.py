@@ -24,7 +24,7 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import MountsSpec, RingSpec
 from gearfmu.stagefile.forms.shapes import ring_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
 
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 MOUNTS = MountsSpec(points=6, stiffness=5e7)

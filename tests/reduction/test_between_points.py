@@ -13,7 +13,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
 CASES = {

@@ -21,7 +21,7 @@ from gearfmu.reduction.cyclic.flank import Points, flank_loads
 from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 FLANK_ROWS = 2 * 4 * 3
 

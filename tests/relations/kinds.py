@@ -23,9 +23,8 @@ from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
-from gearfmu.stagefile.tables.ports import SupportSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, DeviationClass, Eccentricity, MeshSpec
+from gearfmu.stagefile.tables.connections import SupportSpec
 
 ROOT = Path(__file__).parents[2]
 COARSE = BodySpec(

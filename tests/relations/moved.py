@@ -14,7 +14,7 @@ from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.turning import turns
-from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
+from gearfmu.stagefile.tables.bodies import Eccentricity, Wobble
 
 WHOLE = 1e-6  # of a pitch
 Vector = tuple[float, float]

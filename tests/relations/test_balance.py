@@ -22,8 +22,8 @@ from gearfmu.stage.assembly.layout import place_of, stage_layout
 from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.tables.connections import SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.ports import SupportSpec
 
 FORCES, MOMENTS = 1e-5, 2e-3  # at rest, of the largest force and torque; moments: forces act where bodies have moved to
 DASHPOT = 0.25  # root mean square: what is quasi-static moves without it; found up to 0.16, a thin ring

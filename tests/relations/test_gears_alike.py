@@ -13,7 +13,7 @@ from kinds import COARSE, KINDS, assembled
 
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.stage.run.te import loaded_te
-from gearfmu.stagefile.tables.ports import SupportSpec
+from gearfmu.stagefile.tables.connections import SupportSpec
 
 TORQUE, POSITIONS = 300.0, 16  # N·m, over a pitch
 COARSEST = COARSE.model_copy(

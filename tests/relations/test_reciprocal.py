@@ -13,7 +13,7 @@ from kinds import KINDS, Kind
 
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
-from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
+from gearfmu.stagefile.tables.bodies import Eccentricity, Wobble
 
 STEP = 2e-6  # rad: of the angles of ports
 RIGID = {"effect.elastic": 0.0, "effect.hertz": 0.0}

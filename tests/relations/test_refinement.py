@@ -20,7 +20,7 @@ from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.te import loaded_te
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 from gearfmu.study.bench import Point, measure, models_for
 from gearfmu.study.ladder import window
 from gearfmu.study.norm import errors

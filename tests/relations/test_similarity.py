@@ -31,7 +31,7 @@ from gearfmu.stagefile.forms.general import ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec, CarrierSpec
 from gearfmu.stagefile.reading.base import Quantity, Spec
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
 
 C = 4.0
 H = 10e-6  # s

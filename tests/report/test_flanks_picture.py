@@ -12,8 +12,7 @@ from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import ProfileSpec
-from gearfmu.stagefile.tables.lead import LeadSpec
+from gearfmu.stagefile.tables.bodies import LeadSpec, ProfileSpec
 
 
 def test_only_flanks_that_are_not_nominal_are_drawn(tmp_path: Path) -> None:

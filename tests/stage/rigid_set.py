@@ -31,7 +31,7 @@ from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import set_geometries
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 HARD = 5e19  # Pa: the local compliance stays above the least that a model may have
 TORQUE = PortSpec(kind="torque")

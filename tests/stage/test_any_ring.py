@@ -13,7 +13,7 @@ from gearfmu.stage.run.te import loaded_te
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 COARSE = {"modes": 24, "roll_points": 8, "width_functions": 3}
 

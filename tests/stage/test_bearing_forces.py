@@ -14,7 +14,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 FAST = 1

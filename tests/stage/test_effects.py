@@ -20,7 +20,7 @@ from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simula
 from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 LOAD = 302.0
 TORQUE, SPEED, START = 50.0, 10.0, 20e-6  # N·m, rad/s, s

@@ -21,7 +21,7 @@ from gearfmu.stage.assembly.meshes import REACH, film_impulse
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import FilmSpec
+from gearfmu.stagefile.tables.connections import FilmSpec
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m

@@ -24,10 +24,18 @@ from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
-from gearfmu.stagefile.tables.gear import GearSpec
-from gearfmu.stagefile.tables.lead import EndRelief, LeadSpec, Misalignment
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.bodies import (
+    Eccentricity,
+    EndRelief,
+    GearSpec,
+    LeadSpec,
+    Misalignment,
+    ProfileSpec,
+    RootRelief,
+    TipRelief,
+    Wobble,
+)
+from gearfmu.stagefile.tables.connections import PortSpec
 
 NO_CORNERS = {"effect.tip_contact": 0.0}
 PROFILES: dict[str, dict[str, Any]] = {

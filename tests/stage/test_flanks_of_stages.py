@@ -21,7 +21,7 @@ from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape, planet_angles
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
+from gearfmu.stagefile.tables.bodies import DeviationClass, Eccentricity, ProfileSpec, TipRelief
 
 TORQUE = 600.0
 

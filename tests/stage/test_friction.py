@@ -23,7 +23,7 @@ from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import FrictionSpec, PortSpec
+from gearfmu.stagefile.tables.connections import FrictionSpec, PortSpec
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
 EM = 1.0

@@ -17,7 +17,7 @@ from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stagefile.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, mesh_shape
-from gearfmu.stagefile.tables.ports import SupportSpec
+from gearfmu.stagefile.tables.connections import SupportSpec
 
 A = 0.0915
 SHAFT = {

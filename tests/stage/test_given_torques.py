@@ -16,7 +16,7 @@ from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}

@@ -18,7 +18,7 @@ from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
 
 HELD = {"effect.bearings": 0.0}  # axes
 

@@ -16,8 +16,8 @@ from gearfmu.stage.assembly.blob import change_gear, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.lead import LeadSpec, Misalignment
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.bodies import LeadSpec, Misalignment
+from gearfmu.stagefile.tables.connections import PortSpec
 
 TORQUE, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}

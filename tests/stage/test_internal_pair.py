@@ -24,7 +24,7 @@ from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
 
 ROOT = Path(__file__).parents[2]
 

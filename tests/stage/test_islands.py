@@ -14,7 +14,7 @@ from gearfmu.stage import assemble
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stagefile.forms.general import GearBody, Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import SupportSpec
+from gearfmu.stagefile.tables.connections import SupportSpec
 
 H, DURATION = 20e-6, 4e-4
 BETWEEN = 1e9  # N/m

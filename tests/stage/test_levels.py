@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly.levels import FAST, FELT, FULL, RIGID, SHARED_BELOW, STANDARD, WITHIN, lowest_levels
 from gearfmu.stage.assembly.model import integrator_of
-from gearfmu.stagefile.tables.ports import LevelSpec
+from gearfmu.stagefile.tables.connections import LevelSpec
 
 CUTS = LevelSpec(fast_cut=60e3, standard_cut=120e3)
 DEGREES = np.array([0, 2])

@@ -27,7 +27,7 @@ from gearfmu.ranges import Range, all_ranges, kernel_limits, range_of
 from gearfmu.stage.run.steady import CASE_RANGES, PARAMETER_RANGES
 from gearfmu.stagefile.reading.base import Quantity, Spec, Whole, metadata_of, validate
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.lead import Misalignment
+from gearfmu.stagefile.tables.bodies import Misalignment
 from gearfmu.stagefile.tables.profile import read_profile
 
 Annotation = Quantity | Whole

@@ -28,7 +28,7 @@ from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape, set_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec
 
 TORQUE, SLICES = 600.0, 5
 MESH = MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2)

@@ -22,7 +22,7 @@ from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.stage import StageModel
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.gear import GearSpec
+from gearfmu.stagefile.tables.bodies import GearSpec
 
 LINE_LOAD = 300e3  # N/m
 

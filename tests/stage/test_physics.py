@@ -15,7 +15,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 PITCH = 2 * math.pi / 24  # rad, of the wheel
 LOAD = 302.0

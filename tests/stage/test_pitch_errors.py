@@ -18,10 +18,10 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.assembly.blob import read_blob, write_blob
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stored import expected_hash
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
 DEVIATION = 50e-6

@@ -11,7 +11,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 H, STEP = 5e-6, 2e-5

@@ -26,7 +26,7 @@ from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02

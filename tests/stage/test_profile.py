@@ -14,7 +14,7 @@ from gearfmu.errors import SpecError
 from gearfmu.stage.run.profiled import Line, Profiled, winding_torques
 from gearfmu.stage.run.simulate import Steady
 from gearfmu.stagefile.forms.expand import with_ports
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 from gearfmu.stagefile.tables.profile import Profile, read_profile
 
 RPM = np.pi / 30

@@ -11,9 +11,9 @@ import pytest
 from gearfmu import cli
 from gearfmu.body import load_bodies
 from gearfmu.errors import BodyError, SpecError
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.forms.expand import with_bores
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 ROOT = Path(__file__).parents[2]
 COARSE = """

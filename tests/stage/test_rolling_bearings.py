@@ -24,7 +24,7 @@ from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.te import loaded_te
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bearings import OperatingSpec, RollerBearing
+from gearfmu.stagefile.tables.connections import OperatingSpec, RollerBearing
 
 HELD = {"effect.bearings": 0.0}  # axes
 

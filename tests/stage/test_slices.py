@@ -25,7 +25,7 @@ from gearfmu.stage.assembly.layout import width_degrees
 from gearfmu.stage.run.te import mesh_harmonics, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.lead import Misalignment
+from gearfmu.stagefile.tables.bodies import Misalignment
 
 HELD = {"effect.bearings": 0.0}  # axes
 

@@ -14,7 +14,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.ports import ChainSpec
+from gearfmu.stagefile.tables.connections import ChainSpec
 
 LOAD = 302.0  # N·m on the pinion
 PITCH = 2 * math.pi / 24  # rad, of the wheel

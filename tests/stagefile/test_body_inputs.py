@@ -7,13 +7,21 @@ from typing import Any
 
 import pytest
 
-from gearfmu.stagefile.forms.body import body_inputs, expected_hash, hash_of
 from gearfmu.stagefile.forms.expand import expand
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.flanks import DeviationClass, Eccentricity, ProfileSpec, RootRelief, Wobble
-from gearfmu.stagefile.tables.gear import BodySpec
-from gearfmu.stagefile.tables.lead import EndRelief, LeadSpec, Misalignment
+from gearfmu.stagefile.stored import body_inputs, expected_hash, hash_of
+from gearfmu.stagefile.tables.bodies import (
+    BodySpec,
+    DeviationClass,
+    Eccentricity,
+    EndRelief,
+    LeadSpec,
+    Misalignment,
+    ProfileSpec,
+    RootRelief,
+    Wobble,
+)
 
 STAGE = load_stage("fzg_c").written
 

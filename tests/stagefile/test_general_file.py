@@ -10,10 +10,10 @@ from refused import refused
 
 from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.reading.base import field_path
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 TEXT = find_stage("two_stage").read_text(encoding="utf-8")
 

@@ -9,9 +9,9 @@ import pytest
 from refused import refused
 
 from gearfmu.errors import SpecError
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 HOUSED = "two_stage/stage_housed"
 FOOT = '\nbody = "housing"\nnode = "foot0"\n'

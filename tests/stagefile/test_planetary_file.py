@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.stagefile.forms.body import expected_hash
 from gearfmu.stagefile.forms.expand import motion_problems, rewritten
 from gearfmu.stagefile.proposals.new import new_stage
 from gearfmu.stagefile.reading.base import read_toml
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.schema import set_schema
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 TEXT = find_stage("planetary54").read_text(encoding="utf-8")
 

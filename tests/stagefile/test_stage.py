@@ -8,7 +8,7 @@ import pytest
 
 from gearfmu.stagefile.forms.expand import expand, rewritten, with_ports
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 FILES = ["fzg_c", "helical_demo", "planetary54", "two_stage"]
 

@@ -21,7 +21,7 @@ from gearfmu.stagefile.proposals.new import stage_text
 from gearfmu.stagefile.reading.base import read_toml
 from gearfmu.stagefile.reading.files import find_stage, model_folder, shipped_stages
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import Bearing
+from gearfmu.stagefile.tables.connections import Bearing
 
 RAW = read_toml(find_stage("fzg_c"))
 Write = Callable[[dict[str, Any]], Path]

@@ -29,7 +29,7 @@ from gearfmu.files import written_whole
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import Material
+from gearfmu.stagefile.tables.bodies import Material
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent

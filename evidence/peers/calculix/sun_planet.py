@@ -7,7 +7,7 @@ from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import SetGearSpec
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.gear import GearSpec
+from gearfmu.stagefile.tables.bodies import GearSpec
 
 TORQUES = (37.5, 75.0)  # N·m on the sun: its share at 600 N·m on the carrier, and twice that
 

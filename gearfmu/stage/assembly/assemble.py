@@ -28,7 +28,7 @@ from gearfmu.stage.assembly.teeth import ROLLS, deviation_sections, gear_section
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stored import stored, stored_files
-from gearfmu.stagefile.tables.ports import PortSpec
+from gearfmu.stagefile.tables.connections import PortSpec
 
 MODEL_VERSION = 5
 VARIABLES = "e5b3cafe899b"  # of gk_variables.inc, which FMUs follow: the first digits of its SHA-256

@@ -31,7 +31,7 @@ from gearfmu.stage.assembly.groups import Group, node_directions
 from gearfmu.stage.assembly.teeth import OFFSETS, blend
 from gearfmu.stagefile.forms.general import RingBody
 from gearfmu.stagefile.forms.shapes import GearShape
-from gearfmu.stagefile.tables.gear import GearSpec
+from gearfmu.stagefile.tables.bodies import GearSpec
 
 EQUAL = 1e-6  # of the largest compliance: what may part the flanks of a mirrored gear, whose tables are rounded
 FURTHER = range(1, max(OFFSETS) + 1)

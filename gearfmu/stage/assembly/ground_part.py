@@ -34,7 +34,7 @@ from gearfmu.body.body import Body, Flank, Node
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.levels import lowest_levels
 from gearfmu.stage.assembly.teeth import OFFSETS, blend
-from gearfmu.stagefile.tables.ports import LevelSpec
+from gearfmu.stagefile.tables.connections import LevelSpec
 
 if TYPE_CHECKING:
     from gearfmu.stage.assembly.groups import Group, Layout

@@ -19,8 +19,8 @@ from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage.assembly.ground_part import GroundPart, ground_part
 from gearfmu.stage.assembly.groups import Group
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.connections import SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.ports import SupportSpec
 
 AXES = "xyz"
 OFF_AXIS = 1e-3  # of the housing's size: how far a seat may lie from its shaft's axis

@@ -19,9 +19,9 @@ from gearfmu.stage.assembly.housed import housing_part, meetings
 from gearfmu.stage.assembly.teeth import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.tables.bodies import ShaftBody
+from gearfmu.stagefile.tables.connections import SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.ports import SupportSpec
-from gearfmu.stagefile.tables.shaft import ShaftBody
 
 SAME_PLACE = 1e-9  # m
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number

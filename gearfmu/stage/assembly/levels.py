@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.ranges import kernel_number
-from gearfmu.stagefile.tables.ports import LevelSpec
+from gearfmu.stagefile.tables.connections import LevelSpec
 
 LEVELS = ("rigid", "fast", "standard", "full")
 RIGID, FAST, STANDARD, FULL = range(len(LEVELS))

@@ -25,8 +25,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import shafts_of, turns
-from gearfmu.stagefile.tables.bearings import BallBearing, RollerBearing
-from gearfmu.stagefile.tables.ports import SupportSpec
+from gearfmu.stagefile.tables.connections import BallBearing, RollerBearing, SupportSpec
 
 Tangents = Mapping[str, np.ndarray]
 BALL_NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "inner_groove", "outer_groove")

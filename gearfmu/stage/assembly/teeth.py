@@ -21,8 +21,7 @@ from gearfmu.geometry.relief import ReliefCurve, relief_depth
 from gearfmu.stage.assembly.blob import gear_numbers
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape
-from gearfmu.stagefile.tables.flanks import Eccentricity, Wobble
-from gearfmu.stagefile.tables.gear import GearSpec
+from gearfmu.stagefile.tables.bodies import Eccentricity, GearSpec, Wobble
 from gearfmu.stagefile.tables.topography import Topography, read_topography
 
 SHARPEST_EDGE = 1e-6

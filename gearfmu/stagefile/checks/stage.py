@@ -9,14 +9,12 @@ from collections.abc import Iterator
 
 from gearfmu.errors import Problem
 from gearfmu.ranges import kernel_limits
-from gearfmu.stagefile.checks.gears import millimetres, shown
-from gearfmu.stagefile.checks.meshes import Meshed, mesh_problems
+from gearfmu.stagefile.checks.gears import Meshed, mesh_problems, millimetres, shown
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import centre_distance, toothed
-from gearfmu.stagefile.tables.bearings import BallBearing, RollerBearing
+from gearfmu.stagefile.tables.bodies import ShaftBody
+from gearfmu.stagefile.tables.connections import BallBearing, RollerBearing, SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.ports import SupportSpec
-from gearfmu.stagefile.tables.shaft import ShaftBody
 
 Found = Iterator[tuple[str, str, str]]  # field of the stage, value, remedy
 _SAME_RACK = ("normal_module", "pressure_angle")

@@ -23,9 +23,8 @@ from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier, with_relief_rolls
 from gearfmu.stagefile.reading.base import Spec
-from gearfmu.stagefile.tables.bearings import Bearing, RollingMount
-from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
-from gearfmu.stagefile.tables.ports import PortSpec, SupportSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
+from gearfmu.stagefile.tables.connections import Bearing, PortSpec, RollingMount, SupportSpec
 
 CARRIER = "carrier"
 

@@ -16,29 +16,31 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables, refuse
-from gearfmu.stagefile.tables.bearings import Bearings, LaterFields, OperatingSpec
-from gearfmu.stagefile.tables.gear import (
+from gearfmu.stagefile.tables.bodies import (
     Backlash,
-    Bearing,
     GearSpec,
     HelixAngle,
+    Misalignment,
     Module,
     PressureAngle,
+    ShaftBody,
     SurfaceCoupling,
 )
-from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.lead import Misalignment
-from gearfmu.stagefile.tables.ports import (
+from gearfmu.stagefile.tables.connections import (
+    Bearing,
+    Bearings,
     FilmSpec,
     FrictionSpec,
+    LaterFields,
     LevelSpec,
     Limits,
     NodalSpec,
+    OperatingSpec,
     Place,
     PortSpec,
     SupportSpec,
 )
-from gearfmu.stagefile.tables.shaft import ShaftBody
+from gearfmu.stagefile.tables.housing import HousingBody
 
 if TYPE_CHECKING:
     from gearfmu.stagefile.forms.pair import StageSpec

@@ -10,9 +10,16 @@ from pydantic import Field, field_validator, model_validator
 from gearfmu.geometry import PairGeometry
 from gearfmu.stagefile.forms.shapes import gears_in_mesh
 from gearfmu.stagefile.reading.base import Name, Quantity, Text, refuse
-from gearfmu.stagefile.tables.bearings import Bearings, LaterFields, OperatingSpec
-from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
-from gearfmu.stagefile.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
+from gearfmu.stagefile.tables.connections import (
+    Bearings,
+    ContactSpec,
+    LaterFields,
+    LevelSpec,
+    Limits,
+    OperatingSpec,
+    PortSpec,
+)
 
 Table = TypeVar("Table")
 

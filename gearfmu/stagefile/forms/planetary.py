@@ -9,31 +9,38 @@ from pydantic import ConfigDict, Field, field_validator
 
 from gearfmu.geometry.mesh import set_ratio
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables
-from gearfmu.stagefile.tables.bearings import LaterFields
-from gearfmu.stagefile.tables.flanks import Eccentricity, Toothing
-from gearfmu.stagefile.tables.gear import (
+from gearfmu.stagefile.tables.bodies import (
     Backlash,
-    Bearing,
     BodySpec,
-    Diameter,
+    Eccentricity,
     FaceWidth,
     Factor,
     HelixAngle,
-    Length,
     Material,
     ModalDamping,
     Module,
     PressureAngle,
     ProfileShift,
     RackSpec,
-    Ratio,
     Teeth,
     TipDiameter,
     TipEdge,
+    Toothing,
+)
+from gearfmu.stagefile.tables.connections import (
+    Bearing,
+    ContactSpec,
+    Diameter,
+    LaterFields,
+    Length,
+    LevelSpec,
+    Limits,
+    PortSpec,
+    Ratio,
+    SupportSpec,
 )
 from gearfmu.stagefile.tables.housing import HousingBody
 from gearfmu.stagefile.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-from gearfmu.stagefile.tables.ports import ContactSpec, LevelSpec, Limits, PortSpec, SupportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]

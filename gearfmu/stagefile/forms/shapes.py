@@ -20,8 +20,7 @@ from gearfmu.geometry.mesh import (
 )
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
-from gearfmu.stagefile.tables.flanks import Toothing
-from gearfmu.stagefile.tables.gear import GearSpec, PairSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, Toothing
 
 GearShape = GearGeometry | InternalGearGeometry
 MeshShape = PairGeometry | RingMesh

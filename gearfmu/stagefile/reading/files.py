@@ -101,6 +101,10 @@ class Layers:
         keys = field.split(".")
         return next((path for path, raw in self.files if _holds(raw, keys)), self.path)
 
+    def named(self, field: str, name: str) -> Path:
+        """The file that a field names, as seen from here: its path is relative to the file that holds the field."""
+        return self.holder(field).parent / name
+
 
 def read_layers(path: Path) -> Layers:
     """The file at `path` and its bases, paths relative to the naming file; SpecError: one is missing, or a ring."""

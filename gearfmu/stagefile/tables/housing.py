@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, Strict, model_validator
 
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Text, Whole, refuse
-from gearfmu.stagefile.tables.bearings import LaterFields
-from gearfmu.stagefile.tables.gear import Material, ModalDamping
+from gearfmu.stagefile.tables.bodies import Material, ModalDamping
+from gearfmu.stagefile.tables.connections import LaterFields
 from gearfmu.stagefile.tables.imported import FilesSpec, SourceSpec
 
 Method = Literal["krylov", "rubin", "craig_bampton", "modal"]

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field, model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.reading.base import Quantity, Spec, Text, refuse
 from gearfmu.stagefile.reading.files import Layers
 
@@ -51,7 +50,7 @@ class SourceSpec(Spec):
         """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
         section, "gears.pinion.import"."""
         named = [field for field in FILES if getattr(self, field, "")]
-        files = {field: str(_path(layers, f"{place}.{field}", getattr(self, field))) for field in named}
+        files = {field: str(layers.named(f"{place}.{field}", getattr(self, field))) for field in named}
         return self.model_copy(update=files)
 
 
@@ -100,39 +99,6 @@ class CarrierImportSpec(FilesSpec):
 
     bore: Text = Field(description="node set of the bore")
     bolts: tuple[Text, ...] = Field(description="node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
-
-
-def missing_files(layers: Layers) -> list[Problem]:
-    """A problem for every file that a section `import` or `reduced` names and that is not there, whatever else is wrong
-    with the stage file."""
-    return [
-        Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
-        for place, section in _sections(layers.tables).items()
-        for field in FILES
-        if isinstance(name := section.get(field), str) and name
-        if not (path := _path(layers, f"{place}.{field}", name)).is_file()
-    ]
-
-
-def _path(layers: Layers, field: str, name: str) -> Path:
-    return layers.holder(field).parent / name
-
-
-def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The tables `import` and `reduced` of a stage file by their place."""
-    bodies = {
-        f"{group}.{name}": table
-        for group in ("gears", "bodies")
-        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
-    }
-    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
-    found = {
-        f"{place}.{key}": table.get(key)
-        for place, table in bodies.items()
-        if isinstance(table, dict)
-        for key in ("import", "reduced")
-    }
-    return {place: section for place, section in found.items() if isinstance(section, dict)}
 
 
 def import_inputs(spec: SourceSpec) -> dict[str, Any]:

@@ -1,16 +1,16 @@
 """Hashes of bodies as gearfmu 0.2 and 0.3 wrote them, by which their files are known again and adopted.
 
-They name the fields of a pair, a set and a general stage one by one. Bodies of today: `forms.body`."""
+They name the fields of a pair, a set and a general stage one by one. Bodies of today: `stored.body_hash`."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from gearfmu.geometry.mesh import HANDS
-from gearfmu.stagefile.forms.body import hash_of
 from gearfmu.stagefile.forms.general import GearBody, RingBody, Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec
-from gearfmu.stagefile.tables.flanks import TOOTHING
+from gearfmu.stagefile.stored import hash_of
+from gearfmu.stagefile.tables.bodies import TOOTHING
 from gearfmu.stagefile.tables.housing import HousingBody
 from gearfmu.stagefile.tables.imported import import_inputs
 
