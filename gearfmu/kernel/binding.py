@@ -12,7 +12,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 6
+ABI = 7
 MESSAGE = 512
 OUTCOMES = (
     "ok",
@@ -90,10 +90,8 @@ _SIGNATURES = {
     "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double]),
     "gk_time": (c_double, [c_void_p]),
     "gk_record": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, POINTER(RecordingInfo)]),
-    "gk_te": (
-        c_int,
-        [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, c_int, POINTER(c_double), POINTER(c_int)],
-    ),
+    "gk_te": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int]),
+    "gk_te_at": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_int, POINTER(c_double), POINTER(c_int)]),
     "gk_rest": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, POINTER(c_double), POINTER(c_double)]),
     "gk_linearise_room": (c_int, [c_void_p, c_void_p, c_void_p]),
     "gk_linearise": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),

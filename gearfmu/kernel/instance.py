@@ -242,10 +242,15 @@ class Kernel:
     def transmission(self, phi_out: float, torque: float, mesh: int = 0, keep: bool = False) -> TeState:
         """Quasi-static equilibrium with the second port's bore held at phi_out (rad) and `torque` (N·m) on the first
         port's bore, seen at engagement number `mesh`; after `prepare`."""
+        self.check(self._lib.gk_te(self._model, self._setup, self._work, self._data, phi_out, torque, int(keep)))
+        return self.transmission_at(mesh)
+
+    def transmission_at(self, mesh: int) -> TeState:
+        """The equilibrium that `transmission` has just found, seen at engagement number `mesh`."""
         out = (ctypes.c_double * (3 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
-        known = (self._model, self._setup, self._work, self._data, phi_out, torque, mesh)
-        self.check(self._lib.gk_te(*known, int(keep), out, ctypes.byref(count)))
+        known = (self._model, self._setup, self._work, self._data, mesh)
+        self.check(self._lib.gk_te_at(*known, out, ctypes.byref(count)))
         width = 2 + int(self.get("slices"))
         rows = [out[3 + i * width : 3 + (i + 1) * width] for i in range(count.value)]
         return TeState(out[0], out[1], out[2], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})

@@ -19,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 6
+#define GK_ABI 7
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {
@@ -109,13 +109,17 @@ typedef struct gk_recording {
 GK_API gk_outcome gk_record(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                             gk_recording *recording);
 
-/* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the
- * second held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues
- * from the last call. out[0] = te (m) by the bores of the ports, out[1] = angle of the first port's bore (rad),
- * out[2] = te (m) as the output in motion, by the carrier's own angle; then for each of *places tooth pairs {flank
- * 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 3 + 8·12 numbers. */
+/* Quasi-static equilibrium under a torque on the bore of the first port, the bore of the second held at phi_out,
+ * further ports free; by the contact routine of the step. After gk_prepare; `keep` continues from the last call. */
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
-                        double torque, int engagement, int keep, double *out, int *places);
+                        double torque, int keep);
+
+/* What gk_te has just found, seen at an engagement. out[0] = loaded transmission error te (m) by the bores of the ports,
+ * out[1] = angle of the first port's bore (rad), out[2] = te (m) as the output in motion, by the carrier's own angle;
+ * then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most
+ * 3 + 8·12 numbers. GK_BAD_CALL after a step. */
+GK_API gk_outcome gk_te_at(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                           int engagement, double *out, int *places);
 
 /* Static equilibrium with the torque[p] (N m) on the bore of every port p, chains left out; phi[p] (rad): angles of
  * the bores. The torques balance where nothing holds the rotors: Σ torque × speed = 0 in every motion that the

@@ -68,7 +68,7 @@ class Steady(Wound):
     def winding(self) -> float:
         """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh, and
         the plays of its port springs. Its meshes carry the mean of input and output."""
-        known = tuple(sorted({**self.parameters, "effect.friction": 0.0}.items()))
+        known = {**self.parameters, "effect.friction": 0.0}
         ratio, angles = float(self.model.shafts.ratio), self._positions(WINDING_POSITIONS)
         taken, slope = mean_winding(self.model.blob, known, self.torque, angles, ratio)
         return taken - 0.5 * slope * self.lost + self._play

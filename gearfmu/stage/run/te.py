@@ -263,8 +263,7 @@ def _of_mesh(model: StageModel, place: MeshPlace, parameters: Mapping[str, float
 
 
 def _of_set(model: StageModel, place: MeshPlace, planets: int, parameters: Mapping[str, float]) -> _At:
-    """Forces and tangents of a position start from its equilibrium; engagements are those of the sun, then those of
-    the ring."""
+    """Tangents of a position start from its equilibrium; engagements are those of the sun, then those of the ring."""
     kernel, none = statics_of(model, **parameters), np.zeros(0)
     shafts, (r_b, ratio) = model.shafts, set_error(model.stage)
 
@@ -275,7 +274,7 @@ def _of_set(model: StageModel, place: MeshPlace, planets: int, parameters: Mappi
     def at(part: float, torque: float) -> _Point:
         angle = -part * place.pitch
         te, meshes = error(angle, torque, False), range(len(GEARS) * planets)
-        states = [kernel.transmission(angle, torque, mesh, keep=True) for mesh in meshes]
+        states = [kernel.transmission_at(mesh) for mesh in meshes]
         force = np.array([_total(state) for state in states]).reshape(len(GEARS), planets)
         tangent = _tangent(lambda load: error(angle, load, True), torque)
         return _Point(te, tangent, none, abs(tangent / place.lever) * planets, none, none, force)

@@ -14,15 +14,21 @@ from gearfmu.kernel.instance import Recording
 SECANT = 0.01  # of the torque
 
 
-@lru_cache(maxsize=8)
 def mean_winding(
-    blob: bytes, parameters: tuple[tuple[str, float], ...], torque: float, angles: tuple[float, ...], ratio: float
+    blob: bytes, parameters: Mapping[str, float], torque: float, angles: tuple[float, ...], ratio: float
 ) -> tuple[float, float]:
     """Mean angle of the input (rad) under a torque on it (N·m), less its rotation by the output's angles (rad), and its
-    growth with the torque at the first of them, rad/(N·m)."""
-    kernel = Kernel(blob, at_rest(blob, dict(parameters)))
+    growth with the torque at the first of them, rad/(N·m); with these parameters of the kernel."""
+    return _mean_winding(blob, tuple(sorted(at_rest(blob, parameters).items())), torque, angles, ratio)
+
+
+@lru_cache(maxsize=8)
+def _mean_winding(
+    blob: bytes, parameters: tuple[tuple[str, float], ...], torque: float, angles: tuple[float, ...], ratio: float
+) -> tuple[float, float]:
+    kernel = Kernel(blob, dict(parameters))
     kernel.prepare()
-    found = [kernel.transmission(at, torque).phi - ratio * at for at in angles]
+    found = [kernel.transmission(at, torque, keep=i > 0).phi - ratio * at for i, at in enumerate(angles)]
     less = kernel.transmission(angles[0], (1.0 - SECANT) * torque).phi - ratio * angles[0]
     return float(np.mean(found)), (found[0] - less) / (SECANT * torque) if torque else 0.0
 

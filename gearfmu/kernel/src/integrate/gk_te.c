@@ -58,25 +58,32 @@ static void spread(const gk_model *model, const gk_setup *setup, const gk_engage
 }
 
 /* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
- * other ports free; what chains the ports have is left out. out: te (m) of engagement e by the bores of the ports,
- * angle (rad) of the first port's bore, te of e as its output in motion, by the carrier's own angle, then for every
- * tooth pair of e {flank, tooth of gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers.
- * `keep` continues from the last call; where that leads nowhere, the search begins anew. */
+ * other ports free; what chains the ports have is left out. `keep` continues from the last call; where that leads
+ * nowhere, the search begins anew. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
-                 double torque, int e, int keep, double *out, int *places)
+                 double torque, int keep)
 {
-    GK_ASSERT(out && places);
     gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_out, 0.0}};
-    double angle[MAX_ROTORS];
-    if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
+    if (model->ports < 2) return GK_BAD_CALL;
     for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
     gk_outcome outcome = GK_NO_EQUILIBRIUM;
     if (keep) outcome = gk_static_solve(model, setup, work, data, b, STATIC_BARE | STATIC_KEEP);
     if (outcome == GK_NO_EQUILIBRIUM) outcome = gk_static_solve(model, setup, work, data, b, STATIC_BARE);
-    if (outcome) return outcome;
+    return outcome;
+}
+
+/* The same equilibrium seen at engagement e. out: te (m) by the bores of the ports, angle (rad) of the first port's
+ * bore, te of e as its output in motion, by the carrier's own angle, then for every tooth pair of e {flank, tooth of
+ * gear A, force of each slice}; room for 3 + MAX_PAIRS·(2 + MAX_SLICES) numbers. */
+gk_outcome gk_te_at(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data, int e,
+                    double *out, int *places)
+{
+    GK_ASSERT(out && places);
+    double angle[MAX_ROTORS];
+    if (model->ports < 2 || e < 0 || e >= model->engagements || data->state_h != 0.0) return GK_BAD_CALL;
     for (int r = 0; r < model->rotors; r++) angle[r] = GK_OF(data, x)[r];
     angle[model->port[0].rotor] = driven_angle(model, work, 0);
-    angle[model->port[1].rotor] = phi_out;
+    angle[model->port[1].rotor] = work->outer[1];
     const gk_engaged *engaged = &work->engaged[e];
     *out++ = te_of(model, setup, e, angle, angle);
     *out++ = angle[model->port[0].rotor];
