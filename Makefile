@@ -10,6 +10,7 @@ PRICES  ?= phases steps fmu_overhead harness effects_cost levels
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
 EVIDENCE = $(RUN) -m evidence.ledger
+FAST     = $(RUN) -m pytest -n $(JOBS) --dist worksteal
 TIER   ?= 1
 export JOBS
 export OMP_NUM_THREADS ?= 1
@@ -23,9 +24,9 @@ help:
 demo: $(VENV)/.base
 	$(RUN) -m gearfmu.cli demo --out $(OUT)/demo
 
-## make test        gates of form (make lint), then the fast tests
+## make test        gates of form (make lint), then the fast tests; what fails runs once more and shows its values
 test: lint
-	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
+	$(FAST) --assert=plain --durations 60 -rs || { $(FAST) --last-failed --last-failed-no-failures none; exit 1; }
 
 ## make test-full   the slow tests in six parts (PART=3: one of them); how each ended is kept in evidence/ledger.json
 test-full: $(STAMP)

@@ -45,7 +45,13 @@ def damaged(number: int) -> bytes:
 
 @pytest.fixture(scope="module")
 def fuzzer() -> Path:
-    """fuzz_kernel.c on the sanitized kernel."""
+    """fuzz_kernel.c on the sanitized kernel, with the checks that a compiler makes quickly."""
+    return builds.fuzzer(builds.QUICKLY)
+
+
+@pytest.fixture(scope="module")
+def whole_fuzzer() -> Path:
+    """The same with all checks of UBSan."""
     return builds.fuzzer()
 
 
@@ -95,11 +101,19 @@ def check(found: Findings, first: int, count: int) -> None:
     assert not wrong, wrong[:20]
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.full)])
-def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path, count: int) -> None:
+def runs_sound_blobs(fuzzer: Path, count: int) -> None:
     found = feed(fuzzer, sound, range(count))
     check(found, 0, count)
     assert found.outcomes[REFUSED] == 0 and found.outcomes["step", "0"] > count / 2
+
+
+def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path) -> None:
+    runs_sound_blobs(fuzzer, 40)
+
+
+@pytest.mark.full
+def test_many_sound_blobs(whole_fuzzer: Path) -> None:
+    runs_sound_blobs(whole_fuzzer, 200)
 
 
 def test_some_damaged_blobs(fuzzer: Path) -> None:
@@ -115,5 +129,5 @@ def test_energy_at_rest_that_overflows_is_refused(fuzzer: Path) -> None:
 
 @pytest.mark.full
 @pytest.mark.parametrize("part", range(10))
-def test_forty_thousand_damaged_blobs(fuzzer: Path, part: int) -> None:
-    check(feed(fuzzer, damaged, range(10_000 * part, 10_000 * part + 4_000)), 10_000 * part, 4_000)
+def test_forty_thousand_damaged_blobs(whole_fuzzer: Path, part: int) -> None:
+    check(feed(whole_fuzzer, damaged, range(10_000 * part, 10_000 * part + 4_000)), 10_000 * part, 4_000)
