@@ -18,7 +18,7 @@ from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.body.whole import reduced_carrier
 from gearfmu.errors import BodyError, MeshError
-from gearfmu.hdf5 import format_of
+from gearfmu.files import format_of
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
 from gearfmu.stagefile.former import former_hash

@@ -13,7 +13,7 @@ from itertools import accumulate
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.mesh import RingMesh
-from gearfmu.ranges import kernel_limits
+from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.forms.general import GearBody, RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape, MeshShape, gear_shape, largest_half_width
 from gearfmu.stagefile.tables.bodies import TOOTHING
