@@ -1,9 +1,9 @@
-"""Numbers at the border: text such as "600 N*m" to SI floats and back, and the range of every number that a stage file,
-a scene file or an option of the command line may hold, each with its remedy.
+"""Numbers at the border: text such as "600 N*m" to SI floats and back, and the range of every number.
 
-Only readers of files and the command line deal with text; all behind them is SI. A range that the kernel checks too is
-read from the kernel's header (gk_ranges.h), the others are here alone. Ranges say what is plausible, not what is good:
-beyond them a number is a wrong unit or a slip of the pen."""
+Only readers of stage and scene files and the command line deal with text; all behind them is SI. Every number that a
+file or an option may hold has a range with a remedy. A range that the kernel checks too is read from the kernel's
+header (gk_ranges.h), the others are here alone. Ranges are plausible, not good, values: a number beyond them is a wrong
+unit or a slip of the pen."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""A torsional network of inertias, driven nodes, springs with backlash, clutches, torque sources and ports; and its
-equations: linear between events, one set of matrices for each mode, exact propagation by matrix exponentials.
+"""A torsional network: inertias, driven nodes, springs with backlash, clutches, torque sources and ports. It is
+linear between events, with one set of matrices for each mode, and its states are propagated exactly by matrix
+exponentials.
 
 State   x = [φ (n), w (n), impulse on every driven node (d)]
 Input   u = [torque on every node (n), capacity·sign of every slipping clutch (c), acceleration of every driven node
