@@ -34,7 +34,7 @@ KERNEL = "gearfmu/kernel/src"
 # from a stage file to its model
 UPSTREAM = ("stagefile", "geometry", "fem", "femesh", "reduction", "body", "stage/assembly")
 # names for users, and what carries numbers without changing them
-PLUMBING = ("__init__.py", "api", "errors.py", "extras.py", "files.py", "hdf5.py", "ranges.py", "units.py")
+PLUMBING = ("__init__.py", "api", "errors.py", "extras.py", "files.py", "quantities.py")
 BARRIERS = tuple(f"gearfmu/{part}" for part in (*UPSTREAM, *PLUMBING))
 C_WORDS = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|/\*.*?\*/|//[^\n]*', re.DOTALL)
 PROGRAM = re.compile(r"python (?:-m ([\w.]+)|([\w/]+\.py))|\bgearfmu (\w+)")

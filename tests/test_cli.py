@@ -134,7 +134,7 @@ def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path, monkeypa
 
 @pytest.mark.parametrize("verb", ["simulate", "te", "modes", "frf", "import", "run"])
 def test_help_shows_units_as_the_options_take_them(verb: str) -> None:
-    from gearfmu.units import to_si
+    from gearfmu.quantities import to_si
 
     code, out, _ = call(verb, "--help")
     units = re.findall(r'"<number> ([^"]+)"', out)

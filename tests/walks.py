@@ -84,7 +84,7 @@ def to_body() -> list[str]:
 
     changes: dict[str, Any] = {f"gears.pinion.body.mesh.{field}": count for field, count in COARSE.items()}
     stage = load_stage("fzg_c", changes | {"gears.pinion.body.modes": 40})
-    return walked(lambda: make(stage.by_file["pinion"]), ("fem", "geometry", "stagefile", "ranges.py", "units.py"))
+    return walked(lambda: make(stage.by_file["pinion"]), ("fem", "geometry", "stagefile", "quantities.py"))
 
 
 def signatures(word: str = "Any") -> int:

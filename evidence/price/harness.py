@@ -23,12 +23,11 @@ from typing import Any
 import numpy as np
 
 from gearfmu import fmu
+from gearfmu.cosim.coupled import DRIVE, Recorder
 from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.masters import Cut, master
-from gearfmu.cosim.ports import KEYS
+from gearfmu.cosim.masters import KEYS, Cut, master
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.recorder import DRIVE, Recorder
 from gearfmu.cosim.scene_run import drive_of, stage_model
 from gearfmu.scenefile.scene import load_scene
 

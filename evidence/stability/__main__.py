@@ -12,7 +12,7 @@ from evidence.stability import suite
 from evidence.stability.case import CASES, LEVELS, STEPS, Case
 from evidence.stability.scenes import SCENES, what
 from gearfmu.commands.shared import progress_bar
-from gearfmu.units import to_si
+from gearfmu.quantities import to_si
 
 
 def main(given: Sequence[str] | None = None) -> int:

@@ -10,8 +10,8 @@ from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, load
 from gearfmu.api.settings import Quantity, checked
-from gearfmu.body.housing import housing_order
 from gearfmu.body.imported import imported_full_order
+from gearfmu.body.whole import housing_order
 from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order

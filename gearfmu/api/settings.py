@@ -8,10 +8,9 @@ from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
-from gearfmu.ranges import in_range, range_of
+from gearfmu.quantities import in_range, range_of, to_si
 from gearfmu.scenefile.scene import Level
 from gearfmu.stagefile.tables.profile import Profile
-from gearfmu.units import to_si
 
 Quantity: TypeAlias = str | float  # "302 N*m", or the SI number
 Integrator: TypeAlias = Literal["dg4", "em", "rk45", "central"]

@@ -11,14 +11,13 @@ from typing import TypeAlias
 
 from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
-from gearfmu.body.housing import reduced_housing
 from gearfmu.body.layout import FORMAT_VERSION
 from gearfmu.body.sound import make_radiation, sound_path
 from gearfmu.body.store import load_body, save_body
 from gearfmu.body.toothed import gear_work, reduced_gear
-from gearfmu.body.whole import reduced_carrier
+from gearfmu.body.whole import reduced_carrier, reduced_housing
 from gearfmu.errors import BodyError, MeshError
-from gearfmu.hdf5 import format_of
+from gearfmu.files import format_of
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
 from gearfmu.stagefile.former import former_hash

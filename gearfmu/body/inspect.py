@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.body.body import Body, Flank
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import load_body
-from gearfmu.hdf5 import format_of
+from gearfmu.files import format_of
 
 
 def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from gearfmu.body.layout import (
     write_entry,
 )
 from gearfmu.errors import BodyError
-from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.files import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.spin import Spin
 

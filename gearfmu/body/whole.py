@@ -1,4 +1,5 @@
-"""Bodies whose finite elements are taken as a whole: the carrier of a planetary set, a housing."""
+"""Bodies whose finite elements are taken as a whole: the carrier of a planetary set and the housing of a stage, with
+sensors and a skin."""
 
 from __future__ import annotations
 
@@ -19,6 +20,8 @@ from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order, carrier_need
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.imported.housing import ImportedHousing, imported_housing
+from gearfmu.reduction.imported.superelement import superelement
 from gearfmu.reduction.memory import lower_counts, require_memory
 from gearfmu.reduction.mesh_error import carrier_mesh_error
 from gearfmu.reduction.methods import METHODS
@@ -27,8 +30,10 @@ from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import carrier_geometry
+from gearfmu.stagefile.tables.housing import HousingBody
 
 Progress = Callable[[str, float], None]
+LINES = 60  # of the frequencies at which the error of a housing is measured
 
 
 def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> Body:
@@ -112,3 +117,29 @@ def _carrier_facts(carrier: CarrierBody) -> dict[str, Any]:
 def _tell(progress: Progress | None, what: str, share: float) -> None:
     if progress:
         progress(what, share)
+
+
+def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> Body:
+    """The housing of a stage, reduced as its file says. Raises MeshError and BodyError."""
+    started, tell = time.process_time(), progress or (lambda what, share: None)
+    tell(f"{housing.name}: mesh and finite elements", 0.0)
+    found = housing_order(housing)
+    method = "modal" if housing.reduced else housing.method  # all modes of a superelement, which are not many
+    tell(f"{housing.name}: {method}, {found.full.size} unknowns", 0.1)
+    surface = found.surface
+    mesh = found.facts | ({} if surface is None else {"holes_of_the_skin": surface.holes})
+    how = How.of(housing, method, mesh)
+    read = Read(found.sensors) if surface is None else Read(found.sensors, surface.points, surface.faces, found.skin)
+    judging = Judging.over(lines=LINES, damping_ratio=housing.modal_damping)
+    body = whole_body(found.full, how, Size(housing.modes), judging, read)
+    return replace(
+        body,
+        name=housing.name,
+        how=replace(how, provenance=provenance(time.process_time() - started)),
+        nodes=tuple(replace(node, span=found.spans.get(node.name)) for node in body.nodes),
+    )
+
+
+def housing_order(housing: HousingBody) -> ImportedHousing:
+    """A housing before reduction, or as it was reduced elsewhere. Raises MeshError."""
+    return superelement(housing) if housing.reduced else imported_housing(housing)

@@ -93,7 +93,7 @@ def _shipped(name: Path) -> Path:
 def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body import inspect_file
     from gearfmu.body.store import FILE as BODY
-    from gearfmu.hdf5 import format_of
+    from gearfmu.files import format_of
     from gearfmu.stage.run.deformation import FILE as DEFORMATION
     from gearfmu.stage.run.trace import Trace
 
@@ -180,7 +180,7 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
 
 def in_units(found: object, key: str = "") -> Any:
     """Numbers without a unit in their name as text with it, here in what follows from a stage and in bodies."""
-    from gearfmu.units import quantity_text
+    from gearfmu.quantities import quantity_text
 
     if isinstance(found, dict):
         return {name: in_units(value, key if name in ("sun_planet", "planet_ring") else name)

@@ -18,11 +18,10 @@ _EVERY = 9.0  # s between lines of progress where there is no terminal
 
 class Quantity(click.ParamType):
     """An option such as "302 N*m": a number with a unit of the given kind, handed on in SI. name: its range
-    (`gearfmu.ranges`)."""
+    (`gearfmu.quantities`)."""
 
     def __init__(self, name: str) -> None:
-        from gearfmu.ranges import range_of
-        from gearfmu.units import usual_unit
+        from gearfmu.quantities import range_of, usual_unit
 
         self.range = range_of(name)
         self.unit = self.range.unit
@@ -38,7 +37,7 @@ class Quantity(click.ParamType):
         if isinstance(value, float):
             return value
         from gearfmu.errors import Problem, SpecError, UnitError
-        from gearfmu.units import to_si
+        from gearfmu.quantities import to_si
 
         try:
             number = to_si(value, self.unit)

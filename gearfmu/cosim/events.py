@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from gearfmu.cosim.dynamics import Dynamics, Mode
+from gearfmu.cosim.network import Dynamics, Mode
 
 MAX_SWEEPS = 500  # of the Gauss–Seidel iteration
 SLIP_TOLERANCE = 1e-12  # rad/s, for speeds up to about 1e3 rad/s some ten units in the last place

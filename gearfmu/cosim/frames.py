@@ -9,6 +9,7 @@ import numpy as np
 
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
+from gearfmu.scenefile.deformation import DeformationChoice
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage.assembly.groups import MOTIONS
 from gearfmu.stage.assembly.observed import MODE, MOTION
@@ -34,11 +35,9 @@ class FramePlan:
         return tuple(f"{gear}{kind}*" for gear in self.gears for kind in (MOTION, MODE))
 
 
-def frame_plan(scene: SceneSpec) -> FramePlan | None:
-    """What the scene asks for; None: nothing."""
-    choice, step = scene.deformation, scene.coupling.step
-    if choice is None:
-        return None
+def frame_plan(scene: SceneSpec, choice: DeformationChoice) -> FramePlan:
+    """Frames that a scene asks for, by its choice of gears and times."""
+    step = scene.coupling.step
     return FramePlan(choice.gears, tuple(choice.picture_steps(step)), tuple(choice.film_steps(step, scene.steps)))
 
 

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from gearfmu.cosim.dynamics import Dynamics, Mode
 from gearfmu.cosim.events import Event
+from gearfmu.cosim.network import Dynamics, Mode
 
 
 @dataclass(slots=True)

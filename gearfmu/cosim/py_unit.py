@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearfmu.cosim.dynamics import Dynamics, Mode
 from gearfmu.cosim.events import Attempt, Event, first_event, initial_mode, switch
-from gearfmu.cosim.network import Network
+from gearfmu.cosim.network import Dynamics, Mode, Network
 from gearfmu.cosim.py_outputs import NetworkLog, Outputs, State
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError
@@ -105,7 +104,7 @@ class PyUnit:
         for k in self._motion_ports.values():
             node = d.driven[k]
             state.x[node], state.x[d.n + node] = given.motion[k, :2]
-        state.mode = initial_mode(d, state.x, self._inputs(time, state.x), self._capacity(time, time)[0])
+        state.mode = self._mode_of(time, state.x)
 
     def save(self) -> State:
         """A copy of everything that changes."""
@@ -317,8 +316,14 @@ class PyUnit:
             (),
         )
         self._state = state
-        state.mode = initial_mode(d, x, self._inputs(time, x), self._capacity(time, time)[0])
+        state.mode = self._mode_of(time, x)
         return state
+
+    def _mode_of(self, time: float, x: np.ndarray) -> Mode:
+        """The mode that a state alone decides; without clutch and backlash there is one."""
+        if not self._hybrid:
+            return (), ()
+        return initial_mode(self.dynamics, x, self._inputs(time, x), self._capacity(time, time)[0])
 
     def _node_torques(self, u: np.ndarray, time: float, x: Sequence[float]) -> None:
         """Port torques and sources into the first n places of u (zero where there are none)."""

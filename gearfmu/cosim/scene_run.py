@@ -1,12 +1,18 @@
-"""From a scene to its trace: model, FMU, units, master, record, price."""
+"""From a scene to its trace: model, FMU, units, master, record, price; and the summary of the run.
+
+The summary is plain JSON, SI. It is the trace's meta and summary.json."""
 
 from __future__ import annotations
 
+import datetime
+import hashlib
 import json
+import platform
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +20,7 @@ from gearfmu import fmu
 from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
-from gearfmu.cosim.drive import Drive
-from gearfmu.cosim.drivetrain import car_drive, rig_drive
+from gearfmu.cosim.drive import Drive, car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
 from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
@@ -23,19 +28,20 @@ from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
-from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
+from gearfmu.kernel.binding import status_words
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.assembly.model import integrator_of
 from gearfmu.stage.assembly.observed import gear_hashes
 from gearfmu.stage.run.deformation import FILE_NAME
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.forms.turning import require_driven, shafts_of
+from gearfmu.stagefile.forms.turning import meshings, require_driven, shafts_of
 from gearfmu.stagefile.stage import load_stage
 
 WHOLE = Wiring()
@@ -104,7 +110,8 @@ def run(
     scene = staged.scene
     with stage_source(staged, unit, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
-        result = run_once(scene, source, first, frames=frame_plan(scene))
+        planned = None if scene.deformation is None else frame_plan(scene, scene.deformation)
+        result = run_once(scene, source, first, frames=planned)
         errors = (
             verified(scene, source, result, _part(progress, 1.0 / 3.0, 1.0))
             if verify and result.outcome == OK
@@ -276,3 +283,78 @@ def _verifying(scene: SceneSpec, source: Source, steps: tuple[float, float], pro
 
 def _part(progress: Progress | None, start: float, end: float) -> Progress | None:
     return None if progress is None else lambda fraction: progress(start + (end - start) * fraction)
+
+
+TORQUES = (
+    "{}.shaft.tau",
+    "{}.tau",
+    "{}.w",
+)  # whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
+COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "retried_steps": "solver.retried_steps"}
+
+
+def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
+    """Subject of a run, its outcome, price and origin.
+
+    errors : coupling error by channel, None when the run was not verified.
+    """
+    return _what(scene, source) | _price(result) | _accuracy(source, result, errors) | _origin(scene, source)
+
+
+def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    clutch = any(port.chain is not None for port in source.model.stage.ports.values())
+    return {
+        "scene": scene.name,
+        "description": scene.description,
+        "stage": scene.stage.name,
+        "level": scene.stage.level,
+        "integrator": integrator_of(scene.stage.level, scene.stage.integrator, clutch),
+        "contact": scene.stage.contact,
+        "slices": scene.stage.slices,
+        "effects_off": list(scene.stage.effects.off),
+        "H": scene.coupling.step,
+        "master": scene.coupling.master,
+        "settle": scene.settle,
+        "unit": "kernel" if source.fmu_path is None else "fmu",
+        "chain_in_fmu": scene.chain_in_fmu,
+        "meshes": {mesh: known.plain for mesh, known in meshings(source.model.stage).items()},
+    }
+
+
+def _price(result: Result) -> dict[str, Any]:
+    end = float(result.trace.time[-1])
+    counts = {key: int(result.facts[name]) for key, name in COUNTS.items() if name in result.facts}
+    return counts | {
+        "outcome": result.outcome,
+        "message": result.message,
+        "warnings": status_words(int(result.facts.get("solver.status", 0))),
+        "simulated_s": end,
+        "cpu_s": result.cpu_s,
+        "realtime_factor": result.cpu_s / end if end else None,
+        "stage_cpu_s": result.stage_cpu_s,
+        "stage_realtime_factor": result.stage_cpu_s / end if end else None,
+        "h": result.facts.get("solver.h"),
+    }
+
+
+def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
+    port, errors = source.model.shafts.input, errors or {}
+    torque = next((name for name in (text.format(port) for text in TORQUES) if name in errors), None)
+    return {
+        "coupling_error": errors[torque].relative if torque else None,
+        "coupling_error_rms_Nm": errors[torque].rms if torque and torque.endswith(".tau") else None,
+        "coupling_error_of": torque,
+        "coupling_errors": {name: error.relative for name, error in errors.items()},
+        "energy_residual": result.energy_residual,
+        "exchanged_work_J": result.throughput,
+    }
+
+
+def _origin(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    hashes = {f"body {name}": text for name, text in source.model.bodies.items()}
+    hashes |= {"scene": scene.hash, "model": source.model.hash}
+    if source.fmu_path is not None:
+        hashes["fmu"] = hashlib.sha256(source.fmu_path.read_bytes()).hexdigest()
+    versions = {name: version(name) for name in ("gearfmu", "numpy", "scipy", "fmpy")}
+    finished = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+    return {"hashes": hashes, "versions": {"python": platform.python_version(), **versions}, "finished": finished}

@@ -1,5 +1,5 @@
-"""Gears in mesh, spur or helical (ISO 21771): an external pair, a planet in its ring, and a planetary set with the
-carrier, a plate with a bore beside the planets and a bolt for each of them; Hertz's line contact of their flanks.
+"""Gears in mesh, spur or helical (ISO 21771): an external pair, a planet in its ring, and a planetary set. A set has a
+carrier, a plate with a bore beside the planets and a bolt for each of them. Hertz's line contact of flanks is here too.
 
 All of it is seen in the transverse section at mid-width, z = 0. Sun and planets have opposite hands, planets and ring
 the same: the helix angle of a set is that of its sun."""

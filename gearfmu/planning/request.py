@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from gearfmu.errors import GearfmuError, Problem, SpecError, near_or_all
+from gearfmu.quantities import to_si
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.te import set_error
-from gearfmu.units import to_si
 
 WHERE = "plan"
 HIGHEST = 0.45  # of the sampling rate: higher frequencies are folded and filtered

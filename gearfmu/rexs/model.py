@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gearfmu.errors import Problem, UnitError
-from gearfmu.units import to_si
+from gearfmu.quantities import to_si
 
 _SPELLINGS = {"mum": "um", "1 / min": "rpm", "N m": "N*m"}
 

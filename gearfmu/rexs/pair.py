@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from gearfmu.geometry.mesh import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
+from gearfmu.quantities import to_si
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -32,7 +33,6 @@ from gearfmu.stagefile.proposals.draft import (
 )
 from gearfmu.stagefile.reading.base import validate
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.units import to_si
 
 NAMES = ("pinion", "wheel")
 

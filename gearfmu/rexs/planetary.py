@@ -231,7 +231,7 @@ def _put_carrier(model: RexsModel, draft: Draft, stage: Component, gears: list[R
 
 def _bolt(model: RexsModel, draft: Draft, stage: Component) -> float:
     """Diameter (m) of the bolts: that of the planet pins, which must fit the planets' bores."""
-    from gearfmu.units import to_si
+    from gearfmu.quantities import to_si
 
     largest = to_si(draft.tables["planet"]["bore_diameter"], "m")
     for pin in model.related(stage, "shaft", relation="planet_pin"):

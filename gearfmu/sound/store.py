@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.files import Format, reading, writing
 from gearfmu.sound.radiation import Radiation
 from gearfmu.sound.skin import SoundError
 

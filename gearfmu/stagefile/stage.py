@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry.mesh import HANDS, least_apart
-from gearfmu.ranges import range_of
+from gearfmu.quantities import range_of, to_si
 from gearfmu.stagefile.checks.gears import Meshed, mesh_problems, millimetres, shown
 from gearfmu.stagefile.checks.stage import stage_problems
 from gearfmu.stagefile.forms.expand import expand, laid_out, pair_gears
@@ -34,7 +34,6 @@ from gearfmu.stagefile.reading.judge import as_meant
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
 from gearfmu.stagefile.tables.imported import FILES
 from gearfmu.stagefile.tables.topography import read_topography
-from gearfmu.units import to_si
 
 Table = TypeVar("Table", bound=Spec)
 Found = Iterator[tuple[str, str, str]]

@@ -1,5 +1,5 @@
-"""Parts of a stage that other files keep. An FMU holds its tables, which need none of its files and are read back here;
-the file of a body holds the hash of that body's table and of the files that it names, whatever stage it belongs to."""
+"""Parts of a stage that other files keep. An FMU holds its tables, which need none of its files, and is read back here.
+The file of a body holds a hash of that body's table and of the files that it names, whatever stage it belongs to."""
 
 from __future__ import annotations
 

@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import GearfmuError
+from gearfmu.quantities import to_si
 from gearfmu.scenefile.scene import SceneSpec, StageChoice, full_key, scene_path, shipped_scenes
 from gearfmu.stagefile.reading.base import Quantity, read_toml
 from gearfmu.stagefile.reading.files import find_stage, quantity_at, read_layers
 from gearfmu.stagefile.stage import stage_class
-from gearfmu.units import to_si
 
 _RANGE = re.compile(r"\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*(\S.*?)?\s*$")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")

@@ -10,6 +10,7 @@ import numpy as np
 from gearfmu import cosim
 from gearfmu.body import Body
 from gearfmu.cosim.scene_run import Staged
+from gearfmu.quantities import to_si
 from gearfmu.report.metrics import MetricsError, order_cuts
 from gearfmu.report.results import REACHED_THE_END, key_results
 from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
@@ -19,7 +20,6 @@ from gearfmu.stage.run.steady import LoadCase, parameters, steady_run
 from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
-from gearfmu.units import to_si
 
 ORDERS = 5  # of the mesh
 POSITIONS = 41

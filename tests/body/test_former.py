@@ -13,7 +13,7 @@ from gearfmu.body import body_path, load_bodies, load_body, reduce_bodies
 from gearfmu.body.layout import FORMAT_VERSION, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.hdf5 import format_of
+from gearfmu.files import format_of
 from gearfmu.stagefile.former import former_hash
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage

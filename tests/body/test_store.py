@@ -18,7 +18,7 @@ from gearfmu.body.body import _FORMER
 from gearfmu.body.layout import ENTRIES, entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
-from gearfmu.hdf5 import seal
+from gearfmu.files import seal
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage

@@ -63,7 +63,7 @@ def test_hashes_of_scenes_without_are_those_of_before() -> None:
 def test_fmu_and_kernel_record_the_same_frames_and_the_trace_stays(tmp_path: Path) -> None:
     asked = closure(gears=("wheel",), times=(1e-3,), every=5e-4)
     model = stage_model(asked)
-    plan = frame_plan(asked)
+    plan = frame_plan(asked, asked.deformation)
     through_fmu = run_once(asked, Source(model, fmu.export(model, tmp_path / "pair.fmu")), frames=plan)
     through_kernel = run_once(asked, Source(model), frames=plan)
     plain = run_once(closure(), Source(stage_model(closure())))
@@ -94,4 +94,4 @@ def test_an_fmu_that_does_not_tell_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"pair.fmu: observed gears = none.*--observe wheel"):
         cosim.run(asked, fmu_path=path)
     with pytest.raises(CouplingError, match="--observe wheel"):
-        run_once(asked, Source(model), frames=frame_plan(asked))
+        run_once(asked, Source(model), frames=frame_plan(asked, asked.deformation))

@@ -13,8 +13,7 @@ from pydantic import BaseModel
 from scipy.linalg import eigh
 
 from evidence.pages.drivetrain import page
-from gearfmu.cosim.drive import Drive
-from gearfmu.cosim.drivetrain import capacity, car_drive, engine_torque, rig_drive, road_load
+from gearfmu.cosim.drive import Drive, capacity, car_drive, engine_torque, rig_drive, road_load
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.scenefile.drivetrain import PassengerCar, TestRig

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from analytic_stage import Plant
 
+from gearfmu.cosim.masters import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.network import Clutch, Inertia, Network, Spring
-from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.scene_run import drive_of
 from gearfmu.cosim.signals import Ramp

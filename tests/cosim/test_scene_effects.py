@@ -9,8 +9,7 @@ import pytest
 
 from gearfmu import fmu
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.cosim.summary import summary
+from gearfmu.cosim.scene_run import run_once, stage_model, summary
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
 

@@ -23,7 +23,7 @@ from gearfmu.fmu.package import content_identifier, write_archive
 from gearfmu.fmu.units import ATOMS, base_exponents, unit_of
 from gearfmu.kernel import build, library_path
 from gearfmu.kernel.build import BuildError, host_platform
-from gearfmu.ranges import HEADER
+from gearfmu.quantities import HEADER
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from decks import STEEL
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.femesh.imported import read_mesh
-from gearfmu.units import to_si
+from gearfmu.quantities import to_si
 
 HERE = Path(__file__).parent / "gmsh"
 MM = to_si("1 mm", "m")

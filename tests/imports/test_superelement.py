@@ -19,7 +19,7 @@ from decks import brick, write_deck
 from test_formats import op4
 
 from gearfmu.body import Body
-from gearfmu.body.housing import housing_order, reduced_housing
+from gearfmu.body.whole import housing_order, reduced_housing
 from gearfmu.errors import MeshError
 from gearfmu.reduction.imported.housing import ImportedHousing
 from gearfmu.stagefile.tables.housing import HousingBody

@@ -13,7 +13,7 @@ from small_model import pair_blob, with_nodes
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.ranges import HEADER, kernel_limits
+from gearfmu.quantities import HEADER, kernel_limits
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 BLOB = with_nodes(pair_blob(("chain", "spring")))

@@ -15,7 +15,7 @@ from itertools import accumulate
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PYTHON = "geometry stagefile scenefile rexs femesh fem reduction body stage modes cosim units.py planning".split()
+PYTHON = "geometry stagefile scenefile rexs femesh fem reduction body stage modes cosim planning".split()
 PYTHON += [f"study/{name}.py" for name in "norm order limits ladder reference".split()]
 PYTHON += [f"report/{name}.py" for name in "metrics levels mesh_cycle signals runup campbell".split()]
 NOT_NUMBERS = "kernel/src/fmi2 gk_ranges.h gk_text.c /schema.py /table.py reduction/methods/ transient.py".split()

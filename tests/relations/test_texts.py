@@ -19,9 +19,9 @@ from typing import Any
 import pytest
 from kinds import COARSE, KINDS, ROOT, assembled, bodies_of
 
+from gearfmu.quantities import to_si
 from gearfmu.stagefile.reading.files import find_stage, read_layers
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.units import to_si
 
 getcontext().prec = 40
 PI = Decimal("3.141592653589793238462643383279502884197")

@@ -23,7 +23,7 @@ import gearfmu.scenefile
 import gearfmu.stagefile
 from gearfmu.cli import outcome
 from gearfmu.errors import GearfmuError, Problem, SpecError
-from gearfmu.ranges import Range, all_ranges, kernel_limits, range_of
+from gearfmu.quantities import Range, all_ranges, kernel_limits, range_of
 from gearfmu.stage.run.steady import CASE_RANGES, PARAMETER_RANGES
 from gearfmu.stagefile.reading.base import Quantity, Spec, Whole, metadata_of, validate
 from gearfmu.stagefile.stage import load_stage

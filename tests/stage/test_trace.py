@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gearfmu.hdf5 import seal
+from gearfmu.files import seal
 from gearfmu.stage.run.trace import Channel, Trace, TraceError
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -18,7 +18,7 @@ import h5py
 from gearfmu.body import load_bodies
 from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.errors import GearfmuError
-from gearfmu.hdf5 import seal
+from gearfmu.files import seal
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.scenes import __file__ as scenes
 from gearfmu.stage import assemble

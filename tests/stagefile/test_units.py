@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearfmu.errors import UnitError
-from gearfmu.units import _USUAL, _factor_by_pint, to_si
+from gearfmu.quantities import _USUAL, _factor_by_pint, to_si
 
 READ = [
     ("600 N*m", "N*m", 600),
@@ -93,7 +93,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
 
 def test_the_unit_library_is_loaded_only_when_a_unit_needs_it() -> None:
     code = (
-        "import sys; from gearfmu.units import to_si; to_si('3 m', 'm'); to_si('3 mm', 'm'); "
+        "import sys; from gearfmu.quantities import to_si; to_si('3 m', 'm'); to_si('3 mm', 'm'); "
         "sys.exit('pint' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

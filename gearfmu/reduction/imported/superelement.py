@@ -20,9 +20,9 @@ import scipy.sparse as sp
 from gearfmu.errors import MeshError
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.matrices import read_labelled, read_recovery, read_unknowns
-from gearfmu.fem.nastran_matrices import Labelled
+from gearfmu.fem.nastran_matrices import Labelled, bulk_cards, bulk_number
+from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.imported import read_surface
-from gearfmu.femesh.points import read_points
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.housing import ImportedHousing
 from gearfmu.reduction.imported.skin import Surface, enclosed
@@ -198,3 +198,31 @@ def _surface(read: _Read, source: HousingReducedSpec) -> tuple[Surface | None, s
     surface = enclosed(points, faces, source.surface)
     moved = sp.vstack([read.motion(int(label), range(3), "surface") for label in labels])
     return surface, sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ moved)
+
+
+def read_points(path: Path) -> dict[int, np.ndarray]:
+    """Coordinates (3,) of every point by its label, in the file's unit. MeshError for a file without points, and for
+    points in another system of coordinates."""
+    if path.suffix.lower() == ".inp":
+        found = {label: np.array(point, float) for label, point in read_deck(path).nodes.items()}
+    else:
+        found = _grids(path)
+    if not found:
+        raise MeshError(f"{path}: no GRID card and no *NODE: name the file that says where the points lie")
+    return found
+
+
+def _grids(path: Path) -> dict[int, np.ndarray]:
+    try:
+        cards = [card for card in bulk_cards(path) if card[0].rstrip("*") == "GRID"]
+    except OSError as error:
+        raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None
+    found = {}
+    for card in cards:
+        if card[2] not in ("", "0"):
+            raise MeshError(f"{path}: GRID {card[1]} is in coordinate system {card[2]}: write it in the basic system")
+        try:
+            found[int(card[1])] = np.array([bulk_number(text or "0.0") for text in card[3:6]])
+        except ValueError as error:
+            raise MeshError(f"{path}: GRID {card[1]} cannot be read ({error}): correct this card") from None
+    return found

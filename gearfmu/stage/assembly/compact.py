@@ -12,9 +12,9 @@ displacement of a tooth, over both flanks, lengths of roll and width functions. 
 on a tooth m further is displaced there by U S(m) Uᵀ F. S(m) belongs to the level: the kernel sums it over what is not
 dynamic there (`gk_far_fill.c`), from coefficients.
 
-The width functions smear a slice's load over much of the width (docs/theory.md, eq. 8g′), for the body's tables know it
-by a few polynomials at one length of roll. Near the load a flank is a half-space. There the mean of 1/distance between
-two smeared loads is known; the kernel puts that of the slices themselves in its place."""
+A few polynomials at one length of roll represent a slice's load in these tables, and smear it over much of the width
+(docs/theory.md, eq. 8g′). Near the load a flank is a half-space. There the mean of 1/distance between two smeared loads
+is known; the kernel puts that of the slices themselves in its place."""
 
 from __future__ import annotations
 

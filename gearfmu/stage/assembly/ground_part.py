@@ -1,5 +1,5 @@
 """Bodies as the ground group takes them: rigid motion, patterns of nodal diameter 0 and 1 in axes that do not turn,
-nodes, what a gear's flanks read of all that, and the gyroscopic forces on it.
+nodes. A gear's flanks read all that by rows, and gyroscopic forces act on it.
 
 In axes that do not turn the pair (first, second) of nodal diameter 1 is a vector P in the plane, and so are forces x, y
 and moments x, y at a node on the axis. With a, b the rows of the pair on tooth 0, a tooth at the angle ψ reads

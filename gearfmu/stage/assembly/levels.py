@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.ranges import kernel_number
+from gearfmu.quantities import kernel_number
 from gearfmu.stagefile.tables.connections import LevelSpec
 
 LEVELS = ("rigid", "fast", "standard", "full")

@@ -14,7 +14,7 @@ import numpy as np
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.mesh import RingMesh, contact_modulus, half_width
-from gearfmu.ranges import kernel_limits, kernel_number
+from gearfmu.quantities import kernel_limits, kernel_number
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import MeshShape, face_width, mesh_shape, toothed
 

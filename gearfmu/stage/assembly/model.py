@@ -12,13 +12,13 @@ import numpy as np
 
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Kernel, Variable
+from gearfmu.quantities import quantity_text
 from gearfmu.stage.assembly.blob import blob_hash, read_blob, with_guid, write_blob
 from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stage.assembly.shown import Card, Shown, grouped
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import Shafts, shafts_of
-from gearfmu.units import quantity_text
 
 SPRING = 0  # kind of a port in the blob
 

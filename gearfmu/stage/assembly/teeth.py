@@ -1,5 +1,7 @@
-"""The teeth of one gear in the model blob: their numbers, whether a reduced body is that gear's own, the lengths of
-roll, width functions and modes for which that body is read, and the one field of flank deviations.
+"""The teeth of one gear in the model blob: their numbers, the reading of a reduced body, and the field of deviations.
+
+A body is checked to be that gear's own. It is read at lengths of roll, for width functions and in modes that the stage
+can excite.
 
 The field is everything that the stage file says about the flanks, as material (positive: more than nominal) by tooth,
 flank, place across the width and length of roll (docs/theory.md, 2.2). Tip relief of the parabolic kind, leads and

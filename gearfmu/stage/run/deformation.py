@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import GearfmuError
-from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.files import Format, reading, writing
 
 
 class DeformationError(GearfmuError):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.errors import SimulationError
-from gearfmu.ranges import all_ranges
+from gearfmu.quantities import all_ranges
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.te import loaded_te
 from gearfmu.stagefile.forms.general import Stage, ToothedBody

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearfmu.errors import ModelError, Problem, SpecError, near_or_all
 from gearfmu.kernel import Variable
-from gearfmu.ranges import Range, range_of, range_problems
+from gearfmu.quantities import Range, range_of, range_problems
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.limits import beyond_limits, limit_named
 from gearfmu.stage.run.profiled import Line, Profiled

@@ -16,10 +16,9 @@ import numpy as np
 
 from gearfmu.errors import GearfmuError, near_or_all
 from gearfmu.extras import required
-from gearfmu.files import written_whole
-from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.files import Format, reading, writing, written_whole
+from gearfmu.quantities import quantity_text
 from gearfmu.stage.assembly.shown import Card, Shown, grouped, plot_over
-from gearfmu.units import quantity_text
 
 if TYPE_CHECKING:
     import xarray

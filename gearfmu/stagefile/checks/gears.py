@@ -1,6 +1,6 @@
 """Can these gears be made, run together and carry the torque? Gear B of a mesh may be a ring.
 
-Every problem names a field and what to write there; nothing here stops at the first one. Formulas: ISO 21771; undercut
+Every problem names a field and its remedy; nothing here stops at the first one. Formulas: ISO 21771; undercut
 and interference by form rolls; tip interference in a ring: Colbourne (1987)."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from itertools import accumulate
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.mesh import RingMesh
-from gearfmu.ranges import kernel_limits
+from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.forms.general import GearBody, RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape, MeshShape, gear_shape, largest_half_width
 from gearfmu.stagefile.tables.bodies import TOOTHING

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from gearfmu.errors import Problem
-from gearfmu.ranges import kernel_limits
+from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.checks.gears import Meshed, mesh_problems, millimetres, shown
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import centre_distance, toothed

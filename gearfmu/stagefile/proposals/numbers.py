@@ -18,7 +18,7 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
 from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, distance_of_shifts, flank_length
-from gearfmu.ranges import range_of, range_problems
+from gearfmu.quantities import range_of, range_problems
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,

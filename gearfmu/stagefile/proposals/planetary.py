@@ -16,7 +16,7 @@ from gearfmu.geometry.shifts import (
     ring_shortcomings,
     sum_of_shifts,
 )
-from gearfmu.ranges import range_of
+from gearfmu.quantities import range_of
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
 from gearfmu.stagefile.proposals.numbers import (

@@ -18,8 +18,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError, near_or_all
-from gearfmu.ranges import Range, range_of
-from gearfmu.units import to_si
+from gearfmu.quantities import Range, range_of, to_si
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -42,8 +41,8 @@ SpecType = TypeVar("SpecType", bound=Spec)
 
 @dataclass(frozen=True)
 class Quantity:
-    """Annotation of a float field: the name of its range (`gearfmu.ranges`), which says unit and limits, and words that
-    may replace a number.
+    """Annotation of a float field: the name of its range (`gearfmu.quantities`), which says unit and limits, and words
+    that may replace a number.
 
     `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
     plain number.
@@ -101,7 +100,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Whole:
-    """Annotation of an integer field: the name of its range (`gearfmu.ranges`)."""
+    """Annotation of an integer field: the name of its range (`gearfmu.quantities`)."""
 
     name: str
 

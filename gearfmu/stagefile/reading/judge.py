@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 
 from gearfmu.errors import UnitError
+from gearfmu.quantities import to_si
 from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path
-from gearfmu.units import to_si
 
 _ROUNDS = 4  # a key put right may bring further ones to light
 _MISSING = object()

@@ -7,8 +7,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from gearfmu.quantities import quantity_text
 from gearfmu.stagefile.reading.base import Quantity, metadata_of
-from gearfmu.units import quantity_text
 
 
 def shown(spec: BaseModel) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
-from gearfmu.ranges import kernel_limits
+from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, refuse
 from gearfmu.stagefile.tables.connections import Diameter, GearBearing, Length
 from gearfmu.stagefile.tables.imported import ImportSpec

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.ranges import range_of
+from gearfmu.quantities import range_of, to_si
 from gearfmu.stagefile.tables.rows import number, read_rows, uneven
-from gearfmu.units import to_si
 
 UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
 EXAMPLE = "time_[s],torque_[N*m],speed_[rpm]"

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from gearfmu.errors import Problem, UnitError
+from gearfmu.quantities import to_si
 from gearfmu.stagefile.tables.rows import number, read_rows, uneven
-from gearfmu.units import to_si
 
 FLANKS = ("left", "right")  # index 0: sg = +1, index 1: sg = −1
 _LARGEST = 1e-3  # m
