@@ -114,10 +114,10 @@ GK_API gk_outcome gk_record(const gk_model *model, const gk_setup *setup, gk_wor
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                         double torque, int keep);
 
-/* What gk_te has just found, seen at an engagement. out[0] = loaded transmission error te (m) by the bores of the ports,
- * out[1] = angle of the first port's bore (rad), out[2] = te (m) as the output in motion, by the carrier's own angle;
- * then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most
- * 3 + 8·12 numbers. GK_BAD_CALL after a step. */
+/* What gk_te has just found, seen at an engagement. out[0] = loaded transmission error te (m) by the bores of the
+ * ports, out[1] = angle of the first port's bore (rad), out[2] = te (m) as the output in motion, by the carrier's own
+ * angle; then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of gear A, force of each slice (N)};
+ * at most 3 + 8·12 numbers. GK_BAD_CALL after a step. */
 GK_API gk_outcome gk_te_at(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                            int engagement, double *out, int *places);
 
