@@ -16,8 +16,8 @@ static const double AT_NYQUIST = 2.0 / (1.0 - GK_MEMORY); /* f_d over half of η
 static const double NEAR = 50e-6;                         /* m: flanks that count as closed */
 
 /* ---- an engagement ----------------------------------------------------------------------------------------------- */
-/* X = S (1 + Γ S)⁻¹ of a block (n, n), by Gauss elimination of (1 + S Γ) X = S */
-static void what_yields(const double *S, const double *damping, int n, double *X)
+/* Compliance beside dampers, X = S (1 + Γ S)⁻¹ of a block (n, n), by Gauss elimination of (1 + S Γ) X = S */
+static void against_dampers(const double *S, const double *damping, int n, double *X)
 {
     double B[MAX_SLICES * MAX_SLICES];
     for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * AT_NYQUIST * damping[i % n] + (i / n == i % n);
@@ -48,7 +48,7 @@ void gk_closed_compliance(const gk_system *s, const double *Q, double full, int 
         for (int a = 0; a < strips; a++)
             S[a * strips + a] += gk_law_slope(s, first + a, full * s->flank.width[first + a]);
         if (dashpots)
-            what_yields(S, s->dashpot.coefficient + first, strips, X);
+            against_dampers(S, s->dashpot.coefficient + first, strips, X);
         else
             memcpy(X, S, (size_t)(strips * strips) * sizeof *X);
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
