@@ -1,5 +1,5 @@
 /* The ranges of the numbers that both the kernel and a stage file limit, in SI. The kernel checks the model blob and
- * its variables against them; Python reads this file (gearfmu/ranges.py) and adds unit and remedy. */
+ * its variables against them; Python reads this file (gearfmu/quantities.py) and adds unit and remedy. */
 #ifndef GK_RANGES_H
 #define GK_RANGES_H
 
