@@ -1,9 +1,9 @@
 """Counts of what a newcomer has to read: walks, classes, forms, lines. `python tests/walks.py` prints the table.
 
 A walk counts the modules of gearfmu in which a function is entered. Its reader opens every top-level function and
-class once, in the order of first use, with all that stands inside it. His stays are runs of one module, his returns
-stays in a module that he had left. A walk of a body begins at `make` and leaves out finite elements and geometry, which
-are pure functions of arrays and numbers.
+class once, in the order of first use, including its methods and inner functions. His stays are runs of one module, his
+returns stays in a module that he had left. A walk of a body begins at `make` and leaves out finite elements and
+geometry, which are pure functions of arrays and numbers.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
-from gearfmu.reduction.cyclic.sector import SectorBody, turned_sum
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.imported.flank import tooth_loads
 
 
@@ -69,7 +69,7 @@ class ImportedSector(SectorBody):
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
         """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
         moments, gram = patch_moments(self.cut.nodes, self.faces.within(self.bore))
-        return moments, turned_sum(gram, self.teeth)
+        return moments, self.turned_sum(gram)
 
 
 def _repeated(elements: dict[str, np.ndarray]) -> np.ndarray:
