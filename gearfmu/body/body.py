@@ -24,6 +24,9 @@ from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stagefile.forms.general import Reduced
 from gearfmu.stagefile.stored import ALGORITHMS, body_hash
 
+if TYPE_CHECKING:
+    from gearfmu.body.pictures import Outline
+
 _FORMER = {  # names of earlier versions, told by the AttributeError
     "input_hash": "how.hash", "algorithm_version": "how.algorithm", "method": "how.method", "material": "how.material",
     "mesh": "how.mesh", "provenance": "how.provenance", "frf": "error", "display": "picture", "ground": "error.ground",
@@ -302,3 +305,19 @@ class Body:
         """The flank of a body that has one."""
         assert self.flank is not None, f"body '{self.name}' has no teeth"
         return self.flank
+
+
+def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (z·P, 3) and quads (z·Q, 4) of all sectors."""
+    per_sector = len(sector.points)
+    quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
+    points = turn_sectors(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
+    return points.reshape(-1, 3), np.concatenate(quads)
+
+
+def turn_sectors(vectors: np.ndarray) -> np.ndarray:
+    """Sector-frame vectors (…, z, P, 3) in the body frame."""
+    angle = 2 * np.pi * np.arange(vectors.shape[-3]) / vectors.shape[-3]
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1)

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from gearfmu.body.body import Picture, Shapes
+from gearfmu.body.body import Picture, Shapes, turn_sectors, whole_surface
 from gearfmu.fem import surface
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.cyclic.flank import Points
@@ -82,32 +82,11 @@ def pictured_loads(points: Points) -> list[int]:
 
 def sector_picture(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Picture:
     """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
-    pictured = pictured_loads(body.points)
+    shapes, pictured = sector_shapes(sector, modes), pictured_loads(body.points)
+    loads = np.array([unfold_sectors(picture, sector) for picture in statics.pictures], "f4")
+    rolls = body.points.rolls[[load // body.points.functions for load in pictured]]
     points, quads = whole_surface(sector, body.teeth)
-    loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
-    return Picture(
-        points.astype("f4"),
-        quads,
-        np.array(loads, "f4"),
-        body.points.rolls[[load // body.points.functions for load in pictured]],
-        sector_shapes(sector, modes),
-    )
-
-
-def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (z·P, 3) and quads (z·Q, 4) of all sectors."""
-    per_sector = len(sector.points)
-    quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
-    points = turn_sectors(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
-    return points.reshape(-1, 3), np.concatenate(quads)
-
-
-def turn_sectors(vectors: np.ndarray) -> np.ndarray:
-    """Sector-frame vectors (…, z, P, 3) in the body frame."""
-    angle = 2 * np.pi * np.arange(vectors.shape[-3]) / vectors.shape[-3]
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1)
+    return Picture(points.astype("f4"), quads, loads, rolls, shapes)
 
 
 def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:

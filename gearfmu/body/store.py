@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Shapes, Skin, Tangent
+from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Shapes, Skin, Tangent, whole_surface
 from gearfmu.body.former import FORMATS, former_values
 from gearfmu.body.layout import (
     BODY,
@@ -22,7 +22,6 @@ from gearfmu.body.layout import (
     value_of,
     write_entry,
 )
-from gearfmu.body.pictures import whole_surface
 from gearfmu.errors import BodyError
 from gearfmu.files import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError

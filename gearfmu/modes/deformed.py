@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.body.body import Shapes
-from gearfmu.body.pictures import turn_sectors, whole_surface
+from gearfmu.body.body import Shapes, turn_sectors, whole_surface
 from gearfmu.stage.run.deformation import DeformationError, GearMotion
 
 

@@ -23,6 +23,7 @@ class SectorBody:
     mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
     flank : ToothFlank. points : where the flanks are loaded. rigid_bore : the surface of the bore (of a ring: of the
     rim) moves as one rigid body, as on a stiff shaft; else it deforms about its mean motion.
+    load_matrix : all loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows.
     Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
     """
 
@@ -37,6 +38,7 @@ class SectorBody:
             bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
         self.material, self.spaces = material, sector_spaces(sector)
+        self.load_matrix = self._all_loads()
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
@@ -73,9 +75,7 @@ class SectorBody:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
         return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
 
-    @cached_property
-    def load_matrix(self) -> sp.csr_array:
-        """All loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows."""
+    def _all_loads(self) -> sp.csr_array:
         parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
         return sp.csr_array(sp.vstack(parts))
 

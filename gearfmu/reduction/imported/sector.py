@@ -44,6 +44,7 @@ class ImportedSector(SectorBody):
         self.spaces = sector_spaces(
             Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
         )
+        self.load_matrix = self._all_loads()
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction)
