@@ -1,8 +1,9 @@
 """Counts of what a newcomer has to read: walks, classes, forms, lines. `python tests/walks.py` prints the table.
 
-A walk counts the modules of gearfmu in which a function is entered; stays are those of a reader who opens every
-function once, in the order of first calls, and returns are stays in a module that was left before. A walk of a body
-begins at `make` and leaves out finite elements and geometry, which are pure functions of arrays and numbers.
+A walk counts the modules of gearfmu in which a function is entered. Its reader opens every top-level function and
+class once, in the order of first use, including its methods and inner functions. His stays are runs of one module, his
+returns stays in a module that he had left. A walk of a body begins at `make` and leaves out finite elements and
+geometry, which are pure functions of arrays and numbers.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import CodeType, FrameType
+from types import FrameType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,25 +27,23 @@ COARSE = {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
 
 
 def walked(run: Callable[[], object], skip: tuple[str, ...] = ()) -> list[str]:
-    """Modules of the functions that `run` enters, in the order of first calls. skip: packages left out."""
-    found, seen = list[str](), set[CodeType]()
+    """Modules of the top-level functions and classes that `run` enters, in the order of first use: a class is read
+    whole, nested functions belong to theirs. skip: packages left out."""
+    found = dict[tuple[str, str], None]()
 
     def entered(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
-        file = code.co_filename
-        if event != "call" or code in seen or code.co_name == "<module>" or not file.startswith(f"{PRODUCT}/"):
-            return
-        seen.add(code)
-        module = file.removeprefix(f"{PRODUCT}/")
-        if not module.startswith(skip):
-            found.append(module)
+        module, opened = code.co_filename.removeprefix(f"{PRODUCT}/"), code.co_qualname.partition(".")[0]
+        ours = module != code.co_filename and not module.startswith(skip)
+        if event == "call" and ours and opened != "<module>":
+            found.setdefault((module, opened))
 
     sys.setprofile(entered)
     try:
         run()
     finally:
         sys.setprofile(None)
-    return found
+    return [module for module, _ in found]
 
 
 def stays(walk: list[str]) -> tuple[int, int]:

@@ -24,11 +24,11 @@ import numpy as np
 from matplotlib import rc_context
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.body.parts import flank_of, tooth_flank
-from gearfmu.body.toothed import symmetric_mass
+from gearfmu.body.toothed import flank_of, symmetric_mass
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
+from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables

@@ -6,23 +6,27 @@ compliance, all read at nodes. Teeth, spinning, pictures, sensors and a radiatin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import platform
+import sys
+import time
+from dataclasses import dataclass, field, replace
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
-from gearfmu.body.layout import Entry, entries_of, value_of
+from gearfmu.body.layout import body_problems
 from gearfmu.errors import BodyError
 from gearfmu.reduction.cyclic.frf import FrfError
-from gearfmu.reduction.cyclic.spin import Spin
+from gearfmu.reduction.cyclic.modal import Spin
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stagefile.forms.general import Reduced
 from gearfmu.stagefile.stored import ALGORITHMS, body_hash
 
 if TYPE_CHECKING:
-    from gearfmu.body.parts import Outline
+    from gearfmu.body.pictures import Outline
 
-_KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 _FORMER = {  # names of earlier versions, told by the AttributeError
     "input_hash": "how.hash", "algorithm_version": "how.algorithm", "method": "how.method", "material": "how.material",
     "mesh": "how.mesh", "provenance": "how.provenance", "frf": "error", "display": "picture", "ground": "error.ground",
@@ -55,6 +59,29 @@ class How:
         """How a body is made from its table today."""
         material = {} if table.material is None else table.material.model_dump()
         return cls(body_hash(table), method, material, mesh, {}, ALGORITHMS[table.kind])
+
+    def since(self, started: float) -> How:
+        """The same with versions of programs, CPU seconds since `time.process_time()` was `started`, and the peak
+        memory of the process so far."""
+        provenance = {
+            "gearfmu": metadata.version("gearfmu"),
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+            "cpu_s": round(time.process_time() - started, 1),
+            "peak_memory_GB": _peak_memory(),
+        }
+        return replace(self, provenance=provenance)
+
+
+def _peak_memory() -> float | None:
+    """Largest resident memory of this process so far; None where the system does not report it (Windows)."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e9 if sys.platform == "darwin" else 1e6), 2)
 
 
 @dataclass(frozen=True)
@@ -278,90 +305,6 @@ class Body:
         """The flank of a body that has one."""
         assert self.flank is not None, f"body '{self.name}' has no teeth"
         return self.flank
-
-
-def body_problems(body: Body) -> list[str]:
-    """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
-    sizes = {"K": len(body.nodes), "m": sum(len(node.components) for node in body.nodes), "6+n": 6 + body.modes}
-    if body.flank is not None:
-        sizes["z"] = body.flank.teeth
-    problems: list[str] = []
-    for entry in entries_of(body):
-        problems += _array_problems(entry, np.asarray(value_of(body, entry.field)), sizes)
-    if problems:
-        return problems
-    checks = _body_checks(body) | (_flank_checks(body.flank) if body.flank is not None else {})
-    return [text for text, holds in checks.items() if not holds]
-
-
-def _array_problems(entry: Entry, value: np.ndarray, sizes: dict[str, int]) -> list[str]:
-    value = value.astype("i8") if value.dtype == bool else value
-    if value.dtype.kind != entry.kind[0]:
-        return [f"{entry.path} holds {value.dtype}, expected {_KINDS[entry.kind]} numbers"]
-    if value.ndim != len(entry.shape):
-        return [f"{entry.path} has shape {value.shape}, expected {len(entry.shape)} dimensions"]
-    for length, wanted in zip(value.shape, entry.shape, strict=True):
-        expected = wanted if isinstance(wanted, int) else sizes.setdefault(wanted, length)
-        if length != expected:
-            return [
-                f"{entry.path} has shape {value.shape}, which does not fit {entry.shape} with {wanted} = {expected}"
-            ]
-    if not np.all(np.isfinite(value)):
-        return [f"{entry.path} holds a number that is not finite"]
-    return []
-
-
-def _body_checks(body: Body) -> dict[str, bool]:
-    picture, shapes = body.picture, body.picture.shapes if body.picture is not None else None
-    return {
-        "hash is not 64 hex digits": len(body.how.hash) == 64 and set(body.how.hash) <= set("0123456789abcdef"),
-        "mass must be above 0": body.total_mass > 0,
-        "frequency must be above 0 and ascending": body.modes == 0
-        or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),
-        "damping_ratio must lie between 0 and 1": bool(np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))),
-        "sensors/names does not fit the points": body.sensors is None
-        or len(body.sensors.names) == len(body.sensors.points) == len(body.sensors.rows) / 3,
-        "skin/faces names a point that is not there": body.skin is None or _inside(body.skin.faces, body.skin.points),
-        "picture/shapes/quads names a point that is not there": shapes is None or _inside(shapes.quads, shapes.points),
-        "picture/loads does not fit the surface": picture is None or picture.loads.shape[1] == len(picture.points),
-        "picture/quads names a point that is not there": picture is None or _inside(picture.quads, picture.points),
-    }
-
-
-def _inside(quads: np.ndarray, points: np.ndarray) -> bool:
-    return bool(np.all((quads >= 0) & (quads < len(points))))
-
-
-def _flank_checks(flank: Flank) -> dict[str, bool]:
-    offsets = flank.static.shape[2]
-    return {
-        "flank/teeth must be 3 or more": flank.teeth >= 3,
-        "flank/r_b, face_width and strip_half_width must be above 0": min(
-            flank.r_b, flank.face_width, flank.strip_half_width
-        )
-        > 0,
-        "flank/static must hold the tooth offsets −K … K, K at least 3, or all": offsets == flank.teeth
-        or (7 <= offsets < flank.teeth and offsets % 2 == 1),
-        "flank/beta_b must lie between −π/4 and π/4": abs(flank.beta_b) < np.pi / 4,
-        "there must be a mode, a roll point and a width function": min(flank.rows.shape) > 0,
-        "flank/part: the two modes of a pair must follow each other": _pairs_sound(flank),
-        "flank/diameter must lie between 0 and z/2": bool(
-            np.all((flank.diameter >= 0) & (2 * flank.diameter <= flank.teeth))
-        ),
-        "flank/parity must be −1, 0 or +1": bool(np.all(np.abs(flank.parity) <= 1)),
-        "flank/roll must ascend inside flank/roll_range": bool(
-            np.all(np.diff(np.concatenate([flank.roll_range[:1], flank.roll, flank.roll_range[1:]])) > 0)
-        ),
-    }
-
-
-def _pairs_sound(flank: Flank) -> bool:
-    first, second = flank.part == 1, flank.part == 2
-    follows = np.concatenate([[False], first[:-1]])
-    same = np.concatenate([[True], np.diff(flank.diameter) == 0])
-    return bool(np.all((flank.part >= 0) & (flank.part <= 2))) and bool(
-        np.all(second == follows) and np.all(same[second])
-    )
 
 
 def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:

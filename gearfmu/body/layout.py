@@ -1,16 +1,15 @@
-"""The layout of a body and its file: one table from which it is written, read, checked and documented, and how the
-numbers of its datasets are packed.
+"""The layout of a body and its file: one table from which it is written, packed, read, checked and documented.
 
 A model holds singles, and a picture shows a hundredth of a displacement: the lower bits of the finite elements' doubles
-are noise, which nothing compresses. So numbers are rounded to whole multiples of a power of two, and packing what was
-unpacked gives the same bytes. Along the roll points, Chebyshev points of the first kind, rows and tables are smooth:
-their cosine transform, the coefficients of their Chebyshev polynomials, falls off, and what lies below a step costs
-nothing."""
+are noise, which nothing compresses. So numbers are rounded to whole multiples of a power of two, and packing numbers
+that were unpacked gives the same bytes. Rows and tables are smooth along the roll points, Chebyshev points of the first
+kind. Their cosine transform, the coefficients of Chebyshev polynomials, falls off: numbers below a step cost nothing.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -18,8 +17,12 @@ from scipy.fft import dctn, idctn
 
 from gearfmu.errors import BodyError
 
+if TYPE_CHECKING:
+    from gearfmu.body.body import Body, Flank
+
 FORMAT = "gearfmu-body"
 FORMAT_VERSION = 4
+_KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 
 
 @dataclass(frozen=True)
@@ -201,6 +204,90 @@ def entries_of(body: Any) -> tuple[Entry, ...]:
     if SHAPES in found:
         found.remove(SURFACE)
     return (*BODY, *(entry for group in found for entry in group))
+
+
+def body_problems(body: Body) -> list[str]:
+    """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
+    sizes = {"K": len(body.nodes), "m": sum(len(node.components) for node in body.nodes), "6+n": 6 + body.modes}
+    if body.flank is not None:
+        sizes["z"] = body.flank.teeth
+    problems: list[str] = []
+    for entry in entries_of(body):
+        problems += _array_problems(entry, np.asarray(value_of(body, entry.field)), sizes)
+    if problems:
+        return problems
+    checks = _body_checks(body) | (_flank_checks(body.flank) if body.flank is not None else {})
+    return [text for text, holds in checks.items() if not holds]
+
+
+def _array_problems(entry: Entry, value: np.ndarray, sizes: dict[str, int]) -> list[str]:
+    value = value.astype("i8") if value.dtype == bool else value
+    if value.dtype.kind != entry.kind[0]:
+        return [f"{entry.path} holds {value.dtype}, expected {_KINDS[entry.kind]} numbers"]
+    if value.ndim != len(entry.shape):
+        return [f"{entry.path} has shape {value.shape}, expected {len(entry.shape)} dimensions"]
+    for length, wanted in zip(value.shape, entry.shape, strict=True):
+        expected = wanted if isinstance(wanted, int) else sizes.setdefault(wanted, length)
+        if length != expected:
+            return [
+                f"{entry.path} has shape {value.shape}, which does not fit {entry.shape} with {wanted} = {expected}"
+            ]
+    if not np.all(np.isfinite(value)):
+        return [f"{entry.path} holds a number that is not finite"]
+    return []
+
+
+def _body_checks(body: Body) -> dict[str, bool]:
+    picture, shapes = body.picture, body.picture.shapes if body.picture is not None else None
+    return {
+        "hash is not 64 hex digits": len(body.how.hash) == 64 and set(body.how.hash) <= set("0123456789abcdef"),
+        "mass must be above 0": body.total_mass > 0,
+        "frequency must be above 0 and ascending": body.modes == 0
+        or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),
+        "damping_ratio must lie between 0 and 1": bool(np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))),
+        "sensors/names does not fit the points": body.sensors is None
+        or len(body.sensors.names) == len(body.sensors.points) == len(body.sensors.rows) / 3,
+        "skin/faces names a point that is not there": body.skin is None or _inside(body.skin.faces, body.skin.points),
+        "picture/shapes/quads names a point that is not there": shapes is None or _inside(shapes.quads, shapes.points),
+        "picture/loads does not fit the surface": picture is None or picture.loads.shape[1] == len(picture.points),
+        "picture/quads names a point that is not there": picture is None or _inside(picture.quads, picture.points),
+    }
+
+
+def _inside(quads: np.ndarray, points: np.ndarray) -> bool:
+    return bool(np.all((quads >= 0) & (quads < len(points))))
+
+
+def _flank_checks(flank: Flank) -> dict[str, bool]:
+    offsets = flank.static.shape[2]
+    return {
+        "flank/teeth must be 3 or more": flank.teeth >= 3,
+        "flank/r_b, face_width and strip_half_width must be above 0": min(
+            flank.r_b, flank.face_width, flank.strip_half_width
+        )
+        > 0,
+        "flank/static must hold the tooth offsets −K … K, K at least 3, or all": offsets == flank.teeth
+        or (7 <= offsets < flank.teeth and offsets % 2 == 1),
+        "flank/beta_b must lie between −π/4 and π/4": abs(flank.beta_b) < np.pi / 4,
+        "there must be a mode, a roll point and a width function": min(flank.rows.shape) > 0,
+        "flank/part: the two modes of a pair must follow each other": _pairs_sound(flank),
+        "flank/diameter must lie between 0 and z/2": bool(
+            np.all((flank.diameter >= 0) & (2 * flank.diameter <= flank.teeth))
+        ),
+        "flank/parity must be −1, 0 or +1": bool(np.all(np.abs(flank.parity) <= 1)),
+        "flank/roll must ascend inside flank/roll_range": bool(
+            np.all(np.diff(np.concatenate([flank.roll_range[:1], flank.roll, flank.roll_range[1:]])) > 0)
+        ),
+    }
+
+
+def _pairs_sound(flank: Flank) -> bool:
+    first, second = flank.part == 1, flank.part == 2
+    follows = np.concatenate([[False], first[:-1]])
+    same = np.concatenate([[True], np.diff(flank.diameter) == 0])
+    return bool(np.all((flank.part >= 0) & (flank.part <= 2))) and bool(
+        np.all(second == follows) and np.all(same[second])
+    )
 
 
 TEXTS = {

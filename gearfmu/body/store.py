@@ -25,7 +25,7 @@ from gearfmu.body.layout import (
 from gearfmu.errors import BodyError
 from gearfmu.files import Format, reading, writing
 from gearfmu.reduction.cyclic.frf import FrfError
-from gearfmu.reduction.cyclic.spin import Spin
+from gearfmu.reduction.cyclic.modal import Spin
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms

@@ -13,7 +13,6 @@ import scipy.sparse as sp
 
 from gearfmu.body.body import Body, How, Node, Sensors, Skin
 from gearfmu.body.imported import imported_carrier_order
-from gearfmu.body.parts import provenance
 from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.basis import Size
@@ -53,7 +52,7 @@ def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> B
     _tell(progress, f"carrier: {carrier.method}", 0.5)
     how = How.of(carrier, carrier.method, mesh)
     body = whole_body(full, how, Size(carrier.modes), Judging.over(damping_ratio=carrier.modal_damping))
-    return replace(body, how=replace(how, provenance=provenance(time.process_time() - started)))
+    return replace(body, how=how.since(started))
 
 
 @dataclass(frozen=True)
@@ -135,7 +134,7 @@ def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> B
     return replace(
         body,
         name=housing.name,
-        how=replace(how, provenance=provenance(time.process_time() - started)),
+        how=how.since(started),
         nodes=tuple(replace(node, span=found.spans.get(node.name)) for node in body.nodes),
     )
 

@@ -28,7 +28,7 @@ class Harmonic:
     Quantities are those of one sector: φᴴ M φ of a vector is its mass product over one sector.
     rigid : (size, r) rigid motions of this harmonic, mass-normalised over one sector; r = 0 for ν ≥ 2. rigid_parts :
     (6, r) the same as combinations of the rigid motions of the sector. surface (motions of the space, amplitudes):
-    those motions of the rigid surface that belong to this harmonic.
+    those motions of the rigid surface that belong to this harmonic. weight : 2 where it stands for ν and −ν, else 1.
     """
 
     def __init__(self, space: SectorSpace, nodal_diameter: int):
@@ -37,6 +37,7 @@ class Harmonic:
         self.is_real = nodal_diameter == 0 or 2 * nodal_diameter == space.teeth
         self.phase = float(round(np.cos(angle))) if self.is_real else complex(np.cos(angle), np.sin(angle))
         self.dtype = float if self.is_real else complex
+        self.weight = 1 if self.is_real else 2
         self.surface = self._surface_motions()
         self.size = space.interior + space.cut + self.surface.shape[1]
         self.rigid_parts, self.rigid = self._rigid_motions()

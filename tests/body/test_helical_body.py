@@ -15,8 +15,9 @@ from verbs import call
 
 from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies
 from gearfmu.body.layout import entries_of, value_of
-from gearfmu.body.parts import drawn_counts, kept_offsets
+from gearfmu.body.pictures import drawn_counts
 from gearfmu.body.store import save_body
+from gearfmu.body.toothed import kept_offsets
 from gearfmu.errors import BodyError
 from gearfmu.stagefile.stage import load_stage
 

@@ -14,8 +14,7 @@ from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.spinning import growth, leave_axial, stress_stiffness, turn_quarter
-from gearfmu.reduction.cyclic.modal import elastic_modes
-from gearfmu.reduction.cyclic.spin import FamilySpin, family_spin
+from gearfmu.reduction.cyclic.modal import FamilySpin, elastic_modes, family_spin
 
 RADIUS, THICKNESS, HEIGHT, SECTORS = 0.05, 5e-4, 4e-3, 24
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gearfmu.body import parts
+from gearfmu.body import toothed
 from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
 from gearfmu.stage.assembly import assemble, blob, compact, meshes, teeth
@@ -41,7 +41,7 @@ def shape(field: str) -> list[str]:
         ("gk_model.c", "MODEL_VERSION", assemble.MODEL_VERSION),
         ("gk_model.h", "LEADS", teeth.FLANK_WIDTHS),
         ("gk_model.h", "OFFSETS", len(teeth.OFFSETS)),
-        ("gk_model.h", "OFFSETS", 2 * parts._OFFSETS + 1),
+        ("gk_model.h", "OFFSETS", 2 * toothed._OFFSETS + 1),
         ("gk_setup.h", "FAR", compact.RANK),
         ("gk_vars.c", "INSTANCES", instance.INSTANCES),
         ("gk_data.h", "MAX_PAIRS", instance.PLACES),

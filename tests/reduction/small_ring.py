@@ -11,12 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 from blocks import free_body
 
-from gearfmu.body.parts import tooth_flank
 from gearfmu.fem import hex20
 from gearfmu.femesh import ring_sector
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.couplings import Elements
-from gearfmu.reduction.cyclic.flank import flank_loads
+from gearfmu.reduction.cyclic.flank import flank_loads, tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
 from gearfmu.stagefile.forms.expand import rewritten
@@ -57,7 +56,7 @@ def geometry(beta: float) -> InternalGearGeometry:
 @lru_cache(maxsize=4)
 def coarse(beta: float = 0.0) -> SectorBody:
     own = geometry(beta)
-    return SectorBody(ring_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec(), internal=True))
+    return SectorBody(ring_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec()))
 
 
 @lru_cache(maxsize=2)

@@ -13,10 +13,10 @@ from scipy.interpolate import BarycentricInterpolator
 from turned_rows import on_tooth
 
 from gearfmu.body import Body, load_bodies, reduce_body
-from gearfmu.body.parts import tooth_flank
 from gearfmu.errors import ModelError
 from gearfmu.femesh import sector_mesh
 from gearfmu.kernel import Kernel
+from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.stage import StageModel, assemble
@@ -123,7 +123,7 @@ def statics(set_spec: Stage) -> Statics:
     ring = set_spec.by_file["ring"]
     geometry = gear_shape(ring)
     mesh = sector_mesh(geometry, ring.face_width, MESH)
-    return static_tables(SectorBody(mesh, ring.material, *tooth_flank(geometry, ring, True)), [])
+    return static_tables(SectorBody(mesh, ring.material, *tooth_flank(geometry, ring)), [])
 
 
 @pytest.fixture(scope="module")

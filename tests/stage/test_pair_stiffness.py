@@ -86,15 +86,15 @@ def clamped_compliance(gear: GearSpec, shape: GearGeometry, roll: float, scale: 
     keep = np.flatnonzero((abs(space.to_nodes).T @ held.ravel())[:size] == 0)
     total = 0.0
     for diameter in body.diameters():
-        family = body.family(0, diameter)
-        cut = sp.hstack([sp.csr_array((space.cut, space.interior)), family.harmonic.phase * sp.eye_array(space.cut)])
+        harmonic = space.harmonic(diameter)
+        cut = sp.hstack([sp.csr_array((space.cut, space.interior)), harmonic.phase * sp.eye_array(space.cut)])
         expand = sp.csc_array(sp.vstack([sp.eye_array(size), cut]))[:, keep]
-        load = family.flank[keep, 0]
+        load = body.tooth_forces(harmonic, np.array([0]))[keep, 0]
         system = sp.csc_matrix(expand.conj().T @ stiffness @ expand)
         solution = sla.splu(
             system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         ).solve(load)
-        total += family.weight / mesh.teeth * (load.conj() @ solution).real
+        total += harmonic.weight / mesh.teeth * (load.conj() @ solution).real
     return total
 
 

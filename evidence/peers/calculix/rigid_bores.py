@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
+from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stagefile.forms.general import Stage

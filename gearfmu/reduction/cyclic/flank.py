@@ -3,14 +3,14 @@
 The load of roll point s, width function a has the density (1/b) P_a(2z/b) across the face width and 1/L along the
 involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clipped at form circle and tip (L: the length that
 is left). It acts along the outward normal of the analytic flank, or along the profile. A helical flank is the same
-involute in every transverse section, turned by z·twist: roll, strip and profile direction are those of the section at
+involute in every transverse section, turned by z·twist. Roll, strip and profile direction are those of the section at
 z, and the normal has an axial component,
     n = cos β_b n_t(s, z) − sg sin β_b e_z,     e_p = e_r(t) turned by z·twist    (β_b > 0: right-handed),
 and the opposite one on the flanks of a ring.
 e_p points to growing roll, lies in the transverse plane and in the flank, square to n: the direction in which flanks of
-gears on parallel axes slide on each other. Integration runs over the quadratic surface
-elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s
-ds/r_b), in which positions and normals are smooth down to the base circle.
+gears on parallel axes slide on each other. Integration runs over the quadratic surface elements, split exactly where
+the strip begins and ends: rows are smooth in s. Its variable is the roll (dσ = s ds/r_b), in which positions and
+normals are smooth down to the base circle.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ import numpy as np
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
 from gearfmu.geometry import involute
+from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.stagefile.forms.shapes import GearShape
 
 _GAUSS_ROLL = np.polynomial.legendre.leggauss(6)
 _GAUSS_WIDTH = np.polynomial.legendre.leggauss(6)
@@ -85,6 +87,23 @@ class ToothFlank:
         return 0.5 * (low + high) + 0.5 * (high - low) * x
 
 
+@dataclass(frozen=True)
+class Points:
+    """Where the flank is loaded: roll points (R,), m, and the number A of width functions P_0 … P_{A−1}."""
+
+    rolls: np.ndarray
+    functions: int
+
+
+def tooth_flank(geometry: GearShape, gear: Any) -> tuple[ToothFlank, Points]:
+    """Flank and load points of a gear: its geometry, and what a table says about it (face_width, body)."""
+    flank = ToothFlank(
+        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width,
+        isinstance(geometry, InternalGearGeometry), geometry.beta_b,
+    )  # fmt: skip
+    return flank, Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+
+
 Direction = Callable[[np.ndarray, int, np.ndarray], np.ndarray]
 
 
@@ -125,14 +144,6 @@ def flank_loads(
     places: Any = (slice(None), slice(None), patch.quads)  # numpy's types know no slices here
     np.add.at(loads, places, per_node)
     return loads.reshape(len(points.rolls), points.functions, -1)
-
-
-@dataclass(frozen=True)
-class Points:
-    """Where the flank is loaded: roll points (R,), m, and the number A of width functions P_0 … P_{A−1}."""
-
-    rolls: np.ndarray
-    functions: int
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfmu.fem.harmonic import flexibilities
+from gearfmu.fem.harmonic import Harmonic, flexibilities
 from gearfmu.reduction.cyclic.modal import Modes, Progress
-from gearfmu.reduction.cyclic.sector import Family, SectorBody
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
 
 BAND = (50.0, 10e3)
@@ -145,33 +145,32 @@ def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress | None) ->
     """Fᵀ C (M C)^j F for j = 1, 2, 3 over the whole body, flank loads on tooth 0 and bore loads."""
     size = len(inputs) + 6
     total = [np.zeros((size, size)) for _ in range(3)]
-    for index in range(len(body.spaces)):
-        diameters = body.diameters()
+    diameters = body.diameters()
+    for space in body.spaces:
         for start in range(0, len(diameters), _AT_ONCE):
             if progress:
                 progress(f"frequency response, nodal diameter {start}", start / len(diameters))
-            families = [body.family(index, nu) for nu in diameters[start : start + _AT_ONCE]]
-            _add_moments(total, body, families, inputs)
+            harmonics = [space.harmonic(nu) for nu in diameters[start : start + _AT_ONCE]]
+            _add_moments(total, body, harmonics, inputs)
     return total
 
 
-def _add_moments(total: list[np.ndarray], body: SectorBody, families: list[Family], inputs: np.ndarray) -> None:
-    harmonics = [family.harmonic for family in families]
+def _add_moments(total: list[np.ndarray], body: SectorBody, harmonics: list[Harmonic], inputs: np.ndarray) -> None:
     ports, loads = [], []
-    for family in families:
-        seen = np.flatnonzero(np.isin(inputs, family.columns))
-        own = [family.loads(inputs[seen]) / body.teeth]
-        if family.harmonic.nodal_diameter <= 1:  # no other moves the bore's node
-            own.append(family.bore)
-        loads.append(np.hstack(own).astype(family.harmonic.dtype))
+    for harmonic in harmonics:
+        seen = np.flatnonzero(np.isin(inputs, body.seen_loads(harmonic.space.parity)))
+        own = [body.tooth_forces(harmonic, inputs[seen]) / body.teeth]
+        if harmonic.nodal_diameter <= 1:  # no other moves the bore's node
+            own.append(body.bore_forces(harmonic))
+        loads.append(np.hstack(own).astype(harmonic.dtype))
         bore = range(len(inputs), len(inputs) + 6 * (len(own) - 1))
         ports.append(np.ix_(*2 * [np.concatenate([seen, bore]).astype(int)]))
     first = flexibilities(harmonics, loads)
     inertia = [harmonic.mass(u) for harmonic, u in zip(harmonics, first, strict=True)]
     second = flexibilities(harmonics, inertia)
-    for family, at, u, mu, v in zip(families, ports, first, inertia, second, strict=True):
-        factor = body.teeth * family.weight
-        products = (u.conj().T @ mu, v.conj().T @ mu, v.conj().T @ family.harmonic.mass(v))
+    for harmonic, at, u, mu, v in zip(harmonics, ports, first, inertia, second, strict=True):
+        factor = body.teeth * harmonic.weight
+        products = (u.conj().T @ mu, v.conj().T @ mu, v.conj().T @ harmonic.mass(v))
         for matrix, product in zip(total, products, strict=True):
             matrix[at] += factor * product.real
 

@@ -3,11 +3,14 @@
 The sector of a helical gear is not its own mirror image: there is one family for each nodal diameter, of parity 0.
 
 A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same frequency, its real and its imaginary part.
+
+The terms of a spinning gear (`fem/spinning.py`) are Coriolis coupling, centrifugal load and stiffening, each per power
+of the speed: they are numbers of the body.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +21,8 @@ from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.low_fields import LowFields
 from gearfmu.fem.refined import refined_modes
+from gearfmu.fem.spinning import leave_axial, turn_quarter
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.reduction.cyclic.spin import FamilySpin, Spin, family_spin, join_spin
 
 _SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
 _SAMPLED = 1e-4  # residual of their modes
@@ -29,6 +32,36 @@ _SHAPES = 4  # lowest shapes of each family kept for pictures
 COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
 
 Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Spin:
+    """Terms of the turning axes, n real modes.
+
+    coupling (n, n), skew: ∫ρ φ_k · (e_z × φ_l), so that Ω turns the pair of a mode by 2Ω coupling; tilt (2, n),
+    kg^½·m: ∫ρ z (φ_x, φ_y), the same coupling with rigid tilt about x and y; load (n,), kg^½·m: centrifugal load per
+    Ω²; stiffening (n,): B of ω² = ω₀² + B Ω², stresses less softening; growth (2, R, A), m·s²: outward normal
+    displacement of tooth 0 under centrifugal load per Ω²; inertia (), kg·m²·s²: what that adds to the polar moment of
+    inertia per Ω².
+    """
+
+    coupling: np.ndarray
+    tilt: np.ndarray
+    load: np.ndarray
+    stiffening: np.ndarray
+    growth: np.ndarray
+    inertia: float
+
+
+@dataclass(frozen=True)
+class FamilySpin:
+    """The same of the k sector modes of one family, complex where they are pairs (weight 2): coupling (k, k), tilt (k,)
+    of the x component (that of y is i times it), load, stiffening (k,)."""
+
+    coupling: np.ndarray
+    tilt: np.ndarray
+    load: np.ndarray
+    stiffening: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -101,7 +134,7 @@ def elastic_modes(
                 if progress:
                     done = number / len(open_families)
                     progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
-                found[index, nu] = _made(body, index, mine, chosen)
+                found[index, nu] = _made(body, mine, chosen)
                 number += 1
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
@@ -148,24 +181,22 @@ def _limit(found: Iterable[_FamilyModes], count: int) -> float:
     return squared[min(count, len(squared)) - 1]
 
 
-def _made(
-    body: SectorBody, index: int, modes: tuple[Harmonic, np.ndarray, np.ndarray], sample: sp.csr_array
-) -> _FamilyModes:
+def _made(body: SectorBody, modes: tuple[Harmonic, np.ndarray, np.ndarray], sample: sp.csr_array) -> _FamilyModes:
     harmonic, squared, shapes = modes
-    family = body.family_of(index, harmonic)
-    shapes = shapes * np.sqrt(family.weight / body.teeth)
-    fields = body.spaces[index].to_nodes @ harmonic.expand(shapes)
+    weight, seen = harmonic.weight, body.seen_loads(harmonic.space.parity)
+    shapes = shapes * np.sqrt(weight / body.teeth)
+    fields = harmonic.space.to_nodes @ harmonic.expand(shapes)
     flank = np.zeros((body.load_matrix.shape[0], len(squared)), shapes.dtype)
-    flank[family.columns] = body.load_matrix[family.columns] @ fields
+    flank[seen] = body.load_matrix[seen] @ fields
     gauge = _gauge(flank[: body.profile_loads])
     fields, flank = fields * gauge, flank * gauge
-    bore = body.teeth * (family.bore_parts.conj().T @ (family.moments @ fields))
+    bore = body.teeth * (body.bore_parts(harmonic).conj().T @ (body.bore_moments[0] @ fields))
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
     for k in range(len(squared) if sample.shape[0] else 0):
         surface[k] = sample @ fields[:, k].reshape(-1, 3)
-    spin = family_spin(body, harmonic.nodal_diameter, family.weight, fields) if body.knows_stress else None
+    spin = family_spin(body, harmonic.nodal_diameter, weight, fields) if body.knows_stress else None
     pictures = fields[:, :_SHAPES].copy()
-    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
+    return _FamilyModes(weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
 
 
 def _gauge(rows: np.ndarray) -> np.ndarray:
@@ -216,5 +247,45 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
         shapes,
         tangent,
         np.array(columns["surface"]),
-        join_spin(body, spins) if spins else None,
+        _joined_spin(body, spins) if spins else None,
+    )
+
+
+def family_spin(body: SectorBody, diameter: int, weight: int, shapes: np.ndarray) -> FamilySpin:
+    """shapes (3N, k) of the sector, of unit mass over the whole body."""
+    scale, nodes = body.teeth / weight, body.mesh.nodes
+    mass = body.mass_matrix @ shapes
+    own = mass.conj().T
+    high = np.zeros_like(nodes)
+    high[:, 0] = nodes[:, 2]
+    along_x = high.ravel() @ mass
+    along_y = turn_quarter(high.ravel()) @ mass
+    stress = (body.stress_stiffness @ shapes.reshape(len(nodes), -1)).reshape(shapes.shape)
+    square = (shapes.conj() * (stress - body.mass_matrix @ leave_axial(shapes))).sum(axis=0).real
+    radial = leave_axial(nodes.ravel()) @ mass
+    return FamilySpin(
+        coupling=scale * (own @ turn_quarter(shapes)),
+        tilt=scale * (along_x - 1j * along_y) * (diameter == 1),
+        load=scale * radial.real * (diameter == 0),
+        stiffening=scale * square,
+    )
+
+
+def _joined_spin(body: SectorBody, entries: Sequence[tuple[FamilySpin, int, int]]) -> Spin:
+    """entries: of every real mode its family, its number there, and its part (0 single, 1 and 2 of a pair)."""
+    n = len(entries)
+    coupling, tilt, load, stiffening = np.zeros((n, n)), np.zeros((2, n)), np.zeros(n), np.zeros(n)
+    for i, (family, k, part) in enumerate(entries):
+        rotated = family.tilt[k] * (-1j if part == 2 else 1)
+        tilt[:, i] = rotated.real, (1j * rotated).real
+        load[i], stiffening[i] = family.load[k], family.stiffening[k]
+        for j, (other, m, there) in enumerate(entries):
+            if other is family:
+                turned = family.coupling[k, m] * (1j if part == 2 else 1) * (-1j if there == 2 else 1)
+                coupling[i, j] = turned.real
+    rows = body.load_matrix[: body.flank_count] @ body.growth
+    shape = (2, len(body.points.rolls), body.points.functions)
+    radial = leave_axial(body.mesh.nodes.ravel()) @ (body.mass_matrix @ body.growth)
+    return Spin(
+        0.5 * (coupling - coupling.T), tilt, load, stiffening, rows.reshape(shape), float(2 * body.teeth * radial)
     )

@@ -1,9 +1,8 @@
-"""The full-order gear body on one sector, with everything that loads it: tooth flanks and bore; of an internal gear
-tooth flanks, rim (in place of the bore) and the sector's own patch of the rim, where a mount may hold it."""
+"""The full-order gear body on one sector, with everything that loads it: tooth flanks and bore. An internal gear has
+its rim in place of the bore, and the sector's own patch of the rim, where a mount may hold it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,52 +17,13 @@ from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
-@dataclass(frozen=True)
-class Family:
-    """One harmonic of one mirror parity with its loads.
-
-    harmonic : nodal diameter ν of a parity.
-    columns : which loads of a tooth (flat index over side, roll, function; then the patch; then side, roll, function of
-    the loads along the profile) this parity sees. rows : all loads of a tooth, (m, 3N). moments : (6, 3N) share of the
-    bore. bore_parts : (6, 6) Fourier coefficient of the unit loads on the bore node (force x, y, z, moment x, y, z in
-    the body frame) in `moments`: f_j = Σ_ν momentsᵀ bore_parts_ν e^{iθ_ν j} over ν and −ν.
-    weight : 2 for 0 < ν < z/2 (ν and −ν together), else 1.
-    """
-
-    harmonic: Harmonic
-    columns: np.ndarray
-    rows: sp.csr_array
-    moments: np.ndarray
-    bore_parts: np.ndarray
-
-    @property
-    def weight(self) -> int:
-        return 1 if self.harmonic.is_real else 2
-
-    @property
-    def flank(self) -> np.ndarray:
-        """Force of the loads `columns` on one tooth, (size, c)."""
-        return self.loads(self.columns)
-
-    def loads(self, chosen: np.ndarray) -> np.ndarray:
-        """Force of some loads of one tooth, (size, k)."""
-        return self._reduced(self.rows[chosen].toarray().T)
-
-    @property
-    def bore(self) -> np.ndarray:
-        """Force of the unit loads on the bore node, (size, 6)."""
-        return self._reduced(self.moments.T) @ self.bore_parts
-
-    def _reduced(self, nodal: np.ndarray) -> np.ndarray:
-        return self.harmonic.reduce(self.harmonic.space.from_nodes @ nodal)
-
-
 class SectorBody:
     """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
 
     mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
     flank : ToothFlank. points : where the flanks are loaded. rigid_bore : the surface of the bore (of a ring: of the
     rim) moves as one rigid body, as on a stiff shaft; else it deforms about its mean motion.
+    load_matrix : all loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows.
     Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
     """
 
@@ -78,6 +38,7 @@ class SectorBody:
             bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
         self.material, self.spaces = material, sector_spaces(sector)
+        self.load_matrix = self._all_loads()
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
@@ -114,9 +75,7 @@ class SectorBody:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
         return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
 
-    @cached_property
-    def load_matrix(self) -> sp.csr_array:
-        """All loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows."""
+    def _all_loads(self) -> sp.csr_array:
         parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
         return sp.csr_array(sp.vstack(parts))
 
@@ -133,13 +92,13 @@ class SectorBody:
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
         """One sector's share of the bore's (ring: rim's) averaging node: b (6, 3N), and g (6, 6) of all of it."""
         moments, gram = surface_moments(self.mesh.nodes, self._held_faces)
-        return moments, turned_sum(gram, self.teeth)
+        return moments, self.turned_sum(gram)
 
     @cached_property
     def inertia(self) -> np.ndarray:
         """Mass matrix of the whole rigid body about the origin, (6, 6): kg, kg·m, kg·m²."""
         fields = rigid_modes(self.mesh.nodes)
-        return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
+        return self.turned_sum(fields.T @ (self.mass_matrix @ fields))
 
     @property
     def knows_stress(self) -> bool:
@@ -164,44 +123,38 @@ class SectorBody:
         """Nodal diameters 0 … z/2."""
         return range(self.teeth // 2 + 1)
 
-    def family(self, space_index: int, nodal_diameter: int) -> Family:
-        """Loads and operators of one nodal diameter of one parity."""
-        return self.family_of(space_index, self.spaces[space_index].harmonic(nodal_diameter))
+    def tooth_forces(self, harmonic: Harmonic, chosen: np.ndarray) -> np.ndarray:
+        """Force of some loads of one tooth on a harmonic, (size, k)."""
+        return harmonic.reduce(harmonic.space.from_nodes @ self.load_matrix[chosen].toarray().T)
 
-    def family_of(self, space_index: int, harmonic: Harmonic) -> Family:
-        """`family` of a harmonic that is there already."""
-        space = self.spaces[space_index]
-        parts = self._bore_parts(harmonic.nodal_diameter)
-        parts = parts.real if harmonic.is_real else parts
-        return Family(harmonic, self.seen_loads(space.parity), self.load_matrix, self.bore_moments[0], parts)
+    def bore_forces(self, harmonic: Harmonic) -> np.ndarray:
+        """Force of the unit loads on the bore node on a harmonic, (size, 6)."""
+        return harmonic.reduce(harmonic.space.from_nodes @ self.bore_moments[0].T) @ self.bore_parts(harmonic)
 
-    def _bore_parts(self, nodal_diameter: int) -> np.ndarray:
+    def bore_parts(self, harmonic: Harmonic) -> np.ndarray:
+        """Fourier coefficient (6, 6) of the unit loads on the bore node (force x, y, z, moment x, y, z in the body
+        frame) in the moments b of `bore_moments`: f_j = Σ_ν bᵀ parts_ν e^{iθ_ν j} over ν and −ν."""
         parts, h = np.zeros((6, 6), complex), np.linalg.inv(self.bore_moments[1])
-        if nodal_diameter == 0:
+        if harmonic.nodal_diameter == 0:
             parts[[2, 5]] = h[[2, 5]]
-        elif nodal_diameter == 1:
-            parts[0:2], parts[3:5] = 0.5 * _rotating(h[0:2]), 0.5 * _rotating(h[3:5])
-        return parts
+        elif harmonic.nodal_diameter == 1:  # x and y of body-fixed vectors are amplitudes of e^{iα} in turning sectors
+            for x, y in ((0, 1), (3, 4)):
+                amplitude = h[x] - 1j * h[y]
+                parts[x], parts[y] = 0.5 * amplitude, 0.5 * (1j * amplitude)
+        return parts.real if harmonic.is_real else parts
 
     def seen_loads(self, parity: int) -> np.ndarray:
-        """Numbers of the loads of a tooth that fields of this parity see."""
+        """Numbers of the loads of a tooth that fields of this parity see, in `load_matrix`."""
         function = np.tile(np.arange(self.points.functions), 2 * len(self.points.rolls))
         odd = np.concatenate([function % 2, [0, 0, 1][: len(self.patch_rows)], function % 2])
         odd = odd[: self.load_matrix.shape[0]]
         return np.flatnonzero({1: odd == 0, -1: odd == 1, 0: odd >= 0}[parity])
 
-
-def _rotating(h: np.ndarray) -> np.ndarray:
-    """x and y components (2, 6) of body-fixed vectors as amplitudes of e^{iα} in the turning sector frames."""
-    amplitude = h[0] - 1j * h[1]
-    return np.stack([amplitude, 1j * amplitude])
-
-
-def turned_sum(matrix: np.ndarray, teeth: int) -> np.ndarray:
-    """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
-    total = np.zeros((6, 6))
-    for angle in 2 * np.pi * np.arange(teeth) / teeth:
-        c, s = np.cos(angle), np.sin(angle)
-        turn = np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
-        total += turn @ matrix @ turn.T
-    return total
+    def turned_sum(self, matrix: np.ndarray) -> np.ndarray:
+        """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
+        total = np.zeros((6, 6))
+        for angle in 2 * np.pi * np.arange(self.teeth) / self.teeth:
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+            total += turn @ matrix @ turn.T
+        return total

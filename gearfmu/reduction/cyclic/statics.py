@@ -3,6 +3,11 @@
 Each harmonic contributes Fᴴ C_ν F; tooth offset m is their Fourier sum. For a body that is its own mirror image about
 mid-width, loads of even and odd width functions do not see each other: those entries are zero exactly. Loads along the
 profile (friction) are answered on the own tooth only.
+
+Loads are condensed onto the cuts. With y = L⁻¹ f_I of the factor of the interior and g = f_B − K_BI K_II⁻¹ f_I,
+    fᴴ C_ν f' = yᵀ y' + g_νᴴ S_ν⁻¹ g'_ν,        g_ν = g on (minus, plus) seen by ν,
+exactly, S_ν as of `fem.harmonic`. yᵀ y' and g are the same for all ν. For ν = 0 and 1 loads are balanced first by the
+inertia forces of rigid motion, which are loads of the sector like others.
 """
 
 from __future__ import annotations
@@ -10,10 +15,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
 
-from gearfmu.reduction.cyclic.condensed import CondensedLoads
+from gearfmu.fem.cyclic import SectorSpace
+from gearfmu.fem.harmonic import Harmonic
 from gearfmu.reduction.cyclic.modal import Progress
 from gearfmu.reduction.cyclic.sector import SectorBody
+
+_NEGLIGIBLE = 1e-11  # of the largest: singular values of the loads on the cuts that are left out
+_COLUMNS = 128
 
 
 @dataclass(frozen=True)
@@ -45,7 +56,7 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
     own = np.zeros((every, every))
     pictures = np.zeros((len(picture_loads), z, body.mesh.nodes.size))
     for index, space in enumerate(body.spaces):
-        loads = CondensedLoads(body, space)
+        loads = _CondensedLoads(body, space)
         seen, normal = loads.columns, np.flatnonzero(loads.columns < size)
         shown = [load for load in picture_loads if load in seen]
         rest = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
@@ -56,15 +67,15 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
         table[0] += inner[np.ix_(normal, normal)]
         own[np.ix_(seen, seen)] += inner + loads.parts.T @ rest.kernels[0] @ loads.parts
         for nu in (0, 1):
-            family = body.family(index, nu)
-            product = loads.compliance(family.harmonic, loads.tooth, loads.tooth) - inner
-            own[np.ix_(seen, seen)] += family.weight / z * product.real
-            turn = family.weight / z * np.exp(-2j * np.pi * nu * np.arange(z) / z)
+            harmonic = space.harmonic(nu)
+            product = loads.compliance(harmonic, loads.tooth, loads.tooth) - inner
+            own[np.ix_(seen, seen)] += harmonic.weight / z * product.real
+            turn = harmonic.weight / z * np.exp(-2j * np.pi * nu * np.arange(z) / z)
             for m in range(z):
                 table[m] += (turn[m] * product[np.ix_(normal, normal)]).real
-            bore = loads.bore @ family.bore_parts
-            fb[seen] += family.weight * loads.compliance(family.harmonic, loads.tooth, bore).real
-            bb += z * family.weight * loads.compliance(family.harmonic, bore, bore).real
+            bore = loads.bore @ body.bore_parts(harmonic)
+            fb[seen] += harmonic.weight * loads.compliance(harmonic, loads.tooth, bore).real
+            bb += z * harmonic.weight * loads.compliance(harmonic, bore, bore).real
         ff[np.ix_(np.arange(z), seen[normal], seen[normal])] += table
         for number, load in enumerate(shown):
             pictures[picture_loads.index(load)] += _picture(body, index, load, rest.moved[:, :, [number]])
@@ -72,9 +83,68 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
     return replace(shaped, **_along_profile(body, 0.5 * (own + own.T)))
 
 
+class _CondensedLoads:
+    """Loads of one space, k in all: those of a tooth that the space sees (`count`), six of the bore, six of inertia.
+
+    gram : yᵀ y', (k, k). border : g, (b, k). patterns (b, r), parts (r, count): the tooth's columns of g as a product.
+    """
+
+    def __init__(self, body: SectorBody, space: SectorSpace):
+        self.columns = body.seen_loads(space.parity)
+        self.count = len(self.columns)
+        teeth = space.from_nodes @ body.load_matrix[self.columns].T
+        others = np.hstack([space.from_nodes @ body.bore_moments[0].T, space.mass_matrix @ space.rigid])
+        loads = sp.csc_array(sp.hstack([teeth, sp.csc_array(others)]))
+        inner = np.empty((space.interior, loads.shape[1]))
+        self.border, self._motion = loads[space.interior :].toarray(), loads.T.dot(space.rigid).T
+        for first in range(0, loads.shape[1], _COLUMNS):
+            columns = slice(first, first + _COLUMNS)
+            inner[:, columns], passed = space.factor.forward(loads[: space.interior, columns].toarray())
+            self.border[:, columns] += passed
+        self.gram = inner.T @ inner
+        self.patterns, self.parts = _low_rank(self.border[:, : self.count])
+
+    @property
+    def bore(self) -> np.ndarray:
+        """Columns of the bore's six loads among all, as a selection (k, 6)."""
+        return np.eye(len(self.gram))[:, self.count : self.count + 6]
+
+    @property
+    def tooth(self) -> np.ndarray:
+        """Columns of the tooth's loads among all, as a selection (k, count)."""
+        return np.eye(len(self.gram))[:, : self.count]
+
+    def compliance(self, harmonic: Harmonic, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """leftᴴ C_ν right of combinations of the k loads."""
+        left, right = (self._balanced(harmonic, parts) for parts in (left, right))
+        cut = harmonic.reduce_border(self.border)
+        return left.conj().T @ self.gram @ right + (cut @ left).conj().T @ harmonic.solve_cut(cut @ right)
+
+    def kernel(self, harmonic: Harmonic) -> tuple[np.ndarray, np.ndarray]:
+        """Of ν ≥ 2: cut displacement (c, r) per load in `patterns`, and their compliance (r, r)."""
+        cut = harmonic.reduce_border(self.patterns)
+        moved = harmonic.solve_cut(cut)
+        return moved, cut.conj().T @ moved
+
+    def _balanced(self, harmonic: Harmonic, parts: np.ndarray) -> np.ndarray:
+        if not harmonic.rigid.shape[1]:
+            return parts
+        rigid = harmonic.rigid_parts
+        parts = parts.astype(np.result_type(parts, rigid))
+        parts[-6:] -= rigid @ (rigid.conj().T @ (self._motion @ parts))
+        return parts
+
+
+def _low_rank(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal columns, and rows, whose product is the matrix."""
+    left, values, right = sl.svd(matrix, full_matrices=False, check_finite=False)
+    kept = values > _NEGLIGIBLE * values.max(initial=0.0)
+    return left[:, kept], values[kept, None] * right[kept]
+
+
 @dataclass(frozen=True)
 class _Diameters:
-    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `CondensedLoads.kernel` by tooth offset, and
+    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `_CondensedLoads.kernel` by tooth offset, and
     moved (ν, c, p), the cut's displacement under the loads that are shown."""
 
     kernels: np.ndarray
@@ -82,7 +152,7 @@ class _Diameters:
 
 
 def _all_diameters(
-    body: SectorBody, index: int, loads: CondensedLoads, shown: np.ndarray, progress: Progress | None
+    body: SectorBody, index: int, loads: _CondensedLoads, shown: np.ndarray, progress: Progress | None
 ) -> _Diameters:
     z, found = body.teeth, []
     diameters = np.arange(2, z // 2 + 1)
@@ -120,9 +190,9 @@ def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.n
     inside = space.factor.backward(inner * turn.real.sum(axis=0), border)
     total = (space.to_nodes @ np.concatenate([inside, border])).T
     for nu in (0, 1):
-        family = body.family(index, nu)
-        response = space.to_nodes @ family.harmonic.expand(family.harmonic.flexibility(family.loads(np.array([load]))))
-        around = family.weight / z * np.exp(2j * np.pi * nu * np.arange(z) / z)
+        harmonic = space.harmonic(nu)
+        response = space.to_nodes @ harmonic.expand(harmonic.flexibility(body.tooth_forces(harmonic, np.array([load]))))
+        around = harmonic.weight / z * np.exp(2j * np.pi * nu * np.arange(z) / z)
         total += np.multiply.outer(around, response[:, 0]).real
     return total
 

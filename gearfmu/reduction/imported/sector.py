@@ -14,7 +14,7 @@ from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
-from gearfmu.reduction.cyclic.sector import SectorBody, turned_sum
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.imported.flank import tooth_loads
 
 
@@ -44,6 +44,7 @@ class ImportedSector(SectorBody):
         self.spaces = sector_spaces(
             Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
         )
+        self.load_matrix = self._all_loads()
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction)
@@ -69,7 +70,7 @@ class ImportedSector(SectorBody):
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
         """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
         moments, gram = patch_moments(self.cut.nodes, self.faces.within(self.bore))
-        return moments, turned_sum(gram, self.teeth)
+        return moments, self.turned_sum(gram)
 
 
 def _repeated(elements: dict[str, np.ndarray]) -> np.ndarray:
