@@ -133,7 +133,7 @@ def errors(rigid: RigidSet, torque: float = TORQUE, positions: int = 12) -> TeRe
 def test_a_vanishing_helix_is_the_spur_set() -> None:
     """But for what helical slices yield of their own, which spur gears go without."""
     models = [by_functions_alone(replace(HELICAL, helix_angle=beta).model()) for beta in (1e-7, 0.0)]
-    nearly, spur = (loaded_te(model, [TORQUE], 6, **FOUNDATION) for model in models)
+    nearly, spur = (loaded_te(model, [TORQUE], 3, **FOUNDATION) for model in models)
     assert np.abs(nearly.te - spur.te).max() < 1e-6 * np.abs(spur.te).max()
     assert np.abs(nearly.sharing - spur.sharing).max() < 1e-6
 

@@ -90,8 +90,9 @@ def test_load_and_stiffness_agree(name: str) -> None:
 
 
 def test_a_turned_stage_has_turned_bearings() -> None:
-    """All axes 40° further about z: loads and stiffnesses turn with them, averaged over the cage to 1 %."""
-    spec, bodies = loaded(TRAIN)
+    """All axes 40° further about z: loads and stiffnesses turn with them, averaged over the cage to 0.3 %
+    (0.12 %); unturned they would be 11 % off."""
+    spec, bodies = loaded(PAIR)
     c, s = math.cos(math.radians(40)), math.sin(math.radians(40))
     turned = {
         name: rotor.model_copy(
@@ -100,11 +101,11 @@ def test_a_turned_stage_has_turned_bearings() -> None:
         for name, rotor in spec.rotors.items()
     }
     plane = np.array([[c, -s], [s, c]])
-    other, own = settled(spec.model_copy(update={"rotors": turned}), bodies), found(TRAIN)
+    other, own = settled(spec.model_copy(update={"rotors": turned}), bodies), found(PAIR)
     for name, state in own.rests.items():
-        assert other.rests[name].load[:2] == pytest.approx(plane @ state.load[:2], rel=3e-3, abs=5.0)
+        assert other.rests[name].load[:2] == pytest.approx(plane @ state.load[:2], abs=0.1)
         one, two = own.tangents[name][:2, :2], other.tangents[name][:2, :2]
-        assert np.abs(two - plane @ one @ plane.T).max() < 0.01 * np.abs(one).max()
+        assert np.abs(two - plane @ one @ plane.T).max() < 3e-3 * np.abs(one).max()
 
 
 def test_without_load_only_preload_holds() -> None:
@@ -133,18 +134,20 @@ def test_tapered_rollers_are_stiffer_than_balls() -> None:
 
 
 def test_an_axial_load_on_the_open_side_is_refused() -> None:
-    """The input shaft is pushed towards +z; an angular contact bearing that carries −z lets it go."""
-    spec, bodies = loaded(TRAIN)
-    angular = spec.bearings["6306"].model_copy(update={"contact_angle": math.radians(25.0), "clearance": 0.0})
+    """The pinion is pushed towards +z; one angular contact bearing in place of two lets it go where it carries −z.
+    (With 30° of contact a third of the radial load along the axis would not hold it either way.)"""
+    spec, bodies = loaded(PAIR)
+    single = spec.bearings["7305"].model_copy(update={"preload": 0.0, "contact_angle": math.radians(10.0)})
 
     def facing(side: str) -> Settled:
-        supports = [s.model_copy(update={"carries": side}) if s.name == "input_left" else s for s in spec.supports]
-        changed = {"bearings": spec.bearings | {"6306": angular}, "supports": tuple(supports)}
+        update = {"carries": side, "span": None}
+        supports = [s.model_copy(update=update) if s.name == "pinion" else s for s in spec.supports]
+        changed = {"bearings": spec.bearings | {"7305": single}, "supports": tuple(supports)}
         return settled(spec.model_copy(update=changed), bodies)
 
     with pytest.raises(ModelError, match="cannot carry 100 N"):
         facing("-z")
-    assert facing("+z").rests["input_left"].load[2] > 0.0
+    assert facing("+z").rests["pinion"].load[2] > 0.0
 
 
 def test_stages_without_rolling_bearings_have_none() -> None:
@@ -178,7 +181,7 @@ def springs(of: StageModel) -> tuple[dict[str, Any], np.ndarray]:
     return sections, np.diag(own) + np.asarray(sections["support_coupling0"]).reshape(own.size, own.size)
 
 
-@pytest.mark.parametrize("name", [TRAIN, PAIR])
+@pytest.mark.parametrize("name", [pytest.param(TRAIN, marks=pytest.mark.full), PAIR])
 def test_the_blob_holds_the_whole_tangent(name: str) -> None:
     sections, compliance = springs(model(name))
     names = [entry.split(".")[1] for entry in str(sections["support_names"]).split("|")]
