@@ -223,12 +223,6 @@ def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
     assert mean[1] < 0.8 * mean[0]
 
 
-@pytest.fixture(scope="module")
-def helical() -> StageModel:
-    stage = load_stage("helical_demo")
-    return assemble(stage, load_bodies(stage))
-
-
 @pytest.mark.parametrize("torque", [1.0, pytest.param(100.0, marks=pytest.mark.full)])
 def test_a_helical_pair_runs_on_oil(helical: StageModel, torque: float) -> None:
     run = {"level": 1.0, "effect.film": 1.0, "h": 5e-6}

@@ -222,12 +222,10 @@ def speeds(library: Path, h: float, integrator: float) -> np.ndarray:
 
 
 def test_central_drifts_where_the_step_does_not() -> None:
-    """Rattle of all planets at 0.5 µs: central is wrong at changes of contact, not much; dg4 is not."""
-    case = CASES["T2 five slices"]
-    settings = [{"integrator": scheme, "h": 5e-7} for scheme in (DG4, CENTRAL)]
-    drifts = [energies(started(case, STANDING, setting), 2000, 5e-7).drift for setting in settings]
-    print(drifts)
-    assert drifts[0] < 2e-6 and 1e-6 < drifts[1] < 0.05
+    """Rattle of all planets at 0.5 µs: central is wrong at changes of contact, not much; dg4 is not, at ten times that
+    (above)."""
+    case, setting = CASES["T2 five slices"], {"integrator": CENTRAL, "h": 5e-7}
+    assert 1e-6 < energies(started(case, STANDING, setting), 2000, 5e-7).drift < 0.05
 
 
 @pytest.mark.parametrize("level", [1.0, pytest.param(2.0, marks=pytest.mark.full)])
