@@ -52,7 +52,7 @@ def test_shapes_are_those_of_the_whole_body_and_mass_normalised(whole) -> None:
 
 def test_count_is_kept_and_pairs_stay_whole() -> None:
     mesh, material = pinion()
-    for count, expected in ((1, 2), (2, 2), (5, 5)):
+    for count, expected in ((1, 2), (5, 5)):
         body = cyclic_modes("pinion", mesh, material, count)
         numbers = [n for mode in body.modes for n in mode.numbers]
         assert numbers == list(range(1, expected + 1))
@@ -148,8 +148,8 @@ def test_the_ring_without_mounts_has_no_mounted_modes() -> None:
 def test_rigid_couplings_of_the_carrier() -> None:
     """Its bolts and its bore move as rigid bodies, which makes it stiffer than the bare carrier, not softer."""
     spec = load_stage("planetary54")
-    found = body_modes(spec, "carrier", 6, scale=0.4)
-    mesh, material = set_body("carrier", 0.4)
+    found = body_modes(spec, "carrier", 6, scale=0.3)
+    mesh, material = set_body("carrier", 0.3)
     assert np.all(frequencies(found)[:6] > frequencies(cyclic_modes("carrier", mesh, material, 6))[:6])
     assert all(mode.damping_ratio == spec.written.carrier.modal_damping for mode in found.modes)
     radius = np.hypot(found.points[:, 0], found.points[:, 1])

@@ -16,6 +16,7 @@ LONG = (  # more than ten seconds
 )  # fmt: skip
 OF_SETS = ("set_floating_sun", "set_planet_without_contact")
 SHORT = [name for name in SCENES if name in OF_SETS or not (name.startswith("set_") or name in LONG)]
+RELEASE = ("set_floating_sun", "pair_rattle_oiled", "pair_clutch_dump", "pair_hardly_any_load")  # others are like them
 
 
 def found(scene: str, case: Case) -> Row:
@@ -25,7 +26,9 @@ def found(scene: str, case: Case) -> Row:
     return Row(scene, case, finding)
 
 
-@pytest.mark.parametrize("scene", SHORT)
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=pytest.mark.full if name in RELEASE else ()) for name in SHORT]
+)
 def test_every_scene_runs_through_at_level_fast(scene: str) -> None:
     row = found(scene, Case("fast"))
     assert not row.failed, row.finding

@@ -179,14 +179,6 @@ def _modal(body: Body, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return rows @ rows.T, rows @ bore.T, bore @ bore.T
 
 
-def cut_near(body: Body, wish: float) -> float:
-    """Frequency (Hz) in the middle of the widest relative gap between modes within 15 % of the wished cut."""
-    near = body.frequency[(body.frequency < 1.2 * wish) & (body.frequency > 0.8 * wish)]
-    gaps = [(high / low, math.sqrt(low * high)) for low, high in zip(near, near[1:], strict=False)
-            if high > 0.85 * wish and low < 1.15 * wish]  # fmt: skip
-    return max(gaps)[1]
-
-
 def bore_angle(body: Body, time: np.ndarray, cut: float, damped: bool) -> np.ndarray:
     """Angle (rad) of the bore node of a free gear under a unit torque there from t = 0 on: rigid body, static share of
     the modes above `cut` (Hz), and every mode below it."""

@@ -38,6 +38,12 @@ def plain(spec: Stage, bodies: list[Body]) -> StageModel:
 
 
 @pytest.fixture(scope="session")
+def helical() -> StageModel:
+    stage = load_stage("helical_demo")
+    return assemble(stage, load_bodies(stage))
+
+
+@pytest.fixture(scope="session")
 def relieved(relief_spec: Stage, bodies: list[Body]) -> StageModel:
     """Tip relief on both gears."""
     return assemble(relief_spec, bodies)

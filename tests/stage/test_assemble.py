@@ -22,7 +22,7 @@ def spec():
 
 
 def test_equal_inputs_give_equal_bytes(spec):
-    hashes = {assemble(spec, load_bodies(spec)).hash for _ in range(3)}
+    hashes = {assemble.__wrapped__(spec, load_bodies(spec)).hash for _ in range(2)}  # tests/reuse.py would keep one
     assert len(hashes) == 1
 
 

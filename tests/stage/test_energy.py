@@ -5,7 +5,9 @@ closed contact; the balance of a loaded damped run closes; central is the same p
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,18 +44,19 @@ def helical_free() -> FreePair:
     return free_pair(spec, load_bodies(spec))
 
 
-QUICK = ("helical, free rattle", "helical, jammed 1 µm")
+HELICAL = ("helical, free rattle", "helical, jammed 1 µm")
+RELEASE = {"bearings 1e8 N/m", "bearings 1e9 N/m", "damped", "control: without η, under load"}
+RELEASE |= {name for name, case in energy.CASES.items() if case.stage == energy.HELICAL and name not in HELICAL}
+
+
+def cases(of: Mapping[str, energy.Case], build: str) -> list[Any]:
+    """Names of those of a build; some for make test-full."""
+    names = [name for name, case in of.items() if build in case.builds]
+    return [pytest.param(name, marks=pytest.mark.full if name in RELEASE else ()) for name in names]
 
 
 @pytest.mark.parametrize("build", ["double", "shipped"])
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.full) if case.stage == energy.HELICAL and name not in QUICK else name
-        for name, case in energy.CASES.items()
-        if "double" in case.builds
-    ],
-)
+@pytest.mark.parametrize("name", cases(energy.CASES, "double"))
 def test_invariant_holds_and_damping_never_adds(
     request: pytest.FixtureRequest, libraries: dict[str, Path | None], name: str, build: str
 ) -> None:
@@ -70,7 +73,7 @@ def test_invariant_holds_and_damping_never_adds(
         assert energy.keeps(case, line)
 
 
-@pytest.mark.parametrize("slices", [1, 5, 10])
+@pytest.mark.parametrize("slices", [*(pytest.param(n, marks=pytest.mark.full) for n in (1, 5)), 10])
 def test_free_rattle_of_50_ms(pair_free: FreePair, libraries: dict[str, Path | None], slices: int) -> None:
     case = energy.CASES["free rattle"]
     run = {**SHORT, "duration": 0.05, "libraries": libraries}
@@ -81,22 +84,22 @@ def test_free_rattle_of_50_ms(pair_free: FreePair, libraries: dict[str, Path | N
 
 @pytest.mark.parametrize("speed", [0.0, 0.1])
 def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -> None:
-    """100 000 steps in which gears that have sprung apart turn slowly and ring. Turns below the last place of a speed
-    in single precision gave 1.0e-5 and took 1.6e-5 of the energy at the start; rounding alone leaves 7e-7."""
+    """40 000 steps in which gears that have sprung apart turn slowly and ring. Turns below the last place of a speed
+    in single precision gave 4e-6 and took 6e-6 of the energy at the start; rounding alone leaves 4e-8."""
     rolling = {"pinion.w_start": speed, "wheel.w_start": -speed * 16 / 24}
     start = Rattle(load=2.0, play=2e-3, speed=0.0)
     kernel = started(pair_free, start, {"level": FAST, "h": 5e-6, "effect.hertz": 0, **rolling})
     elastic = started(pair_free, start, {"level": FAST, "effect.hertz": 0}).get("energy.stored")
     for port in kernel.ports:
         kernel.set(f"{port}.tau", 0.0)
-    stored = np.empty(500)
+    stored = np.empty(200)
     for i in range(len(stored)):
         kernel.step(i * 1e-3, 1e-3)
         stored[i] = kernel.get("energy.stored") - kernel.get("energy.work")
         assert kernel.get("mesh.contact") == 0
     trend = len(stored) * np.polyfit(np.arange(1, len(stored)), stored[1:], 1)[0]
     print(f"{speed} rad/s: {trend / elastic:.1e}")
-    assert abs(trend) < 2e-6 * elastic
+    assert abs(trend) < 4e-7 * elastic
 
 
 def test_contacts_that_take_turns_keep_their_energy(pair_free: FreePair) -> None:
@@ -108,7 +111,7 @@ def test_contacts_that_take_turns_keep_their_energy(pair_free: FreePair) -> None
     assert found.retried_steps == 0 and found.drift < energy.FLOAT and found.changes > 1300
 
 
-@pytest.mark.parametrize("name", [name for name, case in energy.CONTROLS.items() if case.builds != ("wrong",)])
+@pytest.mark.parametrize("name", cases(energy.CONTROLS, "no eta"))
 def test_controls_are_seen_to_fail(pair_free: FreePair, libraries: dict[str, Path | None], name: str) -> None:
     case = energy.CONTROLS[name]
     (build,) = case.builds
@@ -135,19 +138,21 @@ def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> n
     return np.array(samples)
 
 
+@pytest.fixture(scope="module")
+def converged(pair_free: FreePair, double_library: Path) -> np.ndarray:
+    return speeds(pair_free, double_library, 0.1e-6, DG4)
+
+
 @pytest.mark.parametrize("integrator, order", [(DG4, 4), (EM, 2), (CENTRAL, 2)])
 def test_order_in_closed_contact(
-    pair_free: FreePair, libraries: dict[str, Path | None], integrator: int, order: int
+    pair_free: FreePair, double_library: Path, converged: np.ndarray, integrator: int, order: int
 ) -> None:
     """T10: all modes below 50 kHz are exponential at these steps, the stiffness is constant."""
-    double = libraries["double"]
-    reference = speeds(pair_free, double, 0.1e-6, DG4)
     errors = [
-        np.sqrt(np.mean((speeds(pair_free, double, h, integrator) - reference) ** 2)) for h in (1.6e-6, 0.8e-6, 0.4e-6)
+        np.sqrt(np.mean((speeds(pair_free, double_library, h, integrator) - converged) ** 2)) for h in (0.8e-6, 0.4e-6)
     ]
-    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-    print(f"errors {errors} rad/s, orders {rates}")
-    assert rates[-1] == pytest.approx(order, abs=0.3)
+    print(f"errors {errors} rad/s")
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
 def test_balance_of_a_loaded_damped_run(relieved: StageModel) -> None:
@@ -167,22 +172,21 @@ def test_central_is_the_same_physics_and_drifts(pair_free: FreePair, relieved: S
     """Loaded run against dg4, both at 0.94 µs; undamped rattle at 2 µs keeps its energy to a percent, not exactly."""
     inputs = Steady(relieved, 2000 * np.pi / 30, LOAD)
     runs = [
-        simulate(relieved, inputs, 0.01, 60e-6, {"level": FAST, "h": 60e-6 / 64, "integrator": scheme})
+        simulate(relieved, inputs, 0.006, 60e-6, {"level": FAST, "h": 60e-6 / 64, "integrator": scheme})
         for scheme in (DG4, CENTRAL)
     ]
-    te, reference = (run["mesh.te"][80:] for run in reversed(runs))
+    te, reference = (run["mesh.te"][40:] for run in reversed(runs))
     assert np.std(te - reference) < 0.02 * np.std(reference) and runs[1].meta["outcome"] == "completed"
     rattle = started(pair_free, Rattle(position=0.3), {"level": FAST, "h": 2e-6, "integrator": CENTRAL})
-    assert 1e-6 < energies(rattle, 2e-6, 0.02).drift < 0.03
+    assert 1e-6 < energies(rattle, 2e-6, 0.01).drift < 0.03
 
 
 @pytest.mark.parametrize("name", light_rattle.SCENES)
 def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: StageModel, name: str) -> None:
-    """Some 40 % of the time open; one start, 0.1 s (all: `python -m evidence.energy.light_rattle`)."""
+    """Some 40 % of the time open; one start, 0.1 s, against a third of the step, which keeps eight ninths of an error
+    of second order (all, against an eighth: `python -m evidence.energy.light_rattle`)."""
     scene = light_rattle.start(light_rattle.SCENES[name], 1)
-    found, wanted = (
-        statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, light_rattle.CONVERGED)
-    )
+    found, wanted = (statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, 2.5e-6))
     line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
     assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
 

@@ -157,11 +157,11 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
     meets an impulse with the speed of the moment, so that one step may give back what others took more; one start in
     twelve has a step whose contacts let the defect jump across zero."""
     grown, back, unsolved = (5e-5, 5e-5, 0) if damped else (2e-6, 1e-7, 1)
-    for viscosity in (1e-4, 2e-3, 1e-2):
+    for viscosity in (1e-4, 1e-2):
         settings = {"effect.film": 1.0, "oil_viscosity": viscosity, "h": 1e-5, "level": 1.0,
                     "effect.contact_damping": damped, "effect.modal_damping": damped}  # fmt: skip
         kernel = started(pair_free, start, settings)
-        found = energies(kernel, 1e-5, 0.03)
+        found = energies(kernel, 1e-5, 0.02)
         print(viscosity, f"drift {found.drift:.1e}, growth {found.growth:.1e}, retried_steps {found.retried_steps}")
         assert found.drift < 5e-6 and found.growth < grown  # single: 5e-7 without a film, 1.4e-6 with one
         assert found.retried_steps <= unsolved
@@ -209,11 +209,11 @@ def test_statics_and_the_linearised_stage_know_no_film(spec: Stage, bodies: list
 
 
 def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
-    """Free rattle from ten starts: impacts in 30 ms, mean over the starts."""
+    """Free rattle from four starts: impacts in 30 ms, mean over the starts."""
     mean = []
     for film in ({}, {"effect.film": 1.0, "oil_viscosity": 5e-3}):
         impacts = []
-        for i in range(10):
+        for i in (0, 3, 6, 9):
             start = Rattle(position=0.1 * i, speed=0.15 + 0.01 * i)
             kernel = started(pair_free, start, {"h": 1e-5, "level": 1.0, "effect.contact_damping": 1.0, **film})
             energies(kernel, 1e-5, 0.03)
@@ -223,13 +223,7 @@ def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
     assert mean[1] < 0.8 * mean[0]
 
 
-@pytest.fixture(scope="module")
-def helical() -> StageModel:
-    stage = load_stage("helical_demo")
-    return assemble(stage, load_bodies(stage))
-
-
-@pytest.mark.parametrize("torque", [1.0, 100.0])
+@pytest.mark.parametrize("torque", [1.0, pytest.param(100.0, marks=pytest.mark.full)])
 def test_a_helical_pair_runs_on_oil(helical: StageModel, torque: float) -> None:
     run = {"level": 1.0, "effect.film": 1.0, "h": 5e-6}
     trace = simulate(helical, Steady(helical, 100.0, torque), 2e-3, 20e-6, run)

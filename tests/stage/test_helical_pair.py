@@ -142,8 +142,7 @@ def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.nda
     return np.sum([of_pair for (flank, _), of_pair in forces.items() if flank == 0], axis=0)
 
 
-@pytest.mark.parametrize("change", ["slope", "out_of_plane", "in_plane"])
-def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Body], change: str) -> None:
+def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Body]) -> None:
     """A helix slope of f over the face width opens one end of the flanks as much as axes out of parallel that are
     turned about the direction across the line of action; the other end carries more."""
     spec = with_bearings(relief_spec)
@@ -163,16 +162,14 @@ def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Bod
     assert np.allclose(even, even[::-1], rtol=1e-6)
     assert turned.sum() == pytest.approx(even.sum(), rel=1e-3)
     assert turned[-1] > 1.2 * even[-1] and turned[0] < 0.8 * even[0]
-    if change == "slope":
-        assert np.allclose(slices_at_rest(assemble(slope(-f), bodies), TORQUE), turned[::-1], rtol=1e-6)
-        return
-    share = math.cos(alpha) if change == "out_of_plane" else math.sin(alpha)
-    found = [slices_at_rest(assemble(misaligned(**{change: sign * f / share}), bodies), TORQUE) for sign in (1, -1)]
-    print(np.round(turned), np.round(found[0]), np.round(found[1]))
-    assert min(np.abs(f - turned).max() for f in found) < 2e-3 * even.sum()
+    assert np.allclose(slices_at_rest(assemble(slope(-f), bodies), TORQUE), turned[::-1], rtol=1e-6)
+    for change, share in (("out_of_plane", math.cos(alpha)), ("in_plane", math.sin(alpha))):
+        found = [slices_at_rest(assemble(misaligned(**{change: sign * f / share}), bodies), TORQUE) for sign in (1, -1)]
+        print(np.round(turned), np.round(found[0]), np.round(found[1]))
+        assert min(np.abs(f - turned).max() for f in found) < 2e-3 * even.sum(), change
 
 
-@pytest.mark.parametrize("slices", [5.0, 7.0, 10.0])
+@pytest.mark.parametrize("slices", [*(pytest.param(n, marks=pytest.mark.full) for n in (5.0, 10.0)), 7.0])
 def test_transmission_error_is_smooth_without_a_filter(
     demo: SimpleNamespace, involute: StageModel, slices: float
 ) -> None:
@@ -187,7 +184,7 @@ def test_transmission_error_is_smooth_without_a_filter(
 def test_mean_transmission_error_does_not_depend_on_the_number_of_slices(involute: StageModel) -> None:
     """Tip edges carry a line of contact on past the end of its flank. Cut off there, five slices differ from ten by
     0.44 %."""
-    mean = [loaded_te(involute, [TORQUE], 16, slices=slices).te.mean() for slices in (5.0, 10.0)]
+    mean = [loaded_te(involute, [TORQUE], 8, slices=slices).te.mean() for slices in (5.0, 10.0)]
     print(f"{1e6 * mean[0]:.3f} and {1e6 * mean[1]:.3f} µm")
     assert mean[0] == pytest.approx(mean[1], rel=3e-3)
 
@@ -211,11 +208,18 @@ def test_a_slice_past_the_end_of_its_flank_carries_by_its_tip_edge(demo: SimpleN
     assert carried[0] > 0.1 and carried[1] == 0
 
 
-def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: StageModel) -> None:
+@pytest.fixture(scope="module")
+def undamped(demo: SimpleNamespace) -> dict[str, np.ndarray]:
+    """Relief and crowning as shipped, no damping but the bearings'."""
+    return steady(assemble(demo.spec, demo.bodies), **{"effect.contact_damping": 0.0, "effect.modal_damping": 0.0})
+
+
+def test_forces_of_the_slices_are_outputs(
+    demo: SimpleNamespace, involute: StageModel, undamped: dict[str, np.ndarray]
+) -> None:
     """In motion they add up to the mesh force; at rest they are the slices that `te` finds."""
     slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.written.contact.slices)]
-    trace = steady(assemble(demo.spec, demo.bodies))
-    assert np.stack([trace[name] for name in slices]).sum(axis=0) == pytest.approx(trace["mesh.force"], rel=1e-9)
+    assert np.stack([undamped[name] for name in slices]).sum(axis=0) == pytest.approx(undamped["mesh.force"], rel=1e-9)
     assert f"mesh.slice_{len(slices) + 1}" not in involute.kernel().variables
     kernel = at_rest(involute, TORQUE)
     shares = np.array([kernel.get(name) for name in slices])
@@ -223,14 +227,11 @@ def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: Stage
     assert np.ptp(shares) > 0.2 * shares.mean()
 
 
-def test_energy_is_kept_in_motion(demo: SimpleNamespace) -> None:
-    """Relief and crowning as shipped, no damping but the bearings': of the energy that passes through, what the balance
-    leaves."""
-    model = assemble(demo.spec, demo.bodies)
-    run = steady(model, **{"effect.contact_damping": 0.0, "effect.modal_damping": 0.0})
-    left, through = np.abs(run["energy.residual"]).max(), TORQUE * SPEED * 10 * 2 * math.pi / 23 / SPEED
+def test_energy_is_kept_in_motion(demo: SimpleNamespace, undamped: dict[str, np.ndarray]) -> None:
+    """Of the energy that passes through, what the balance leaves."""
+    left, through = np.abs(undamped["energy.residual"]).max(), TORQUE * SPEED * 10 * 2 * math.pi / 23 / SPEED
     print(f"{through:.0f} J passed through, left {left:.2e} J")
     assert left < 1e-5 * through
-    assert run["mesh.force_mean"].mean() == pytest.approx(
+    assert undamped["mesh.force_mean"].mean() == pytest.approx(
         TORQUE / (demo.pair.gears[0].r_b * math.cos(demo.pair.gears[0].beta_b)), rel=5e-3
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -26,6 +27,7 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 
 TORQUE, SPEED, H = 150.0, 150.0, 20e-6
+FAST = {"level": 1.0, "h": H / 2}
 
 
 @cache
@@ -49,12 +51,19 @@ def housed() -> StageModel:
 
 
 @cache
+def shipped() -> StageModel:
+    return assemble(stage(), load_bodies(stage()))
+
+
+@cache
 def on_ground() -> StageModel:
     return assemble(load_stage("two_stage"), gears())
 
 
-def run(model: StageModel, duration: float = 1e-3, step: float = H, **parameters: float) -> Trace:
-    given = {"level": 1.0} | {name.replace("__", "."): value for name, value in parameters.items()}
+@cache
+def run(of: Callable[[], StageModel], duration: float = 4e-4, step: float = H, **parameters: float) -> Trace:
+    model = of()
+    given = FAST | {name.replace("__", "."): value for name, value in parameters.items()}
     return simulate(model, Steady(model, SPEED, TORQUE), duration, step, given)
 
 
@@ -184,7 +193,7 @@ def test_the_housed_group_is_the_dense_system() -> None:
     sensors = len(layout.bodies[last].nodes) - 2
     seen = [(0, 0, 0), (last, 0, 1), *((last, sensors + k, d) for k in range(2) for d in range(3))]
     group = mount(layout)
-    for frequency in (35.0, 420.0, 1730.0, 5210.0):
+    for frequency in (35.0, 1730.0):
         wanted = dense_response(layout, (0, 0), seen, 2 * np.pi * frequency)
         found = group_response(group, (0, 0), seen, 2 * np.pi * frequency)
         assert np.abs(found - wanted).max() <= 1e-6 * np.abs(wanted).max()
@@ -222,24 +231,22 @@ def test_a_free_rigid_housing_yields_by_its_mass() -> None:
         assemble(free, [*gears(), body])
 
 
-def test_without_its_housing_it_is_the_stage_on_the_ground_bit_for_bit() -> None:
+@pytest.mark.parametrize("effect", ["housing", pytest.param("bearings", marks=pytest.mark.full)])
+def test_without_its_housing_it_is_the_stage_on_the_ground_bit_for_bit(effect: str) -> None:
     """And with the bearings held; sensors and mounts then read nothing."""
-    for effect in ("effect__housing", "effect__bearings"):
-        own, plain = (
-            run(housed(), **{effect: 0.0}),
-            run(on_ground(), **({} if effect == "effect__housing" else {effect: 0.0})),
-        )
-        assert [name for name in plain.channels if not np.array_equal(plain[name], own[name])] == []
-        assert not any(np.any(own[name]) for name in own.channels if name.startswith(("sensor.", "mount.")))
+    off = {f"effect__{effect}": 0.0}
+    own, plain = run(housed, **off), run(on_ground, **({} if effect == "housing" else off))
+    assert [name for name in plain.channels if not np.array_equal(plain[name], own[name])] == []
+    assert not any(np.any(own[name]) for name in own.channels if name.startswith(("sensor.", "mount.")))
 
 
 def test_a_rigid_massive_housing_on_stiff_feet_is_rigid_ground() -> None:
     """Transmission error and forces at rest and in motion. Margin: differences are 1e-6 to 2e-5."""
     stiff = with_feet(stage(), radial=1e12, axial=1e12, tilt=1e11, torsion=1e11)
     heavy = assemble(stiff, [*gears(), housing_of(stage(), 1e5)])
-    at_rest = [statics_of(model).transmission(0.0, TORQUE) for model in (heavy, on_ground())]
+    at_rest = [statics_of(model, **FAST).transmission(0.0, TORQUE) for model in (heavy, on_ground())]
     assert at_rest[0].te == pytest.approx(at_rest[1].te, rel=1e-4)
-    found, wanted = run(heavy), run(on_ground())
+    found, wanted = run(lambda: heavy), run(on_ground)
     for name in wanted.channels:
         if name.endswith((".force", ".fx", ".fy", ".fz", ".te")):
             assert np.abs(found[name] - wanted[name]).max() <= 1e-4 * max(np.abs(wanted[name]).max(), 1.0), name
@@ -248,7 +255,7 @@ def test_a_rigid_massive_housing_on_stiff_feet_is_rigid_ground() -> None:
 def test_the_feet_carry_what_the_bearings_bring() -> None:
     """At rest forces on the housing are in balance; bearings press on it, it on the ground. Margin: statics leave some
     mN of some kN."""
-    start = {name: channel.values[0] for name, channel in run(housed()).channels.items()}
+    start = {name: channel.values[0] for name, channel in run(housed).channels.items()}
     for axis in "xyz":
         brought = sum(v for name, v in start.items() if name.startswith("bearing.") and name.endswith(f".f{axis}"))
         carried = sum(v for name, v in start.items() if name.startswith("mount.") and name.endswith(f".f{axis}"))
@@ -259,7 +266,7 @@ def test_the_feet_carry_what_the_bearings_bring() -> None:
 def test_a_sensor_tells_the_mean_acceleration() -> None:
     """Over a communication step of twice the length it is the mean of two, with the same internal steps. Margin: the
     solver's tolerance leaves 1e-4."""
-    short, long = run(housed(), h=1e-5), run(housed(), step=2 * H, h=1e-5)
+    short, long = run(housed), run(housed, step=2 * H)
     for name in (name for name in short.channels if name.startswith("sensor.")):
         mean = 0.5 * (short[name][1::2] + short[name][2::2])
         assert np.abs(long[name][1:] - mean).max() <= 1e-3 * np.abs(mean).max()
@@ -273,7 +280,7 @@ def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> 
     sensor and 6e-8 of the forces, with them 2.3e-3 and 4e-6; at half the step half as much."""
     chosen = stage() if damped else undamped(stage())
     turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
-    own, other = (run(assemble(order, [*gears(), drawn()])) for order in (chosen, turned))
+    own, other = (run(lambda: assemble(order, [*gears(), drawn()]), 1e-3) for order in (chosen, turned))  # noqa: B023
     for name in own.channels:
         differ = np.abs(own[name] - other[name]).max()
         if name.startswith("sensor."):
@@ -283,11 +290,11 @@ def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> 
             assert abs(own[name][0] - other[name][0]) <= 5e-8 * np.abs(own["stage1.force"]).max(), name
 
 
-def test_the_balance_of_energy_closes_as_on_the_ground() -> None:
-    """Of the shipped housing. Margin: it leaves 2.8e-5, the ground 3.9e-5."""
-    shipped = assemble(stage(), load_bodies(stage()))
-    left, plain = (abs(run(model, 4e-3).meta["energy_residual"]) for model in (shipped, on_ground()))
-    assert left <= 1.5 * plain
+@pytest.mark.parametrize(("of", "times"), [(housed, 10.0), pytest.param(shipped, 1.5, marks=pytest.mark.full)])
+def test_the_balance_of_energy_closes_as_on_the_ground(of: Callable[[], StageModel], times: float) -> None:
+    """The ground leaves 2.1e-5, the shipped housing 2.2e-6, the drawn one, whose seats yield more, 1.65e-4."""
+    left, plain = (abs(run(model, 2e-3).meta["energy_residual"]) for model in (of, on_ground))
+    assert left <= times * plain
 
 
 @pytest.mark.full
@@ -296,8 +303,8 @@ def test_what_is_above_its_limit_is_compliance() -> None:
     soft = stage().model_copy(
         update={"bodies": stage().bodies | {"housing": stage().housings[0].model_copy(update={"dynamic_to": 2e3})}}
     )
-    fewer = assemble(soft, [*gears(), drawn()])
-    at_rest = [statics_of(model, level=1.0).transmission(0.0, TORQUE) for model in (fewer, housed())]
+    models = [assemble(chosen, [*gears(), drawn()]) for chosen in (soft, stage())]
+    at_rest = [statics_of(model, level=1.0).transmission(0.0, TORQUE) for model in models]
     assert at_rest[0].te == pytest.approx(at_rest[1].te, rel=1e-7)
     lost = int(np.sum(drawn().frequency > 2e3))
     sizes = [mount_sets(drawn_layout(drawn(), own))[0].omega.size for own in (stage(), soft)]
@@ -324,7 +331,7 @@ def test_seats_off_their_bearings_are_told(moved: list[float], words: str) -> No
 def test_bearing_forces_give_the_sensors_back() -> None:
     """The housing on its feet alone under the recorded forces. Margin: forces that are constant over 10 µs leave 2.6 %
     (0.2 dB)."""
-    trace = run(housed(), 3e-3, 1e-5)
+    trace = run(housed, 1e-3, 1e-5)
     alone = HousingAlone.of(stage(), [*gears(), drawn()])
     assert len(alone.channels) == 27  # five directions of balls, four of rollers
     speed = alone.sensor_speed(alone.motion(trace))

@@ -64,10 +64,10 @@ def rigid_error(spec: Stage, bodies: list[Body], along: int, nodes_of: str = "bo
 
 def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[Body]) -> None:
     """f = 4/3 b k √(2R) δ^(3/2): the error falls with the distance of the nodes, of one gear or of both."""
-    errors = {along: rigid_error(spec, bodies, along) for along in (41, 161, 513)}
+    errors = {along: rigid_error(spec, bodies, along) for along in (41, 513)}
     one_sided = rigid_error(spec, bodies, 513, "a")
     print(f"errors by nodes along {errors}, of A's nodes alone {one_sided:.4f}")
-    assert errors[513] < 0.01 < errors[41] and errors[513] < errors[161] and one_sided < 0.015
+    assert errors[513] < 0.01 < errors[41] and one_sided < 0.015
 
 
 @pytest.mark.parametrize("elastic", [0.0, 1.0])
@@ -107,7 +107,7 @@ def test_helical_gears_and_their_axial_force() -> None:
     model = assemble(spec, load_bodies(spec))
     runs = []
     for law in (LINE, NODAL):
-        trace = simulate(model, Steady(model, SPEED, 150.0), 6e-4, 2e-6, {"level": PAPER, "contact": law})
+        trace = simulate(model, Steady(model, SPEED, 150.0), 4e-4, 2e-6, {"level": PAPER, "contact": law})
         runs.append([trace[name][100:].mean() for name in ("mesh.te", "mesh.force", "bearing.pinion.fz")])
     print(f"te, force, axial force: {runs}")
     assert runs[1] == pytest.approx(runs[0], rel=0.02)
@@ -131,7 +131,7 @@ def test_the_papers_planetary_set(planetary: SimpleNamespace) -> None:
     assert "nodal" in kernel.warning and kernel.get("solver.n_dyn") > 2500
     meshes = [f"{central}_planet{k}" for central in ("sun", "ring") for k in (1, 2, 3, 4)]
     found = []
-    for i in range(6):
+    for i in range(3):
         kernel.step(i * 1e-5, 1e-5)
         found.append([kernel.get(f"{mesh}.force") for mesh in meshes])
     force = np.array(found)

@@ -47,7 +47,7 @@ def natural(rigid: RigidSet, library: Path | None = None) -> tuple[np.ndarray, n
     return Motion(rigid, model).plane_modes(system)
 
 
-@pytest.mark.parametrize("planets", [3, 4, 5])
+@pytest.mark.parametrize("planets", [3, slow(4), 5])
 def test_natural_frequencies_are_those_of_lin_and_parker(planets: int) -> None:
     rigid = RigidSet(planets)
     found, shapes = natural(rigid)
@@ -118,9 +118,9 @@ def test_a_pin_error_excites_other_modes_too() -> None:
     assert response(RigidSet(3, pins={1: (0.0, 1e-5)})) > 1e-2
 
 
-def periods(rigid: RigidSet, torque: float) -> TeResult:
+def periods(rigid: RigidSet, torque: float, times: int = 1) -> TeResult:
     """Statics over one mesh period, at a multiple of the planets' number of positions."""
-    return loaded_te(rigid.model(), [torque], {3: 24, 4: 24, 5: 20, 6: 24}[rigid.planets], **SPRINGS)
+    return loaded_te(rigid.model(), [torque], times * {3: 12, 4: 12, 5: 10, 6: 12}[rigid.planets], **SPRINGS)
 
 
 @pytest.mark.parametrize(("planets", "teeth"), [(3, (26, 34)), slow(4, (27, 33)), (5, (26, 34)), slow(6, (37, 23))])
@@ -160,7 +160,7 @@ def test_shares_with_pin_errors_are_those_of_the_paper_model(
     assert np.ptp(paper) > 0.02 and np.allclose(kernel, paper, atol=1e-4)
 
 
-@pytest.mark.parametrize("stiffness", [1e5, 1e4])
+@pytest.mark.parametrize("stiffness", [slow(1e5), 1e4])
 def test_a_set_with_pin_errors_rests_without_load_however_softly_its_sun_floats(stiffness: float) -> None:
     """Flanks that overlapped push the sun aside, planets turn loosely in their backlash: what is left is the weight of
     the sun's bearing on the teeth, less than stiffness times backlash."""
@@ -200,7 +200,7 @@ def test_three_elastic_planets_share_alike(pins: dict[int, tuple[float, float]])
     [
         (3, (26, 34)),
         slow(4, (24, 36)),
-        (4, (27, 33)),
+        slow(4, (27, 33)),
         slow(5, (26, 34)),
         (5, (27, 33)),
         slow(6, (37, 23)),
@@ -211,7 +211,7 @@ def test_mesh_phasing_suppresses_harmonics(planets: int, teeth: tuple[int, int])
     """Harmonic l of the meshes turns the set where l z_s/N is whole, and moves the sun across the axis where l z_s ± 1
     is a multiple of N (R. G. Parker, J. Sound Vib. 236 (2000) 561–573); else it moves planets alone."""
     rigid = RigidSet(planets, teeth, contact_ratio=1.6)
-    found = periods(rigid, 600.0)
+    found = periods(rigid, 600.0, 2)
     count, force = found.position.size, found.sharing[0, :, 0] * found.force[0, :, 0, None]
     turning = np.abs(np.fft.rfft(found.te[0]))
     lateral = np.abs(np.fft.fft(force @ np.exp(1j * rigid.angles()), axis=0))
@@ -250,7 +250,7 @@ SPEEDS = {  # ports, speeds of carrier, sun, ring per rad/s of the one that driv
 }
 
 
-SLOW = {"ring held", "carrier held"}
+SLOW = {"ring stands", "ring held", "carrier held"}
 
 
 @pytest.mark.parametrize("case", [slow(case) if case in SLOW else case for case in SPEEDS])
@@ -282,7 +282,7 @@ def test_mean_torques_balance() -> None:
     for name, value in (("carrier.tau", torque), ("carrier.w_start", speed), ("sun.w", speed * rigid.ratio)):
         kernel.set(name, value)
     kernel.initialize()
-    found = np.empty((2400, 2))
+    found = np.empty((1600, 2))
     for i in range(len(found)):
         kernel.set("sun.phi", speed * rigid.ratio * step * (i + 1))
         kernel.step(step * i, step)
@@ -383,7 +383,7 @@ def test_a_turning_free_set_keeps_its_angular_momentum() -> None:
 @pytest.mark.parametrize(
     "rigid",
     [
-        pytest.param(RigidSet(3), id="3"),
+        slow(RigidSet(3), name="3"),
         slow(RigidSet(5), name="5"),
         pytest.param(RigidSet(6, (36, 24)), id="6"),
         slow(RigidSet(4, positions=(0, 31, 59, 91)), name="4 unequal"),

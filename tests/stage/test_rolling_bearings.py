@@ -14,6 +14,7 @@ from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised
 from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.assembly import rolling
 from gearfmu.stage.assembly.assemble import settled, tangents_of
 from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.assembly.layout import stage_layout
@@ -90,8 +91,9 @@ def test_load_and_stiffness_agree(name: str) -> None:
 
 
 def test_a_turned_stage_has_turned_bearings() -> None:
-    """All axes 40° further about z: loads and stiffnesses turn with them, averaged over the cage to 1 %."""
-    spec, bodies = loaded(TRAIN)
+    """All axes 40° further about z: loads and stiffnesses turn with them, averaged over the cage to 0.3 %
+    (0.12 %); unturned they would be 11 % off."""
+    spec, bodies = loaded(PAIR)
     c, s = math.cos(math.radians(40)), math.sin(math.radians(40))
     turned = {
         name: rotor.model_copy(
@@ -100,11 +102,11 @@ def test_a_turned_stage_has_turned_bearings() -> None:
         for name, rotor in spec.rotors.items()
     }
     plane = np.array([[c, -s], [s, c]])
-    other, own = settled(spec.model_copy(update={"rotors": turned}), bodies), found(TRAIN)
+    other, own = settled(spec.model_copy(update={"rotors": turned}), bodies), found(PAIR)
     for name, state in own.rests.items():
-        assert other.rests[name].load[:2] == pytest.approx(plane @ state.load[:2], rel=3e-3, abs=5.0)
+        assert other.rests[name].load[:2] == pytest.approx(plane @ state.load[:2], abs=0.1)
         one, two = own.tangents[name][:2, :2], other.tangents[name][:2, :2]
-        assert np.abs(two - plane @ one @ plane.T).max() < 0.01 * np.abs(one).max()
+        assert np.abs(two - plane @ one @ plane.T).max() < 3e-3 * np.abs(one).max()
 
 
 def test_without_load_only_preload_holds() -> None:
@@ -132,8 +134,9 @@ def test_tapered_rollers_are_stiffer_than_balls() -> None:
         assert (np.diag(own.tangents[name])[:2] > np.diag(balls.tangents[name])[:2]).all()
 
 
-def test_an_axial_load_on_the_open_side_is_refused() -> None:
-    """The input shaft is pushed towards +z; an angular contact bearing that carries −z lets it go."""
+def test_an_axial_load_on_the_open_side_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The input shaft is pushed towards +z; an angular contact bearing that carries −z lets it go. Of one iteration."""
+    monkeypatch.setattr(rolling, "SETTLED", math.inf)
     spec, bodies = loaded(TRAIN)
     angular = spec.bearings["6306"].model_copy(update={"contact_angle": math.radians(25.0), "clearance": 0.0})
 
@@ -178,7 +181,7 @@ def springs(of: StageModel) -> tuple[dict[str, Any], np.ndarray]:
     return sections, np.diag(own) + np.asarray(sections["support_coupling0"]).reshape(own.size, own.size)
 
 
-@pytest.mark.parametrize("name", [TRAIN, PAIR])
+@pytest.mark.parametrize("name", [pytest.param(TRAIN, marks=pytest.mark.full), PAIR])
 def test_the_blob_holds_the_whole_tangent(name: str) -> None:
     sections, compliance = springs(model(name))
     names = [entry.split(".")[1] for entry in str(sections["support_names"]).split("|")]
