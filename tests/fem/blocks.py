@@ -16,7 +16,7 @@ from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 
 STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
-COUNT = 31  # modes of a body by one sector that are compared with those of the whole
+COUNT = 41  # modes of a body by one sector that are compared with those of the whole
 
 
 def free_body(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray, cells: np.ndarray) -> Elastic:

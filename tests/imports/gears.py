@@ -15,7 +15,7 @@ from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
-COUNTS = {"flank = 20": "flank = 4", "thickness = 5": "thickness = 2", "root = 6": "root = 2", "rim = 4": "rim = 2",
+COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
           "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 6",
           "width_functions = 5": "width_functions = 3"}  # fmt: skip
 
@@ -39,7 +39,7 @@ def pinion(whole: bool = True) -> FeMesh:
     """The coarse mesh of fzg_c's pinion, all teeth or one sector."""
     spec = load_stage("fzg_c")
     geometry = gear_geometry(spec.gears[0], spec.written.pair)
-    mesh = spec.gears[0].body.mesh.model_copy(update={"flank": 4, "thickness": 2, "root": 2, "rim": 2, "width": 2})
+    mesh = spec.gears[0].body.mesh.model_copy(update={"flank": 6, "thickness": 2, "root": 3, "rim": 2, "width": 2})
     sector = gear_sector(geometry, spec.gears[0].face_width, mesh)
     return sector.full() if whole else sector
 

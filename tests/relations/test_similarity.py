@@ -39,8 +39,8 @@ STEPS = 10  # of communication
 FAST = {"level": 1.0}
 COARSEST = BodySpec(
     strip_half_width=4.5e-4,
-    modes=8,
-    roll_points=4,
+    modes=12,
+    roll_points=6,
     width_functions=2,
     mesh=MeshSpec(flank=2, thickness=1, root=2, rim=1, width=1),
 )

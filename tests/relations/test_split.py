@@ -174,6 +174,7 @@ def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str,
         after.done = cut
         after.advance(1, inputs)
         found.append(np.abs(after.rows[-1] - record.rows[cut + 1]) / families(names, record.rows[: cut + 2]))
+        del other, after  # so that the next one takes over its memory
     least = dict(zip(names, np.min(found, axis=0).tolist(), strict=True))
     kept = {name: least[name] for name in names if not name.endswith(WINDOWED) and not name.startswith("energy.")}
     print(kind.name, new, [(name, f"{kept[name]:.1e}") for name in sorted(kept, key=lambda name: -kept[name])[:3]])
@@ -184,7 +185,7 @@ def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str,
 def test_a_run_that_goes_on_with_its_own_setup_is_not_disturbed(kind: Kind) -> None:
     """6e-7 is left in sets. Rigid rotations that were taken over without their force: 2e-5 in the pair, 1e-4 in the
     set; energy that contacts owe and a run forgets: .4 %, 1.5 % with pitch errors."""
-    assert max(adopted(kind, {}, range(16, 24, 4)).values()) < UNDISTURBED
+    assert max(adopted(kind, {}, range(40, 48, 4)).values()) < UNDISTURBED
 
 
 SETUPS = {"standard": {"level": 2.0}, "half": {"h": INNER / 2}, "gyroscopic": {"effect.gyroscopic": 0.0}}
