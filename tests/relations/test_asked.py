@@ -31,9 +31,9 @@ OWN = {
     "set": ("coriolis", "centrifugal"),
     "helical_set": ("coriolis", "centrifugal"),
 }
-CHEAP = ("pair",)
+CHEAP = ("pair", "internal")
 TELLING = ("effect.bearings", "effect.elastic", "effect.friction")
-FEW = {"internal": TELLING, "helical": TELLING[:2], "train": TELLING[1:2], "set": TELLING[1:2]}
+FEW = {"helical": TELLING[:2], "train": TELLING[1:2], "set": TELLING[1:2]}
 
 
 def deviations(trace: Trace, model: StageModel, kind: Kind) -> dict[str, float]:
