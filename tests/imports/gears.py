@@ -16,7 +16,7 @@ from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
 COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
-          "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 6",
+          "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 8",
           "width_functions = 5": "width_functions = 3"}  # fmt: skip
 
 
