@@ -49,12 +49,10 @@ def test_gears_side_by_side_are_those_made_one_after_the_other(
                 assert np.abs(own - value_of(other, entry.field)).max() < 1e-9 * np.abs(own).max(), entry.path
 
 
-def test_what_a_process_raises_is_raised_here(spec: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "_WORTH", 0)
-    monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)
+def test_what_a_process_raises_is_raised_here(spec: object, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     with pytest.raises(OSError, match="file"):
-        reduce_bodies(spec, tmp_path / "file" / "below")
+        apart.reduce_apart_together([(spec, "pinion", tmp_path / "file" / "below" / "pinion.h5")])
 
 
 def test_a_gear_that_does_not_fit_is_refused_with_the_counts_to_lower(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,16 +11,24 @@ import scipy.sparse as sp
 
 from gearfmu.fem import hex20
 from gearfmu.fem.coupling import rigid_modes
+from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 
 STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
+COUNT = 41  # modes of a body by one sector that are compared with those of the whole
 
 
 def free_body(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray, cells: np.ndarray) -> Elastic:
     """A body that nothing holds, without any symmetry, from its matrices."""
     of_dof = np.repeat(np.arange(len(nodes)), 3)
     return Elastic(FullOrder("body", stiffness, mass, rigid_modes(nodes), (), (), 1.0, cells, of_dof))
+
+
+@cache
+def modes_of(whole: Elastic) -> tuple[np.ndarray, np.ndarray]:
+    """Squared frequencies and shapes of a few modes more than COUNT."""
+    return lowest_modes(whole, COUNT + 6, block=12)
 
 
 def grid_mesh(cells: tuple[int, int, int], mapping: Callable[[np.ndarray], np.ndarray]):

@@ -99,7 +99,7 @@ def valid_mesh_or_a_reason(scale: float, numbers: dict) -> None:
         check_meshes(pair, gears, scale)
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(st.fixed_dictionaries(PAIRS))
 def test_valid_mesh_or_a_reason(numbers: dict) -> None:
     valid_mesh_or_a_reason(0.3, numbers)

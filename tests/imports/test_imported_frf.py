@@ -46,7 +46,7 @@ def places(body: FullOrder) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("whole", "ready"),
-    [(True, False), (False, False), (False, True), pytest.param(True, True, marks=pytest.mark.full)],
+    [(True, False), (False, True), *(pytest.param(both, both, marks=pytest.mark.full) for both in (False, True))],
 )
 def test_the_same_full_model_whatever_the_road(tmp_path: Path, native: FullOrder, whole: bool, ready: bool) -> None:
     """Whole mesh or sector, our elements or ready-made matrices: K, M and the rows of all interfaces."""

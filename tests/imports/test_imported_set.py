@@ -40,8 +40,8 @@ PLANET = '[planet.import]\nfile = "planet.inp"\nlength = "1 mm"\nbore = "BORE"\n
 def stage(folder: Path, section: str = "") -> Stage:
     """planetary54 on coarse meshes, with import sections at its end."""
     text = find_stage("planetary54").read_text(encoding="utf-8")
-    coarse = re.sub(r"(?m)^(\[(?:sun|planet|ring)\.body\.mesh\]|\[carrier\.mesh\])$", r"\1\nscale = 0.35", text)
-    coarse = re.sub(r"(?m)^modes = 400", "modes = 40", coarse)
+    coarse = re.sub(r"(?m)^(\[(?:sun|planet|ring)\.body\.mesh\]|\[carrier\.mesh\])$", r"\1\nscale = 0.2", text)
+    coarse = re.sub(r"(?m)^modes = \d+", "modes = 48", coarse)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "stage.toml").write_text(coarse + "\n" + section, encoding="utf-8")
     return load_stage(folder / "stage.toml")
@@ -51,7 +51,7 @@ def stage(folder: Path, section: str = "") -> Stage:
 def carrier_parts() -> tuple[FeMesh, dict[str, np.ndarray]]:
     spec = load_stage("planetary54")
     sector = carrier_sector(
-        carrier_geometry(spec.bodies["carrier"]), spec.written.carrier.mesh.model_copy(update={"scale": 0.35})
+        carrier_geometry(spec.bodies["carrier"]), spec.written.carrier.mesh.model_copy(update={"scale": 0.2})
     )
     mesh = sector.full()
     sets = {name: sector.sector_nodes(k)[sector.sets["bolt"]] for k, name in enumerate(BOLTS)}

@@ -12,7 +12,7 @@ from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.stage import load_stage
 
-SCALE = 0.3
+SCALE = 0.2
 SHIFTS = (-((2e4 * np.pi) ** 2), (2e4 * np.pi) ** 2)  # rad²/s², the second beyond the first elastic modes
 SOFT = {name: "averaging" for name in ("bolt0", "bolt1", "bolt2", "bolt3", "bore")}
 

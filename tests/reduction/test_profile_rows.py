@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import small_gear
 import small_ring
+from blocks import COUNT, modes_of
 from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -72,8 +72,8 @@ def test_a_unit_load_along_the_profile_is_one_newton_outwards_with_the_roll_as_i
 
 def test_rows_along_the_profile_are_those_of_the_whole_body(case: Case) -> None:
     """Sums of N Nᵀ over each frequency cluster; on other teeth they follow from tooth 0 as those along the normal."""
-    modes, own = elastic_modes(case.sector, 41), case.sector.mesh
-    _, shapes = lowest_modes(case.free, len(modes.frequency) + 6, block=12)
+    modes, own = elastic_modes(case.sector, COUNT), case.sector.mesh
+    _, shapes = modes_of(case.free)
     rows = np.vstack([modes.flank_rows, modes.tangent_rows])
     omega = 2 * np.pi * modes.frequency
     ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1

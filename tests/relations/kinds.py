@@ -161,13 +161,13 @@ def _drawn(file: str, seed: int) -> Stage:
 
 
 @cache
-def loaded(kind: Kind) -> Inputs:
-    """Inputs as of `Steady`, wound up for one position not for the mean over a pitch: a load at a sixteenth of the
-    cost."""
-    steady = Steady(kind.model().driven_by_springs(), kind.speed, kind.torque)
-    winding = statics_of(steady.model).transmission(0.0, kind.torque).phi
+def loaded(kind: Kind, scale: float = 1.0) -> Inputs:
+    """Inputs as of `Steady` under `scale` times the torque, wound up for one position and all effects, whatever a run
+    has, not for the mean over a pitch: a load at a sixteenth of the cost. No `Wound`, which a run winds up anew."""
+    steady = Steady(kind.model().driven_by_springs(), kind.speed, scale * kind.torque)
+    winding = statics_of(kind.model()).transmission(0.0, steady.torque).phi
     steady.__dict__["winding"] = float(winding)
-    return steady
+    return lambda time: steady(time)
 
 
 def assembled(stage: Stage, bodies: Mapping[str, Any]) -> StageModel:

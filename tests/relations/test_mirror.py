@@ -31,6 +31,7 @@ from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
 from gearfmu.stagefile.tables.bodies import DeviationClass, Eccentricity, LeadSpec, Misalignment, Wobble
 from gearfmu.stagefile.tables.connections import FrictionSpec
 
+FEW = COARSE.model_copy(update={"modes": 40})
 SAME = 5e-3  # tables of coast flanks are read where they touch at the nominal distance: up to 2e-3 at this load
 LIGHT = 0.3  # of the torque
 ACROSS = "y"  # mirrored at y = 0: senses of rotation turn round
@@ -181,7 +182,7 @@ def coarse(file: str, gear: str, hand: int) -> Any:
     stage = next(kind.stage for kind in KINDS.values() if kind.file == file)
     body = stage.bodies[gear]
     assert isinstance(body, ToothedBody)
-    body = body.model_copy(update={"body": COARSE, "helix_angle": hand * body.helix_angle})
+    body = body.model_copy(update={"body": FEW, "helix_angle": hand * body.helix_angle})
     return reduced_gear(body)
 
 
@@ -196,7 +197,7 @@ def bodies(kind: Kind, hand: int) -> dict[str, Any]:
 
 def as_coarse(stage: Stage) -> Stage:
     own = {
-        name: body.model_copy(update={"body": COARSE}) if isinstance(body, ToothedBody) and body.helix_angle else body
+        name: body.model_copy(update={"body": FEW}) if isinstance(body, ToothedBody) and body.helix_angle else body
         for name, body in stage.bodies.items()
     }
     return stage.model_copy(update={"bodies": own})

@@ -97,7 +97,7 @@ def orders_of_a_run(speed: float, slices: int, teeth: int = 23) -> Mapping[str, 
     }
 
 
-@pytest.mark.parametrize("speed", [209.0, 400.0])
+@pytest.mark.parametrize("speed", [209.0, pytest.param(400.0, marks=pytest.mark.full)])
 def test_orders_of_a_run_hardly_depend_on_the_slices(speed: float) -> None:
     """Of all forces with 5, 7 and 10: those that reach SHARE of the mean mesh force agree within 3 dB, margin 1.3."""
     runs = [orders_of_a_run(speed, slices) for slices in (5, 7, 10)]

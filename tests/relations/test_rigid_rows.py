@@ -21,7 +21,7 @@ ROUNDING = 1e-14  # m; levers are some 1e-2 m
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.full) if n == "set" else n for n in KINDS])
 def test_sliding_by_tilt_is_that_of_a_rigid_body(inner_library: Path, name: str) -> None:
     stage = KINDS[name].stage
-    inner = Inner(inner_library, KINDS[name].model().blob, {"slices": SLICES, "effect.friction": 1.0})
+    inner = Inner(inner_library, KINDS[name].model().blob, {"level": 0.0, "slices": SLICES, "effect.friction": 1.0})
     for e, mesh in enumerate(stage.engagements):
         _, _, middle, *rows = inner.rows(e, np.zeros(12)).T
         slide = np.moveaxis(np.reshape(rows[12:], (2, 6, -1)), 1, 0)  # motion, gear, contact

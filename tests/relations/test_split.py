@@ -174,6 +174,7 @@ def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str,
         after.done = cut
         after.advance(1, inputs)
         found.append(np.abs(after.rows[-1] - record.rows[cut + 1]) / families(names, record.rows[: cut + 2]))
+        del other, after  # so that the next one takes over its memory
     least = dict(zip(names, np.min(found, axis=0).tolist(), strict=True))
     kept = {name: least[name] for name in names if not name.endswith(WINDOWED) and not name.startswith("energy.")}
     print(kind.name, new, [(name, f"{kept[name]:.1e}") for name in sorted(kept, key=lambda name: -kept[name])[:3]])

@@ -30,7 +30,7 @@ def ball(count: int, ka: np.ndarray, patches: int) -> Radiation:
 def test_spheres_breathe_and_oscillate_as_they_do_exactly() -> None:
     """Measured .065 dB at most, from the flat triangles; π and 4.493 are resonances of the air inside. Radiation
     efficiency R/(ρc G), so that what linear shapes leave of the quadrupole's velocity cancels."""
-    ka = np.array([0.1, 1.0, np.pi, 4.0, 4.4934])
+    ka = np.array([0.1, np.pi, 4.4934])
     sound = ball(5, ka, 600)
     assert sound.reach > ka[-1] * SPEED / (2 * np.pi * RADIUS)
     for coordinate, order in ((0, 1), (1, 1), (2, 1), (6, 0), (7, 2)):
@@ -95,6 +95,7 @@ def test_a_box_radiates_as_in_another_program() -> None:
 
 
 LINES = np.array([125.0, 500.0, 900.0])
+ENDS, LAST = LINES[::2], LINES[-1:]
 
 
 def housing(
@@ -130,13 +131,13 @@ def test_power_on_the_skin_is_reciprocal_and_equals_that_far_away() -> None:
 
 def test_refinement_moves_a_box_by_little_and_joined_triangles_are_as_good(coarse: Radiation) -> None:
     """Measured .18 dB; twist, at −70 … −20 dB of equivalent radiated power, stays weak."""
-    fine, joined = housing((8, 6, 4), patches=500), housing((18, 12, 9), patches=220)
+    fine, joined = housing((8, 6, 4), 1.0, ENDS, 500), housing((18, 12, 9), 1.0, ENDS, 220)
     index = np.arange(9)
     reference = fine.resistance[:, index, index] / (RHO_C * np.diag(fine.gram))
-    for other in (coarse, joined):
-        own = other.resistance[:, index, index] / (RHO_C * np.diag(other.gram))
+    for resistance, gram in ((coarse.resistance[::2], coarse.gram), (joined.resistance, joined.gram)):
+        own = resistance[:, index, index] / (RHO_C * np.diag(gram))
         assert np.abs(decibel(own / reference))[:, :8].max() < 0.3
-        assert own[0, 8] < 1e-6 and own[2, 8] < 0.01
+        assert own[0, 8] < 1e-6 and own[1, 8] < 0.01
 
 
 def test_a_turned_body_radiates_alike(coarse: Radiation) -> None:
@@ -146,15 +147,15 @@ def test_a_turned_body_radiates_alike(coarse: Radiation) -> None:
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     shapes = np.einsum("ij,pjn->pin", turn, modes_of_a_box(points))
-    turned = radiation(skin_of(points @ turn.T + [0.4, -0.2, 0.1], faces, shapes), LINES, 400)
-    scale = np.sqrt(np.einsum("lii,ljj->lij", coarse.resistance, coarse.resistance))[:, :8, :8]
-    assert (np.abs(turned.resistance - coarse.resistance)[:, :8, :8] / scale).max() < 0.05
+    turned = radiation(skin_of(points @ turn.T + [0.4, -0.2, 0.1], faces, shapes), LAST, 400)
+    scale = np.sqrt(np.einsum("lii,ljj->lij", *[coarse.resistance[-1:]] * 2))[:, :8, :8]
+    assert (np.abs(turned.resistance - coarse.resistance[-1:])[:, :8, :8] / scale).max() < 0.05
 
 
 def test_twice_the_size_at_half_the_frequency_is_four_times_the_resistance(coarse: Radiation) -> None:
-    large = housing((6, 4, 3), 2.0, LINES / 2)
-    ratio = large.resistance[:, 6:, 6:] / coarse.resistance[:, 6:, 6:]
-    known = np.abs(coarse.resistance[:, 6:, 6:]) > 1e-3 * coarse.resistance[:, 6:, 6:].max(axis=(1, 2), keepdims=True)
+    large, small = housing((6, 4, 3), 2.0, LAST / 2), coarse.resistance[-1:, 6:, 6:]
+    ratio = large.resistance[:, 6:, 6:] / small
+    known = np.abs(small) > 1e-3 * small.max()
     assert np.abs(ratio[known] / 4 - 1).max() < 1e-4
     assert large.reach == pytest.approx(coarse.reach / 2)
 
@@ -165,12 +166,9 @@ def test_above_the_reach_the_matrix_is_equivalent_radiated_power(coarse: Radiati
     assert (high.balance == 0).all()
 
 
-@pytest.mark.parametrize("line", range(3))
-def test_below_the_reach_equivalent_radiated_power_says_too_much_of_weak_radiators(
-    coarse: Radiation, line: int
-) -> None:
-    weak = coarse.resistance[line, 8, 8] / (RHO_C * coarse.gram[8, 8])  # twist
-    assert weak < (0.001, 0.02, 0.2)[line]
+def test_below_the_reach_equivalent_radiated_power_says_too_much_of_weak_radiators(coarse: Radiation) -> None:
+    weak = coarse.resistance[:, 8, 8] / (RHO_C * coarse.gram[8, 8])  # twist
+    assert (weak < (0.001, 0.02, 0.2)).all()
 
 
 def baffled_plate(k: float, sides: tuple[float, float]) -> float:
@@ -187,7 +185,7 @@ def baffled_plate(k: float, sides: tuple[float, float]) -> float:
 def test_a_plate_in_a_baffle_radiates_as_wallace_says() -> None:
     """Two plates back to back have their middle plane as a rigid baffle. The error falls with their distance in
     proportion (4.5 % at 20 mm and k a = 2), so two distances give that of none. Measured .4 % at most."""
-    sides, ka = (0.3, 0.2), np.array([0.3, 1.0, 2.0, 4.0])
+    sides, ka = (0.3, 0.2), np.array([0.3, 4.0])
     printed = (
         32 * 0.3 * 0.2 / np.pi**5 * (1 - 0.06 / 12 * (1 - 8 / np.pi**2) * (3 / 2 + 2 / 3))
     )  # his eq. (22), k a = .3
