@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import io
 import json
 import os
 import re
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import click
@@ -299,16 +301,18 @@ def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(
     import pty
 
     line = "simulate fzg_c --torque 80~N*m --speed 2000~rpm --duration 4~ms --settle 1~ms --set level=rigid".split()
-    command = [sys.executable, "-m", "gearfmu.cli", *(word.replace("~", " ") for word in line)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "100"}
+    words = [word.replace("~", " ") for word in line]
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "100")
     near, far = pty.openpty()
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=far, env=environment, cwd=tmp_path, check=True)
-    os.close(far)
+    out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
+    with os.fdopen(far, "w", encoding="utf-8") as terminal, redirect_stderr(terminal), redirect_stdout(out):
+        assert cli.outcome(words) == 0
     shown = os.read(near, 1 << 16).decode(errors="replace")
     os.close(near)
-    monkeypatch.chdir(tmp_path)
-    plain = call(*(word.replace("~", " ") for word in line))
-    assert "fzg_c" in shown and "━" in shown and "━" not in done.stdout.decode()
+    plain = call(*words)
+    assert "fzg_c" in shown and "━" in shown and "━" not in out.buffer.getvalue().decode()
     assert plain[0] == 0 and "━" not in plain[2], "lines at most, where the machine is slow"
 
 

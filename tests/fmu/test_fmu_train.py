@@ -19,7 +19,10 @@ from gearfmu.stagefile.stage import load_stage
 STEPS, H = 20, 1e-4
 
 
-@pytest.fixture(scope="module", params=["two_stage", "two_stage/stage_housed"])
+TRAINS = ["two_stage/stage_housed", pytest.param("two_stage", marks=pytest.mark.full)]
+
+
+@pytest.fixture(scope="module", params=TRAINS)
 def train(request: pytest.FixtureRequest) -> StageModel:
     spec = load_stage(request.param)
     fast = spec.levels.model_copy(update={"standard_cut": spec.levels.fast_cut})

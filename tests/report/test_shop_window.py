@@ -15,7 +15,9 @@ from gearfmu.stage.run.trace import Trace
 
 
 def closure(step: float, folder: Path) -> Trace:
-    return cosim.run(with_step(load_scene("clutch_closure"), step), folder, unit="kernel")
+    """The first half of the demo's scene."""
+    scene = with_step(load_scene("clutch_closure"), step)
+    return cosim.run(scene.model_copy(update={"duration": 0.2}), folder, unit="kernel")
 
 
 def test_the_demos_octave_bands_are_right_and_it_warns_of_nothing(tmp_path: Path) -> None:
