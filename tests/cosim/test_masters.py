@@ -3,6 +3,8 @@ costs."""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from analytic_stage import Plant
@@ -32,6 +34,7 @@ def coupled(plant: Plant, name: str, h: float) -> tuple[np.ndarray, float]:
     return np.array(rows), (chosen.ports.work + work) / chosen.ports.throughput
 
 
+@lru_cache
 def whole(plant: Plant, h: float) -> np.ndarray:
     """The same without a cut."""
     unit = PyUnit(plant.monolithic(), plant.micro_step)
@@ -43,6 +46,7 @@ def whole(plant: Plant, h: float) -> np.ndarray:
     return np.array(rows)
 
 
+@lru_cache
 def error(plant: Plant, name: str, h: float) -> np.ndarray:
     """(3,) rms of the difference over the rms of the AC part."""
     reference = whole(plant, h)
