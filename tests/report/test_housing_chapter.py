@@ -47,20 +47,17 @@ def test_one_metre_per_second_squared_is_120_decibel_in_its_own_third_octave(mid
     assert list(plot.columns) == ["third_octave_[Hz]", "sensor.lid.ax_[dB re 1 µm/s²]"], "what stands still is left out"
 
 
-def run(duration: float) -> Trace:
-    """The beginning of the shipped scene."""
-    scene = gf.load_scene("clutch_closure_housed")
-    return gf.run(scene.model_copy(update={"duration": duration}), unit="kernel")
-
-
 @pytest.fixture(scope="module")
 def closure() -> Trace:
-    return run(0.06)
+    """The first 60 ms of the shipped scene."""
+    scene = gf.load_scene("clutch_closure_housed")
+    return gf.run(scene.model_copy(update={"duration": 0.06}), unit="kernel")
 
 
 @pytest.fixture(scope="module")
 def beginning() -> Trace:
-    return run(0.01)
+    """10 ms of it with one slice."""
+    return gf.run(gf.load_scene("clutch_closure_housed", {"duration": "10 ms", "stage.slices": 1}), unit="kernel")
 
 
 @pytest.mark.full
