@@ -5,19 +5,21 @@ from __future__ import annotations
 import os
 import resource
 import signal
-import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
 
+from gearfmu import cli
 from gearfmu.body import load_body
 from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
 
-GEARFMU = [sys.executable, "-m", "gearfmu.cli"]
 INTERRUPTED = "gearfmu: interrupted; files that were being written are as they were before"
-SMALL = {"modes": 40, "roll_points": 8, "width_functions": 3, "flank": 6, "thickness": 2, "width": 2}
+SMALL = {"modes": 40, "roll_points": 8, "width_functions": 3}
+SMALL |= {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
 LATEST = 120.0  # s until there is something to interrupt
 
 
@@ -32,15 +34,26 @@ def tiny(folder: Path) -> Path:
     return path
 
 
-def _heeds_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # which a test run in the background of a shell ignores
+def forked(words: list[str], folder: Path, told: Path, before: Callable[[], object] = lambda: None) -> int:
+    """Number of a process that runs the verb in `folder`: a fork, so that modules are not read again. What it writes
+    goes to the file `told`."""
+    if number := os.fork():
+        return number
+    code = -1
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell may have told us to ignore
+        os.chdir(folder)
+        with told.open("w", encoding="utf-8") as file, redirect_stdout(file), redirect_stderr(file):
+            before()
+            cli.main(words)
+    except SystemExit as end:
+        code = end.code
+    finally:
+        os._exit(code)
 
 
-def started(words: list[str], folder: Path) -> subprocess.Popen[str]:
-    pipe = subprocess.PIPE
-    return subprocess.Popen(
-        [*GEARFMU, *words], cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=_heeds_interrupts
-    )
+def exit_code(number: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
 
 
 def left_over(folder: Path) -> list[str]:
@@ -50,10 +63,10 @@ def left_over(folder: Path) -> list[str]:
 
 SLOW = pytest.param("study", marks=pytest.mark.full)
 OVER = ["--over", "torque=10:300:200 N*m", "--over", "positions=4"]
-WORK = {  # verb with its arguments, and the file or line that shows that it is at work
-    "reduce": (["reduce", "tiny"], ""),
-    "sweep": (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl"),
-    "study": (["study", "pair_loaded", "--quick", "--out", "out"], "study.csv"),
+WORK = {  # verb with its arguments, the file that shows that it is at work, and what that holds then
+    "reduce": (["reduce", "tiny"], "told", "reducing"),
+    "sweep": (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
+    "study": (["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", ""),
 }
 
 
@@ -61,28 +74,24 @@ WORK = {  # verb with its arguments, and the file or line that shows that it is 
 def test_interrupted_work_is_one_line_and_whole_files(verb: str, tmp_path: Path) -> None:
     if verb == "reduce":
         tiny(tmp_path)
-    words, sign = WORK[verb]
-    work = started(words, tmp_path)
-    assert work.stderr is not None
-    if not sign:
-        while "reducing" not in (line := work.stderr.readline()):
-            assert line, "it ended by itself"
-    end = time.monotonic() + LATEST
-    while sign and not (found := list(tmp_path.rglob(sign))) and work.poll() is None and time.monotonic() < end:
+    (words, file, sign), told = WORK[verb], tmp_path / "told"
+    work, end = forked(words, tmp_path, told), time.monotonic() + LATEST
+    while not (found := [path for path in tmp_path.rglob(file) if sign in path.read_text("utf-8")]):
+        assert os.waitpid(work, os.WNOHANG) == (0, 0) and time.monotonic() < end, "it ended by itself"
         time.sleep(0.05)
-    work.send_signal(signal.SIGINT)
-    _, told = work.communicate(timeout=60)
-    assert work.returncode == 130, told
-    assert told.splitlines()[-1] == INTERRUPTED and "Traceback" not in told
+    os.kill(work, signal.SIGINT)
+    assert exit_code(work) == 130
+    text = told.read_text(encoding="utf-8")
+    assert text.splitlines()[-1] == INTERRUPTED and "Traceback" not in text
     assert not left_over(tmp_path)
-    assert not sign or found[0].read_text(encoding="utf-8").endswith("\n")
+    assert found[0].read_text(encoding="utf-8").endswith("\n")
 
 
 def test_two_processes_may_reduce_one_stage(tmp_path: Path) -> None:
     tiny(tmp_path)
-    both = [started(["reduce", "tiny"], tmp_path) for _ in range(2)]
-    told = [work.communicate(timeout=300) for work in both]
-    assert [work.returncode for work in both] == [0, 0], told
+    told = [tmp_path / name for name in ("one", "other")]
+    both = [forked(["reduce", "tiny"], tmp_path, path) for path in told]
+    assert [exit_code(work) for work in both] == [0, 0], [path.read_text(encoding="utf-8") for path in told]
     assert {path.name for path in (tmp_path / "tiny").iterdir()} == {"stage.toml", "pinion.h5", "wheel.h5"}
     assert load_body(tmp_path / "tiny" / "wheel.h5").toothed.teeth == 19
 
@@ -90,16 +99,14 @@ def test_two_processes_may_reduce_one_stage(tmp_path: Path) -> None:
 def _no_room() -> None:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # writing more is an OSError then, as on a full disk
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+    sys.dont_write_bytecode = True  # a cut-off file would stay and be read
 
 
 def test_a_full_disk_is_one_line_and_leaves_the_old_file(tmp_path: Path) -> None:
-    table = tmp_path / "te.csv"
+    table, told = tmp_path / "te.csv", tmp_path / "told"
     table.write_text("old\n", encoding="utf-8")
     words = ["te", "fzg_c", "--torque", "100 N*m", "--positions", "40", "--out", "te.csv"]
-    whole = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # a cut-off file of bytecode would stay and be read
-    done = subprocess.run(
-        [*GEARFMU, *words], cwd=tmp_path, env=whole, capture_output=True, text=True, check=False, preexec_fn=_no_room
-    )
-    (told,) = [line for line in done.stderr.splitlines() if line.startswith("gearfmu:")]
-    assert done.returncode == 1 and "te.csv: cannot be written, File too large: make room" in told
+    assert exit_code(forked(words, tmp_path, told, before=_no_room)) == 1
+    (line,) = [line for line in told.read_text(encoding="utf-8").splitlines() if line.startswith("gearfmu:")]
+    assert "te.csv: cannot be written, File too large: make room" in line
     assert table.read_text(encoding="utf-8") == "old\n" and not left_over(tmp_path)

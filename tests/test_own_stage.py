@@ -14,7 +14,8 @@ from gearfmu.scenefile.scene import load_scene
 from gearfmu.stagefile.proposals.coarse import coarse_stage
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto-own-stage.md"
-TINY = {"modes": 40, "roll_points": 8, "width_functions": 3, "flank": 6, "thickness": 2, "width": 2}
+TINY = {"modes": 40, "roll_points": 8, "width_functions": 3}
+TINY |= {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
 
 
 def commands(text: str) -> list[list[str]]:

@@ -40,7 +40,7 @@ def test_models_and_results_fit_one_screen(stage: str) -> None:
     model = gf.assemble(stage)
     text, page = screens(model)
     assert text.startswith(f"Stage {stage} (") and stage in page and "effect.(" in text and model.hash[:12] in text
-    result = gf.te(model, [50.0, "100 N*m"], 2)
+    result = gf.te(model, [50.0, "100 N*m"], 2, level="rigid", slices=1)
     text, page = screens(result)
     assert "50.0 N·m" in text and f"mean {1e6 * result.te[1].mean():.3f} µm" in text and "100.0 N·m" in page
     axes = result.plot()

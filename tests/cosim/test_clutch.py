@@ -93,7 +93,7 @@ def test_a_jump_of_capacity_between_steps_is_exact():
     assert unit.events[0].time == pytest.approx(0.1 + 10.0 / (20.0 * (1 / J1 + 1 / J2)), abs=1e-12)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     speeds=st.lists(st.floats(-50, 50), min_size=4, max_size=4),
     capacities=st.lists(st.floats(0.0, 40.0), min_size=3, max_size=3),

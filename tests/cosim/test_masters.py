@@ -3,6 +3,8 @@ costs."""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from analytic_stage import Plant
@@ -32,6 +34,7 @@ def coupled(plant: Plant, name: str, h: float) -> tuple[np.ndarray, float]:
     return np.array(rows), (chosen.ports.work + work) / chosen.ports.throughput
 
 
+@lru_cache
 def whole(plant: Plant, h: float) -> np.ndarray:
     """The same without a cut."""
     unit = PyUnit(plant.monolithic(), plant.micro_step)
@@ -43,6 +46,7 @@ def whole(plant: Plant, h: float) -> np.ndarray:
     return np.array(rows)
 
 
+@lru_cache
 def error(plant: Plant, name: str, h: float) -> np.ndarray:
     """(3,) rms of the difference over the rms of the AC part."""
     reference = whole(plant, h)
@@ -64,10 +68,6 @@ def test_gs_mean_at_100_us_errs_by_less_than_a_tenth_of_a_percent():
     assert error(VIBRATION, "gs_mean", 1e-4)[0] < 2.7e-4
     assert error(CLOSURE, "gs_mean", 1e-4)[0] < 3e-5
     assert error(RATTLE, "gs_mean", 1e-4)[0] < 6e-4
-
-
-def test_gs_mean_beats_jacobi_by_two_orders():
-    assert error(CLOSURE, "gs_mean", 1e-4)[0] < 0.01 * error(CLOSURE, "jacobi", 1e-4)[0]
 
 
 def test_jacobi_at_1_ms_stays_within_five_percent_with_the_chain_inside():

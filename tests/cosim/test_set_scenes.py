@@ -22,6 +22,12 @@ R_B_SUN, PIN_CIRCLE = 21.143e-3, 45e-3  # m
 BACKLASH = 0.06e-3  # m, of each of the two meshes in series
 
 
+def sliced_once(name: str) -> SceneSpec:
+    """A shipped scene with one slice: its teeth are spur, and preparing takes a third."""
+    scene = load_scene(name)
+    return scene.model_copy(update={"stage": scene.stage.model_copy(update={"slices": 1})})
+
+
 def with_capacity(scene: SceneSpec, duration: float, *points: tuple[float, float]) -> SceneSpec:
     brake = scene.drivetrain.clutches["brake"].model_copy(update={"capacity": points})
     parts = scene.drivetrain.model_copy(update={"clutches": {"brake": brake}})
@@ -51,7 +57,7 @@ def impulse(trace: Trace, channel: str, step: float) -> np.ndarray:
 # -- the ring's brake lets go and catches again ------------------------------------------------------------------------
 def short_shift() -> SceneSpec:
     points = ((0.0, 400.0), (1e-3, 400.0), (1.5e-3, 0.0), (3e-3, 0.0), (4e-3, 250.0), (6e-3, 400.0))
-    return with_capacity(load_scene("planetary_shift"), 0.01, *points)
+    return with_capacity(sliced_once("planetary_shift"), 0.01, *points)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +122,7 @@ def test_energy_at_the_cut(shift: Result) -> None:
 
 @pytest.mark.full
 def test_the_fmu_with_three_ports_is_the_kernel_bit_for_bit(shift_model: StageModel, tmp_path: Path) -> None:
-    scene = with_capacity(load_scene("planetary_shift"), 1e-3, (0.0, 400.0), (2e-4, 400.0), (4e-4, 0.0))
+    scene = with_capacity(sliced_once("planetary_shift"), 1e-3, (0.0, 400.0), (2e-4, 400.0), (4e-4, 0.0))
     path = export(shift_model, tmp_path / "set.fmu")
     traces = [run_once(scene, Source(shift_model, fmu)).trace for fmu in (None, path)]
     assert list(traces[0].channels) == list(traces[1].channels)
@@ -128,7 +134,7 @@ def test_the_fmu_with_three_ports_is_the_kernel_bit_for_bit(shift_model: StageMo
 @pytest.fixture(scope="module")
 def closure() -> Result:
     """Slip 3 rad/s, gone within 4 ms."""
-    scene = load_scene("planetary_closure")
+    scene = sliced_once("planetary_closure")
     changed = {
         "duration": 0.012,
         "start": scene.start.model_copy(update={"slip": 3.0}),
@@ -175,7 +181,7 @@ def test_the_sun_drives_the_vehicle_as_the_teeth_say(closure: Result) -> None:
 @pytest.fixture(scope="module")
 def runup() -> Result:
     """From 40 rad/s in 10 ms at 104 rad/s², as the scene has it, from 2 ms on."""
-    scene = load_scene("planetary_runup")
+    scene = sliced_once("planetary_runup")
     control = scene.drivetrain.torques["control"]
     wanted = SpeedControl(damping=20.0, over_time=((2e-3, 40.0), (1.2e-2, 40.0 + 1.04)))
     torques = scene.drivetrain.torques | {"control": control.model_copy(update={"speed_control": wanted})}

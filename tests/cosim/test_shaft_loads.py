@@ -225,7 +225,7 @@ def planetary() -> StageModel:
 
 def short(level: str, duration: float) -> SceneSpec:
     scene = load_scene(PAPER)
-    stage = scene.stage.model_copy(update={"level": level})
+    stage = scene.stage.model_copy(update={"level": level, "slices": 1})
     return scene.model_copy(update={"duration": duration, "settle": 0.0, "stage": stage})
 
 

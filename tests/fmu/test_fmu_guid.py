@@ -34,15 +34,14 @@ def made(**changes: object) -> StageModel:
 def test_other_rounding_leaves_the_guid(stage: str) -> None:
     """Two sets of routines of one linear algebra stand for two versions of numpy: the numbers differ, the GUID does
     not. Where a processor knows one of them only, the hashes agree as well and the test says nothing."""
-    found = []
-    for routines in ("Prescott", "Haswell"):
-        environment = os.environ | {"OPENBLAS_CORETYPE": routines}
-        command = [sys.executable, "-c", MAKES, stage]
-        found.append(
-            subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout.split()
-        )
-    assert found[0][1] == found[1][1]
-    if found[0][0] == found[1][0]:
+    spec = load_stage(stage)
+    here = assemble(spec, load_bodies(spec))
+    environment = os.environ | {"OPENBLAS_CORETYPE": "Prescott"}
+    command = [sys.executable, "-c", MAKES, stage]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    hash_there, guid_there = done.stdout.split()
+    assert guid_there == here.guid
+    if hash_there == here.hash:
         pytest.skip("this linear algebra has one set of routines here")
 
 

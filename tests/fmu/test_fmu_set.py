@@ -20,7 +20,7 @@ from gearfmu.fmu.description import shafts
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.stage import load_stage
 
-STEPS, H, RIGID = 10, 1e-4, 0
+STEPS, H, RIGID, SLICES = 10, 1e-4, 0, 1
 START = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}
 
 SETS = ["planetary54/stage_housed", pytest.param("planetary54", marks=pytest.mark.full)]
@@ -47,7 +47,7 @@ def subject(fmu: Path) -> Iterator[tuple[Subject, dict[str, int]]]:
     folder = fmu.parent / "open"
     made = Subject(str(folder) if folder.is_dir() else unpack(fmu, folder))
     references = {v.name: v.valueReference for v in made.variables}
-    made.fmu.setInteger([references["level"]], [RIGID])
+    made.fmu.setInteger([references["level"], references["slices"]], [RIGID, SLICES])
     made.fmu.setReal([references[name] for name in START], list(START.values()))
     made.fmu.setupExperiment(startTime=0.0)
     made.fmu.enterInitializationMode()
@@ -61,7 +61,7 @@ def test_the_fmu_of_a_set_is_its_kernel_bit_for_bit(
     planetary: StageModel, subject: tuple[Subject, dict[str, int]]
 ) -> None:
     theirs, references = subject
-    kernel = planetary.kernel(level=float(RIGID))
+    kernel = planetary.kernel(level=float(RIGID), slices=float(SLICES))
     for name, value in START.items():
         kernel.set(name, value)
     kernel.initialize(0.0)

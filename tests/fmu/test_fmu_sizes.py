@@ -20,7 +20,12 @@ def rows() -> dict[str, dict[str, str]]:
         return {row["stage"]: row for row in csv.DictReader(file)}
 
 
-@pytest.mark.parametrize("stage", sorted(AIMS))
+QUICK = ("fzg_c", "helical_set")  # the least and the most tables of a stage
+
+
+@pytest.mark.parametrize(
+    "stage", [stage if stage in QUICK else pytest.param(stage, marks=pytest.mark.full) for stage in sorted(AIMS)]
+)
 def test_an_fmu_is_not_larger_than_its_row(stage: str, tmp_path: Path) -> None:
     row = rows()[stage]
     size = export(gearfmu.assemble(stage), tmp_path / "stage.fmu").stat().st_size / 1e6

@@ -42,7 +42,7 @@ def test_the_build_description_follows_its_schema_and_names_every_file(with_sour
 
 
 def test_sources_do_not_change_the_rest(with_sources, native):
-    assert not findings(with_sources)
+    assert not findings(with_sources, ())
     assert with_sources.stat().st_size - native.stat().st_size < 400_000
 
 

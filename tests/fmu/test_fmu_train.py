@@ -19,11 +19,14 @@ from gearfmu.stagefile.stage import load_stage
 STEPS, H = 20, 1e-4
 
 
-@pytest.fixture(scope="module", params=["two_stage", "two_stage/stage_housed"])
+TRAINS = ["two_stage/stage_housed", pytest.param("two_stage", marks=pytest.mark.full)]
+
+
+@pytest.fixture(scope="module", params=TRAINS)
 def train(request: pytest.FixtureRequest) -> StageModel:
+    """At level fast with one slice, which takes a tenth of the preparation."""
     spec = load_stage(request.param)
-    fast = spec.levels.model_copy(update={"standard_cut": spec.levels.fast_cut})
-    return assemble(spec.model_copy(update={"levels": fast}), load_bodies(spec))
+    return assemble(spec, load_bodies(spec)).with_starts({"level": 1.0, "slices": 1.0})
 
 
 @pytest.fixture(scope="module")

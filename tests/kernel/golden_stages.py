@@ -122,6 +122,7 @@ def _turning(
     return Stage(blob, reversed_torques(speed, torque, every), start, {"slices": slices}, steps)
 
 
+@cache
 def stages() -> dict[str, Stage]:
     """By name."""
     small, helical = {"pinion": 250.0, "wheel": -250.0 * 16 / 24}, {"pinion": 300.0, "wheel": -300.0 * 2 / 3}

@@ -10,22 +10,27 @@ import re
 import struct
 import subprocess
 import sys
-from functools import lru_cache
+import traceback
+from collections.abc import Callable
+from functools import lru_cache, partial
 from pathlib import Path
 
 import pytest
 from builds import checked_library
-from golden import REALS, results
+from golden import REALS, moved, results, stored
 from probes import build, compilers, source_folder
 from small_model import pair_blob
 
-from gearfmu.kernel import Kernel
+from gearfmu import cosim
+from gearfmu.kernel import Kernel, binding, instance
 from gearfmu.kernel.build import FLAGS, fmi_headers
+from gearfmu.scenefile.scene import load_scene
 
 FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": (), "native": ("-march=native",)}
 VARIANTS = [pytest.param(c, f, marks=pytest.mark.full) for c in compilers() for f in FLAG_SETS]
 CHECKS = 150  # GK_ASSERT in the sources, at least
-QUICK_SCENES, LONG_SCENES = ("pair_loaded", "clutch_closure"), ("clutch_closure_train", "planetary_closure")
+QUICK_SCENES = [("pair_loaded", {"duration": "60 ms"}), ("clutch_closure", {"duration": "130 ms"})]  # it has locked
+LONG_SCENES = ("pair_loaded", "clutch_closure", "clutch_closure_train", "planetary_closure")
 WATCHED = ("mesh.force", "mesh.te", "energy.stored", "energy.residual", "bearing.pinion.fx", "wheel.gear.phi")
 
 
@@ -103,29 +108,47 @@ def test_a_second_run_repeats_the_first(system_library: Path) -> None:
 
 
 # ---- with GK_ASSERT --------------------------------------------------------------------------------------------------
-def apart(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """A Python program of this folder in a process of its own, which a check that fails ends."""
-    here = Path(__file__).parent
-    line = [sys.executable, str(here / str(arguments[0])), *map(str, arguments[1:])]
-    return subprocess.run(line, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(here.parents[1])})
+def apart(run: Callable[[], object]) -> int:
+    """Exit code of a fork of this process that calls `run`: a check that fails ends it."""
+    if child := os.fork():
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    code = 1
+    try:
+        run()
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+def golden_runs(real: str = "float", part: str = "") -> None:
+    assert not moved(stored(real, part), results(checked_library(real), part))
+
+
+def scene(name: str, changes: dict[str, str]) -> None:
+    """Runs it on the kernel with checks."""
+    checked = binding.load(checked_library())
+    instance.load = lambda library=None: checked
+    instance._opened.cache_clear()
+    assert cosim.run(load_scene(name, changes), unit="kernel").meta["outcome"] == "ok"
 
 
 def test_no_check_fails_in_runs_of_the_pair() -> None:
-    done = apart("golden.py", "--library", checked_library(), "--only", "pair/")
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert apart(partial(golden_runs, part="pair/")) == 0
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("real", REALS)
 def test_no_check_fails_in_golden_runs(real: str) -> None:
-    done = apart("golden.py", "--library", checked_library(real), "--real", real)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert apart(partial(golden_runs, real)) == 0
 
 
-@pytest.mark.parametrize("scenes", [QUICK_SCENES, pytest.param(LONG_SCENES, marks=pytest.mark.full)])
-def test_no_check_fails_in_scenes(scenes: tuple[str, ...]) -> None:
-    done = apart("checked_scenes.py", checked_library(), *scenes)
-    assert done.stdout.split("\n")[:-1] == [f"{scene} ok" for scene in scenes], done.stderr
+@pytest.mark.parametrize(
+    ("name", "changes"), [*QUICK_SCENES, *(pytest.param(name, {}, marks=pytest.mark.full) for name in LONG_SCENES)]
+)
+def test_no_check_fails_in_scenes(name: str, changes: dict[str, str]) -> None:
+    assert apart(partial(scene, name, changes)) == 0
 
 
 def test_a_check_that_fails_ends_the_process_and_says_where() -> None:

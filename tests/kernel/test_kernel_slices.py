@@ -132,7 +132,7 @@ def test_mirrored_slices_as_one_row_change_nothing(slices: int, damping: float) 
 
 @pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (1, 0.0)], ids=["dg4", "em"])
 @pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 8e3)])
-@pytest.mark.parametrize("slices", [1, 4, 5, 6])
+@pytest.mark.parametrize("slices", [1, 4, 5, pytest.param(6, marks=pytest.mark.full)])
 def test_slices_step_by_step(
     double_library: Path, slices: int, integrator: int, gamma: float, zeta: float, damping: float
 ) -> None:

@@ -48,9 +48,13 @@ def state_after_steps(blob: bytes, level: float, friction: float) -> bytes:
     return kernel.save()
 
 
-@pytest.mark.parametrize("level", [FAST, STANDARD])
-@pytest.mark.parametrize("change", [bytes, moved])
-@pytest.mark.parametrize("name", MODELS)
+QUICK = [("helical_set", moved, FAST), ("helical_set", bytes, STANDARD), ("pin_errors", moved, STANDARD)]
+OTHERS = [(n, c, v) for n in MODELS for c in (bytes, moved) for v in (FAST, STANDARD) if (n, c, v) not in QUICK]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "level"), [*QUICK, *(pytest.param(*case, marks=pytest.mark.full) for case in OTHERS)]
+)
 def test_shared_tables_are_those_of_every_gear_alone(name, change, level, monkeypatch) -> None:
     shared, alone = both_ways(change(golden_model(name)), monkeypatch)
     assert state_after_steps(shared, level, 0.0) == state_after_steps(alone, level, 0.0)

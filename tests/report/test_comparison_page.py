@@ -14,7 +14,7 @@ from gearfmu.commands.runs import compare as compare_verb
 from gearfmu.errors import GearfmuError
 from gearfmu.stage.run.trace import Channel, Trace
 
-TIME = np.arange(25_000) * 2e-5
+TIME = np.arange(10_000) * 2e-5
 TONE = 950.0
 
 

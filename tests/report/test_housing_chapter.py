@@ -54,6 +54,12 @@ def closure() -> Trace:
     return gf.run(scene.model_copy(update={"duration": 0.06}), unit="kernel")
 
 
+@pytest.fixture(scope="module")
+def beginning() -> Trace:
+    """10 ms of it with one slice."""
+    return gf.run(gf.load_scene("clutch_closure_housed", {"duration": "10 ms", "stage.slices": 1}), unit="kernel")
+
+
 @pytest.mark.full
 def test_with_a_housing_the_chapter_is_there_and_its_sound_is_that_of_sound_power(
     closure: Trace, tmp_path: Path
@@ -110,9 +116,9 @@ def test_a_run_up_has_sound_power_over_the_speed(closure: Trace, tmp_path: Path)
     assert code == 0 and f"level {10 * np.log10((10 ** (0.1 * own.total())).mean()):.1f} dB" in out, err
 
 
-def test_the_turning_view_looks_into_the_housing(closure: Trace) -> None:
+def test_the_turning_view_looks_into_the_housing(beginning: Trace) -> None:
     stage = gf.load("two_stage/stage_housed")
-    view = turning(Run(closure, {}, stage, load_bodies(stage)))
+    view = turning(Run(beginning, {}, stage, load_bodies(stage)))
     assert view is not None and "far side of the housing" in view.caption
     (drawn,) = [body for body in view.bodies if body.inside]
     corners = (drawn.points + [drawn.place[0][0], drawn.place[1][0], drawn.place[2]])[drawn.quads]
@@ -122,21 +128,21 @@ def test_the_turning_view_looks_into_the_housing(closure: Trace) -> None:
     assert np.ptp(corners.reshape(-1, 3), axis=0) == pytest.approx(np.ptp(load_bodies(stage)[-1].skin.points, axis=0))
 
 
-def test_it_is_absent_without_a_housing_and_where_the_housing_is_held(closure: Trace, tmp_path: Path) -> None:
-    channels = {n: c for n, c in closure.channels.items() if not n.startswith(("sensor.", "mount."))}
-    held = {n: replace(c, values=0 * c.values) if n.startswith("sensor.") else c for n, c in closure.channels.items()}
+def test_it_is_absent_without_a_housing_and_where_the_housing_is_held(beginning: Trace, tmp_path: Path) -> None:
+    channels = {n: c for n, c in beginning.channels.items() if not n.startswith(("sensor.", "mount."))}
+    held = {n: replace(c, values=0 * c.values) if n.startswith("sensor.") else c for n, c in beginning.channels.items()}
     for number, own in enumerate((channels, held)):
         folder = tmp_path / str(number)
-        page = report.write(Trace(closure.time, own, {}), {}, folder).read_text(encoding="utf-8")
+        page = report.write(Trace(beginning.time, own, {}), {}, folder).read_text(encoding="utf-8")
         assert "housing_" not in page and not list((folder / "data").glob("housing*"))
 
 
-def test_what_is_missing_for_the_sound_is_said_and_the_rest_stays(closure: Trace, tmp_path: Path) -> None:
+def test_what_is_missing_for_the_sound_is_said_and_the_rest_stays(beginning: Trace, tmp_path: Path) -> None:
     stage = gf.load("two_stage/stage_housed")
     *others, own = load_bodies(stage)
     bodies = [*others, replace(own, skin=None, how=replace(own.how, hash="0" * 64))]
     with pytest.raises(MetricsError, match="housing has no skin"):
-        housing.sound(Run(closure, {}, stage, bodies))
-    page = report.write(closure, closure.meta, tmp_path).read_text(encoding="utf-8")
+        housing.sound(Run(beginning, {}, stage, bodies))
+    page = report.write(beginning, beginning.meta, tmp_path).read_text(encoding="utf-8")
     assert "Sound power of the housing: the stage&#x27;s bodies are not at hand." in page
     assert 'id="housing_octaves"' in page and 'id="housing_sound"' not in page

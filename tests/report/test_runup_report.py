@@ -91,8 +91,8 @@ def test_a_run_up_is_one_whose_carrier_gathers_speed() -> None:
 
 
 def test_the_report_of_a_run_up_has_its_maps_instead_of_a_spectrum(tmp_path: Path) -> None:
-    trace, spec = sweep(), load_stage("planetary54")
-    report.write(trace, trace.meta, tmp_path, spec, load_bodies(spec))
+    trace = sweep()
+    report.write(trace, trace.meta, tmp_path)
     made = {path.stem for path in (tmp_path / "data").glob("*.csv")}
     assert {"spectrogram_speed", "orders_map", "orders_speed"} <= made and "spectrum" not in made
     text = (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -15,12 +15,14 @@ from gearfmu.stage.run.trace import Trace
 
 
 def closure(step: float, folder: Path) -> Trace:
-    return cosim.run(with_step(load_scene("clutch_closure"), step), folder, unit="kernel")
+    """The first half of the demo's scene."""
+    scene = with_step(load_scene("clutch_closure"), step)
+    return cosim.run(scene.model_copy(update={"duration": 0.2}), folder, unit="kernel")
 
 
 def test_the_demos_octave_bands_are_right_and_it_warns_of_nothing(tmp_path: Path) -> None:
     """Against samples at every internal step, of 5 µs, where nothing folds: within 0.1 dB up to the band of 8 kHz, 0.3
-    dB in that of 16 kHz. At 100 µs the samples are up to 17 dB off, and the page says so."""
+    dB in that of 16 kHz. At 100 µs the samples are up to 20 dB off (17 in the whole scene), and the page says so."""
     shown, fine, coarse = (closure(step, tmp_path) for step in (DEMO_STEP, 5e-6, 1e-4))
     found, true = (octave_table(trace, window_of_interest(trace)) for trace in (shown, fine))
     off = {
@@ -37,4 +39,4 @@ def test_the_demos_octave_bands_are_right_and_it_warns_of_nothing(tmp_path: Path
     sampled = {name: channel for name, channel in coarse.channels.items() if not name.endswith("_mean")}
     plain = Trace(coarse.time, sampled, coarse.meta)
     folded = octave_table(plain, window_of_interest(plain))["mesh.force"]
-    assert max(folded[band] - true["mesh.force_mean"][band] for band in folded) == pytest.approx(16, abs=4)
+    assert max(folded[band] - true["mesh.force_mean"][band] for band in folded) == pytest.approx(20, abs=4)

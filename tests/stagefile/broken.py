@@ -186,15 +186,14 @@ def _scene(name: str, changes: list[Change], folder: Path) -> None:
     in_drivetrain(scene, load_stage(scene.stage.name))
 
 
-def _copied(name: str, folder: Path) -> Path:
-    """The folder of a shipped stage with its bodies."""
-    for path in find_stage(name).parent.glob("*"):
-        (folder / path.name).write_bytes(path.read_bytes())
-    return folder
-
-
 def _spoilt(file: str, spoil: Callable[[Path], None], name: str, folder: Path) -> None:
-    spoil(_copied(name, folder) / file)
+    """In the folder of a shipped stage: copies of its file and of one body, links to the other bodies."""
+    for path in find_stage(name).parent.glob("*"):
+        if path.name in (file, "stage.toml"):
+            (folder / path.name).write_bytes(path.read_bytes())
+        else:
+            (folder / path.name).symlink_to(path)
+    spoil(folder / file)
     load_bodies(load_stage(folder))
 
 

@@ -11,8 +11,10 @@ import pytest
 
 import gearfmu as gf
 from gearfmu import cli
+from gearfmu.api import plans
 from gearfmu.sweeps import table as tables
 from gearfmu.sweeps.charts import write_charts
+from gearfmu.sweeps.runners import in_this_process
 
 STAGE = "fzg_c/stage_relief"
 RELIEF = "stage.gears.pinion.tip_relief.amount"
@@ -45,6 +47,12 @@ def test_a_point_that_fails_is_a_row_with_its_reason(harris: gf.SweepTable) -> N
     assert np.isnan(harris["te_mean_um"][1])
 
 
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Points are computed in this process: `harris` and test_runners.py have workers."""
+    monkeypatch.setattr(plans, "on_this_machine", lambda workers: in_this_process)
+
+
 @pytest.mark.needs("xarray")
 def test_results_over_the_swept_keys(harris: gf.SweepTable) -> None:
     grid = harris.to_xarray()["te_mean_um"]
@@ -58,6 +66,7 @@ def test_pictures(harris: gf.SweepTable, tmp_path: Path) -> None:
     assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
 
 
+@pytest.mark.usefixtures("here")
 def test_a_sweep_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last line of the journal is cut off, as by a process that was killed, and one point is new: two are computed
     and the line of the other stays. Where pyarrow is missing the table is CSV."""
@@ -83,6 +92,7 @@ def test_a_sweep_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.Mo
     assert np.all(np.diff(table["te_mean_um"]) > 0)
 
 
+@pytest.mark.usefixtures("here")
 def test_a_scene_and_a_stage_alone_by_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Levels over torque and speed with traces; a run that is stopped, here refused by the kernel, is counted."""
     short = ["--over", "duration=40 ms", "--over", "settle=10 ms", "--jobs", "1", "--out", str(tmp_path)]
