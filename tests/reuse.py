@@ -150,8 +150,9 @@ def _prepared_once(prepare: Callable[[instance.Kernel], None]) -> Callable[[inst
 
 
 def _parameters(kernel: instance.Kernel) -> bytes:
-    """The values of all its parameters."""
-    references = kernel.references(name for name, own in kernel.variables.items() if own.causality == "parameter")
+    """The values of all its parameters but speeds at the start, which gk_prepare does not read."""
+    known = (name for name, own in kernel.variables.items() if own.causality == "parameter")
+    references = kernel.references(name for name in known if not name.endswith(".w_start"))
     values = (ctypes.c_double * len(references))()
     kernel.get_many(references, values)
     return bytes(values)

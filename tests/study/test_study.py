@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +16,11 @@ from evidence.study.limits import limit_rows
 from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu import cli
 from gearfmu.errors import SpecError
+from gearfmu.kernel import Kernel
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.teeth import ROLLS
-from gearfmu.study import Job, ReferenceRow, Row, study
+from gearfmu.study import Job, ReferenceRow, Row, bench, study
 from gearfmu.study.bench import Point, Price, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.norm import errors as errors_of
@@ -114,11 +117,22 @@ def test_a_train_is_measured_by_all_its_meshes_and_bearings() -> None:
     assert run.signals.locked is not None and not run.signals.locked.any()
 
 
-def test_half_the_step_costs_about_twice(scene: SceneSpec) -> None:
+def test_half_the_step_costs_twice_by_a_clock_that_counts_steps(
+    scene: SceneSpec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step takes a microsecond, a call as much: the price is per simulated second, without the calls."""
+    made, real = [0.0], Kernel.try_step
+
+    def counted(kernel: Kernel, time: float, step: float) -> int:
+        made[0] += 1.0 + (0.0 if math.isnan(step) else step / kernel.get("solver.h"))
+        return real(kernel, time, step)
+
     model = models_for(scene)
     whole, half = (measure(scene, model, Point("fast", h=h)) for h in (5e-6, 2.5e-6))
-    price = paired_price(half, whole)
-    assert 1.6 < price.cpu_ratio < 2.4 and price.realtime_factor > 0
+    monkeypatch.setattr(Kernel, "try_step", counted)
+    monkeypatch.setattr(bench, "clock", SimpleNamespace(thread_time=lambda: 1e-6 * made[0]))
+    price = paired_price(half, whole, looked_at=1e-3)
+    assert (price.cpu_ratio, price.realtime_factor) == pytest.approx((2.0, 0.4))
 
 
 def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
