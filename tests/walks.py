@@ -1,4 +1,5 @@
-"""Counts of what a newcomer has to read: walks, classes, forms, lines. `python tests/walks.py` prints the table.
+"""Counts of what a newcomer has to read: walks, classes, forms, lines. `python tests/walks.py` prints the table; it
+needs Python 3.11.
 
 A walk counts the modules of gearfmu in which a function is entered. Its reader opens every top-level function and
 class once, in the order of first use, including its methods and inner functions. His stays are runs of one module, his

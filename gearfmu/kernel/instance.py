@@ -246,7 +246,8 @@ class Kernel:
         return self.transmission_at(mesh)
 
     def transmission_at(self, mesh: int) -> TeState:
-        """The equilibrium that `transmission` has just found, seen at engagement number `mesh`."""
+        """The equilibrium that `transmission` has just found, seen at engagement number `mesh`.
+        SimulationError(bad_call) once a step has been made."""
         out = (ctypes.c_double * (3 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
         known = (self._model, self._setup, self._work, self._data, mesh)
