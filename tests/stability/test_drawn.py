@@ -200,10 +200,7 @@ def unsolved(made: Record) -> list[str]:
     return [f"{count} of {int(made['solver.steps'][-1])} steps unsolved"] if count else []
 
 
-FOUND = {  # by the first 200 draws, not cured yet
-    **dict.fromkeys((49, 56, 74, 75, 95, 131), "energy balance leaves 1e-4 to 4e-4"),
-    168: "friction beside a film goes on changing sides in one step of 1433",
-}
+FOUND = dict.fromkeys((49, 56, 74, 75, 95, 131), "energy balance leaves 1e-4 to 4e-4")  # by 200 draws, not cured yet
 
 
 CYCLED = 92  # a contact stuck, parted, slid and stuck again without end, until what would hold it showed the side
