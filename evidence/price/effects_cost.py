@@ -15,16 +15,15 @@ from __future__ import annotations
 
 import math
 import re
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from evidence.price.counted import ROOT, SET, SET_START, SET_TORQUES, Count, Period, count, make_host, words
 from gearfmu.body import load_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel import build
@@ -34,33 +33,28 @@ from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.bodies import Eccentricity, ProfileSpec
 
-ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "gearfmu" / "stage" / COSTS
 STAGE, SPEED = "fzg_c/stage_relief", 2000 * math.pi / 30
 TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else off is another motion
-H, WARM, STEPS = 50e-6, 10, 38  # communication steps; 38 are one mesh period
+PERIOD, PERIOD_OF_SET = Period(10, 38, 50e-6), Period(4, 10, 50e-6)  # 38 steps are one mesh period
 BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
 OWN_DATA: dict[str, dict[str, Any]] = {  # of the pinion, where the stage does not have them
     "pitch_errors": {"index_deviation": {0: 5e-6}},
     "flank_deviations": {"profile": ProfileSpec(slope=2e-6, crowning=2e-6)},
     "runout": {"eccentricity": Eccentricity(amount=5e-6)},
 }
-RUBBING, HOUSED = "helical_demo", "two_stage/stage_housed"
-SET, SET_WARM, SET_STEPS = "planetary54", 4, 10
-SET_START = {"carrier.w_start": 85.0, "sun.w_start": 340.0}
-SET_TORQUE = {"carrier.tau": 600.0, "sun.tau": -150.0}
-SET_WATCHED = ("sun_planet1.te", "sun_planet1.force", "energy.stored", "energy.dissipated")
+OTHERS = {"friction": "helical_demo", "housing": "two_stage/stage_housed"}  # stages that have what it needs
 Compiled = Callable[[Sequence[str], Sequence[str], Sequence[Path], Path], list[Path]]
 MOST = 0.05  # that an effect may cost while it is off
-WATCHED = ("mesh.te", "mesh.force", "stage2.te", "stage2.force", "energy.stored", "energy.dissipated")  # as there are
+WATCHED = [f"{mesh}.{what}" for mesh in ("mesh", "stage2", "sun_planet1") for what in ("te", "force")]
+WATCHED += ["energy.stored", "energy.dissipated"]  # as there are
 
 
-@dataclass(frozen=True)
-class Count:
-    """Instructions of an internal step, and the watched outputs at the end, bit for bit."""
-
-    instructions: float
-    outputs: tuple[str, ...]
+@lru_cache
+def shipped(stage: str) -> StageModel:
+    """The model of a stage: a planetary set takes some seconds to assemble."""
+    spec = load_stage(stage)
+    return assemble(spec, load_bodies(spec))
 
 
 class Bench:
@@ -68,16 +62,10 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.host, self.whole = folder / "host", folder / "whole"
+        self.host, self.whole = make_host(folder), folder / "whole"
         self.counts: dict[tuple[Any, ...], Count] = {}
-        program = Path(__file__).with_name("effects_host.c")
-        subprocess.run(
-            ["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"],
-            check=True,
-        )
         spec = load_stage(STAGE)
         bodies = load_bodies(spec)
-        self.plain = assemble(spec, bodies)
         self.own = {
             name: assemble(
                 rewritten(spec, gears=(spec.written.gears[0].model_copy(update=data), spec.written.gears[1])), bodies
@@ -117,38 +105,15 @@ class Bench:
     def _counted(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
         blob = self.folder / f"{model.hash[:12]}.blob"
         blob.write_bytes(model.blob)
-        of_set = model is self.turning
-        words = set_arguments(model, settings) if of_set else arguments(model, settings, torque)
-        command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--toggle-collect=measured",
-                   "--callgrind-out-file=/dev/null", self.host, library, blob,
-                   *((SET_WARM, SET_STEPS) if of_set else (WARM, STEPS)), H, *words]  # fmt: skip
-        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
-        collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
-        internal, *outputs = done.stdout.split()
-        return Count(int(collected[1]) / float(internal), tuple(outputs))
-
-    @cached_property
-    def turning(self) -> StageModel:
-        """A planetary set, which takes some seconds to assemble."""
-        spec = load_stage(SET)
-        return assemble(spec, load_bodies(spec))
-
-    @cached_property
-    def rubbing(self) -> StageModel:
-        """A pair whose bodies know how they yield along the profile."""
-        spec = load_stage(RUBBING)
-        return assemble(spec, load_bodies(spec))
-
-    @cached_property
-    def housed(self) -> StageModel:
-        """A train in its housing."""
-        spec = load_stage(HOUSED)
-        return assemble(spec, load_bodies(spec))
+        if model is shipped(SET):
+            arguments = words(model, {**settings, **SET_START}, SET_TORQUES, WATCHED)
+            return count(self.host, library, blob, PERIOD_OF_SET, arguments)
+        arguments = words(model, settings, Steady(model, SPEED, torque), WATCHED)
+        return count(self.host, library, blob, PERIOD, arguments)
 
     def measure(self, effect: Effect) -> tuple[Cost, bool]:
         """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
-        others = {"friction": "rubbing", "housing": "housed"}
-        plain = self.turning if effect.carried else getattr(self, others.get(effect.name, "plain"))
+        plain = shipped(SET if effect.carried else OTHERS.get(effect.name, STAGE))
         with_it = self.own.get(effect.name, plain)
         plain = with_it if effect.off_setting else plain  # the switch is there where the data are
         whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
@@ -157,24 +122,6 @@ class Bench:
         without = self.count(lacking, plain, {**BASE, **effect.off_setting}, torque)
         cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)
         return cost, off.outputs == without.outputs
-
-
-def arguments(model: StageModel, settings: Mapping[str, float], torque: float) -> list[str]:
-    """Parameters, inputs of constant speed and load, and watched outputs, by reference."""
-    known = model.kernel().variables
-    steady = Steady(model, SPEED, torque)
-    start, later = steady(0.0), steady(1.0)
-    words = [f"p{known[name].reference}={value!r}+0" for name, value in settings.items()]
-    words += [f"i{known[name].reference}={start[name]!r}+{later[name] - start[name]!r}" for name in start]
-    return words + [f"w{known[name].reference}" for name in WATCHED if name in known]
-
-
-def set_arguments(model: StageModel, settings: Mapping[str, float]) -> list[str]:
-    """`arguments` of a planetary set under constant torques."""
-    known, parameters = model.kernel().variables, {**settings, **SET_START}
-    words = [f"p{known[name].reference}={value!r}+0" for name, value in parameters.items()]
-    words += [f"i{known[name].reference}={value!r}+0" for name, value in SET_TORQUE.items()]
-    return words + [f"w{known[name].reference}" for name in SET_WATCHED]
 
 
 def table(rows: Mapping[str, Cost]) -> str:

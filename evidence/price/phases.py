@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from evidence.price.steps import SET_START, SET_TORQUES
+from evidence.price.counted import SET_START, SET_TORQUES
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
