@@ -4,7 +4,6 @@ closed contact; the balance of a loaded damped run closes; central is the same p
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -73,15 +72,6 @@ def test_invariant_holds_and_damping_never_adds(
         assert energy.keeps(case, line)
 
 
-@pytest.mark.parametrize("slices", [*(pytest.param(n, marks=pytest.mark.full) for n in (1, 5)), 10])
-def test_free_rattle_of_50_ms(pair_free: FreePair, libraries: dict[str, Path | None], slices: int) -> None:
-    case = energy.CASES["free rattle"]
-    run = {**SHORT, "duration": 0.05, "libraries": libraries}
-    for build in ("double", "shipped"):
-        line = energy.row(pair_free, "free rattle", case, (build, 1, slices, 7.5e-6), run)
-        assert energy.keeps(case, line) and line["changes"] >= 20
-
-
 @pytest.mark.parametrize("speed", [0.0, 0.1])
 def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -> None:
     """40 000 steps in which gears that have sprung apart turn slowly and ring. Turns below the last place of a speed
@@ -117,12 +107,6 @@ def test_controls_are_seen_to_fail(pair_free: FreePair, libraries: dict[str, Pat
     (build,) = case.builds
     line = energy.row(pair_free, name, case, (build, 0, 5, 10e-6), {**SHORT, "duration": 0.02, "libraries": libraries})
     assert line["drift"] > case.at_least
-
-
-@pytest.mark.full
-def test_the_whole_table_of_the_fast_level(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "argv", ["energy.py", "--starts", "5", "--out", str(tmp_path / "energy.csv")])
-    assert energy.main() == 0
 
 
 def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> np.ndarray:
@@ -189,9 +173,3 @@ def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: Sta
     found, wanted = (statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, 2.5e-6))
     line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
     assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
-
-
-@pytest.mark.full
-def test_light_load_rattle_from_four_starts(relieved: StageModel) -> None:
-    lines = light_rattle.table(relieved, 0.3, FAST)
-    assert not [light_rattle.missed(line) for line in lines if line["start"] == -1 and light_rattle.missed(line)]

@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from gearfmu.stage.assembly.assemble import assemble, general_sections
-from gearfmu.stage.assembly.blob import read_blob
-from gearfmu.stage.assembly.compact import ground_rows
 from gearfmu.stage.assembly.ground_part import read_tables, turn_tables
 from gearfmu.stage.assembly.groups import SPIN, mount
 from gearfmu.stage.assembly.layout import stage_layout
@@ -175,18 +172,6 @@ def test_held_frequencies_are_zeros_of_the_free_body_s_compliance_at_the_bore(la
     assert len(zeros) >= 8 and error < 1e-9
 
 
-@pytest.mark.parametrize("turned", [0.4, 2.0, 5.5])
-def test_isotropic_supports_know_no_direction(layout, bodies, pair, turned):
-    """All angles turned alike: displacements stay, forces on the supports turn."""
-    group = mount(layout)
-    here, force = Grouped(bodies[0], pair.gears[0], group, 0, LOADS, 0.3).answer(omega=2e4)
-    there, other = Grouped(bodies[0], pair.gears[0], group, 0, LOADS, 0.3 + turned).answer(omega=2e4)
-    error = relative(there - here, here)
-    force_error = np.abs(other[:2] - turn(turned) @ force[:2]).max() / np.abs(force).max()
-    print(f"turned by {turned}: {error:.1e}, force {force_error:.1e}")
-    assert error < 1e-10 and force_error < 1e-10
-
-
 def test_a_force_that_stands_in_space_moves_the_hub_alike_whichever_tooth_it_meets(layout, bodies, pair):
     """Dynamic answer of the hub from all modes of the body in its own axes, at every angle: patterns of nodal diameter
     2 and more never reach it."""
@@ -207,29 +192,6 @@ def test_a_force_that_stands_in_space_moves_the_hub_alike_whichever_tooth_it_mee
     assert error < 1e-9
 
 
-def test_sections_hold_the_groups(spec, bodies, layout):
-    """Names, shapes and types by the kernel's table; equal inputs, equal bytes; rows and lists from the groups."""
-    model = assemble(spec, bodies)
-    assert model.hash == assemble(spec, bodies).hash
-    sections, blob = general_sections(spec, bodies), read_blob(model.blob)
-    assert next(iter(blob)) == "counts" and np.array_equal(blob["counts"], sections["counts"])
-    group = mount(layout)
-    read = sections["ground_list1_0"]
-    others = np.setdiff1d(np.arange(group.omega.size), read)
-    assert not group.shapes[group.at[1]][:, others].any()
-    rows = blend(sections["resample1"], ground_rows(1, 0, sections), 2)
-    want = group.flank_rows(1)[..., read]
-    assert np.abs(rows - want).max() < 1e-13 * np.abs(want).max()
-    assert np.all(np.diff(sections["omega_ground0"]) >= 0) and np.all(np.diff(sections["omega0"]) >= 0)
-    masses = [body.total_mass for body in bodies]
-    assert sections["damper0"] == pytest.approx(2 * 0.03 * np.sqrt(3e8 * np.repeat(masses, 2)))
-    assert not sections["damper_rows1"].any()
-    assert sections["displacement_names"] == "pinion.gear.x|pinion.gear.y|wheel.gear.x|wheel.gear.y"
-    assert sections["support_names"] == "bearing.pinion.fx|bearing.pinion.fy|bearing.wheel.fx|bearing.wheel.fy"
-    assert np.array_equal(sections["support_compliance0"], np.full(4, 1 / 3e8))
-    assert not sections["support_compliance1"].any()
-
-
 def test_four_oscillators_are_the_gears_as_a_whole(layout):
     """Rigid share: of the kinetic energy; the sum over all oscillators is the number of rigid freedoms."""
     for group in (mount(layout), mount(with_compliance(layout, np.zeros((2, 2))))):
@@ -237,23 +199,3 @@ def test_four_oscillators_are_the_gears_as_a_whole(layout):
         assert (group.rigid_share > -1e-12).all()
     free = mount(layout)
     assert (free.rigid_share[:4] > 0.98).all() and (free.rigid_share[4:] < 0.1).all()
-
-
-def test_dampers_feel_the_springs(layout):
-    """Damper rows are the elongation of the springs: with the springs alone as flexibility they are the hub's own
-    motion."""
-    group = mount(layout)
-    own = np.concatenate([np.diag(s.compliance) for s in layout.supports])
-    assert np.allclose(group.damper_rows, own[:, None] * (group.kappa @ group.support_rows), rtol=1e-13, atol=0)
-
-
-def test_orthogonality(layout):
-    """Φᵀ M Φ = 1, and the low modes are the gears on their bearings."""
-    group = mount(layout)
-    mass = np.ones(group.at[-1].stop)
-    for b, body in enumerate(layout.bodies):
-        mass[group.at[b].start : group.at[b].start + 2] = body.mass[0, 0]
-    assert np.allclose(group.shapes.T @ (mass[:, None] * group.shapes), np.eye(group.omega.size), atol=1e-11)
-    masses = [body.mass[0, 0] for body in layout.bodies]
-    rough = np.sort(np.repeat(np.sqrt(3e8 / np.array(masses)), 2))
-    assert group.omega[:4] == pytest.approx(rough, rel=0.05)

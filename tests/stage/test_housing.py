@@ -272,24 +272,6 @@ def test_a_sensor_tells_the_mean_acceleration() -> None:
         assert np.abs(long[name][1:] - mean).max() <= 1e-3 * np.abs(mean).max()
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(("damped", "sensors"), [(False, 1e-4), (True, 5e-3)])
-def test_the_order_of_supports_changes_nothing(damped: bool, sensors: float) -> None:
-    """But that a step takes the dashpots one after the other, which makes a difference of the order of its length.
-    Margin: at the start 1.2e-8 (its search ends at 1e-11 m, 5e-7 of the force); after 1 ms without dashpots 1.7e-5 of a
-    sensor and 6e-8 of the forces, with them 2.3e-3 and 4e-6; at half the step half as much."""
-    chosen = stage() if damped else undamped(stage())
-    turned = chosen.model_copy(update={"supports": chosen.supports[::-1]})
-    own, other = (run(lambda: assemble(order, [*gears(), drawn()]), 1e-3) for order in (chosen, turned))  # noqa: B023
-    for name in own.channels:
-        differ = np.abs(own[name] - other[name]).max()
-        if name.startswith("sensor."):
-            assert differ <= sensors * max(np.abs(own[n]).max() for n in own.channels if n.startswith("sensor.")), name
-        elif name.endswith((".fx", ".fy", ".fz", ".force")):
-            assert differ <= 1e-5 * np.abs(own["stage1.force"]).max(), name
-            assert abs(own[name][0] - other[name][0]) <= 5e-8 * np.abs(own["stage1.force"]).max(), name
-
-
 @pytest.mark.parametrize(("of", "times"), [(shipped, 1.5), pytest.param(housed, 10.0, marks=pytest.mark.full)])
 def test_the_balance_of_energy_closes_as_on_the_ground(of: Callable[[], StageModel], times: float) -> None:
     """The ground leaves 2.1e-5, the shipped housing 2.2e-6, the drawn one, whose seats yield more, 1.65e-4."""

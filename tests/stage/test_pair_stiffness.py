@@ -13,16 +13,10 @@ import math
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
-import scipy.sparse.linalg as sla
 
-from gearfmu.femesh import gear_sector
-from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.reduction.cyclic.flank import Points, ToothFlank
-from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.bodies import GearSpec
 
 LINE_LOAD = 300e3  # N/m
 
@@ -63,41 +57,6 @@ def expected(spec: Stage, pair: PairGeometry) -> float:
     return 1 / (1 / (theoretical_stiffness(spec) * rack_factor(spec)) + disc_torsion(spec, pair))
 
 
-def local_compliance(spec: Stage, pair: PairGeometry) -> float:
-    """Secant of docs/theory eq. (7) for both bodies at the line load, m/N."""
-    gear, roll = spec.gears[0], pair.path["C"]
-    modulus = gear.material.youngs_modulus / (1 - gear.material.poisson_ratio**2)
-    radius = roll * (pair.length - roll) / pair.length
-    half_width = math.sqrt(4 * LINE_LOAD * radius / (math.pi * modulus / 2))
-    return 2 * 2 / (math.pi * modulus * gear.face_width) * (math.log(4 * gear.body.strip_half_width / half_width) - 1)
-
-
-def clamped_compliance(gear: GearSpec, shape: GearGeometry, roll: float, scale: float) -> float:
-    """Displacement of the load strip at `roll` per uniform load on it, all nodes of the bore held, m/N: cyclic
-    symmetry, one nodal diameter at a time."""
-    flank = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, gear.face_width, gear.body.strip_half_width)
-    mesh = gear_sector(shape, gear.face_width, gear.body.mesh.model_copy(update={"scale": scale}))
-    body = SectorBody(mesh, gear.material, flank, Points(np.array([roll]), 1))
-    space = body.spaces[0]
-    held = np.zeros(mesh.nodes.shape)
-    held[mesh.sets["bore"]] = 1
-    stiffness = space.from_nodes @ body.stiffness @ space.to_nodes
-    size = space.interior + space.cut
-    keep = np.flatnonzero((abs(space.to_nodes).T @ held.ravel())[:size] == 0)
-    total = 0.0
-    for diameter in body.diameters():
-        harmonic = space.harmonic(diameter)
-        cut = sp.hstack([sp.csr_array((space.cut, space.interior)), harmonic.phase * sp.eye_array(space.cut)])
-        expand = sp.csc_array(sp.vstack([sp.eye_array(size), cut]))[:, keep]
-        load = body.tooth_forces(harmonic, np.array([0]))[keep, 0]
-        system = sp.csc_matrix(expand.conj().T @ stiffness @ expand)
-        solution = sla.splu(
-            system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        ).solve(load)
-        total += harmonic.weight / mesh.teeth * (load.conj() @ solution).real
-    return total
-
-
 def test_formula_is_the_standards(spec: Stage) -> None:
     assert theoretical_stiffness(spec) == pytest.approx(15.78e9, rel=1e-3) and rack_factor(spec) == 0.975
 
@@ -119,15 +78,3 @@ def test_secant_from_the_transmission_error(plain: StageModel, spec: Stage, pair
         f"c'th {1e-9 * theoretical_stiffness(spec):.2f}, with rack and discs {1e-9 * expected(spec, pair):.2f}"
     )
     assert secant == pytest.approx(expected(spec, pair), rel=0.10)
-
-
-@pytest.mark.full
-def test_secant_from_finite_elements_with_clamped_bores(spec: Stage, pair: PairGeometry) -> None:
-    rolls = (pair.path["C"], pair.length - pair.path["C"])
-    bodies = [clamped_compliance(*parts, scale=0.6) for parts in zip(spec.gears, pair.gears, rolls, strict=True)]
-    secant = 1 / (spec.gears[0].face_width * (sum(bodies) + local_compliance(spec, pair)))
-    print(
-        f"c' = {1e-9 * secant:.2f} N/(mm µm), bores clamped; c'th {1e-9 * theoretical_stiffness(spec):.2f}, "
-        f"with rack and discs {1e-9 * expected(spec, pair):.2f}"
-    )
-    assert secant == pytest.approx(expected(spec, pair), rel=0.06)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.errors import ModelError, SpecError
-from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.errors import SpecError
+from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import RotorSpec, Stage
@@ -25,12 +25,6 @@ from gearfmu.stagefile.stage import load_stage
 
 FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
-
-
-@pytest.fixture(scope="module")
-def two_stage() -> StageModel:
-    spec = load_stage("two_stage")
-    return assemble(spec, load_bodies(spec))
 
 
 def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[str, np.ndarray]:
@@ -141,17 +135,6 @@ def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
     assert carried == pytest.approx(found["seat.wheel1.fz"] + found["seat.pinion2.fz"], rel=1e-4)
     assert abs(carried) < 0.6 * max(pushed.values())
     assert found["solver.status"] == 0 == at_rest(two_stage)["solver.status"]
-
-
-def test_every_mesh_of_a_train_has_its_transmission_error(two_stage) -> None:
-    """Each over its own pitch: positive against the direction in which gear A is driven; periodic; a mesh that there is
-    not is refused."""
-    found = {mesh: loaded_te(two_stage, [100.0, 200.0], 3, mesh=mesh) for mesh in ("stage1", "stage2")}
-    assert found["stage1"].te.min() > 0 > found["stage2"].te.max()
-    assert all(np.all(np.diff(np.abs(result.te), axis=0) > 0) for result in found.values())
-    assert all(np.all(result.mesh_stiffness > 0) for result in found.values())
-    with pytest.raises(ModelError, match="it has stage1, stage2"):
-        loaded_te(two_stage, [100.0], 3, mesh="stage3")
 
 
 def as_general_file(pair: dict[str, Any]) -> dict[str, Any]:
