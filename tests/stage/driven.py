@@ -23,8 +23,8 @@ def give(kernel: Kernel, inputs: Mapping[str, float]) -> None:
 
 def stepped(kernel: Kernel, count: int, h: float, *names: str) -> np.ndarray:
     """(count, names): outputs after each of so many communication steps of h (s) under inputs that stay."""
-    found = np.empty((count, len(names)))
+    found, start = np.empty((count, len(names))), kernel.time
     for i in range(count):
-        kernel.step(i * h, h)
+        kernel.step(start + i * h, h)
         found[i] = [kernel.get(name) for name in names]
     return found

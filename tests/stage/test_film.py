@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from driven import give, stepped
 from scipy.integrate import solve_ivp
 
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
@@ -15,7 +16,7 @@ from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage import Steady, assemble, simulate
+from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.meshes import REACH, film_impulse
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
@@ -56,8 +57,10 @@ def falling(h: float, integrator: float, settings: Mapping[str, float], complian
     return kernel
 
 
-def gap(kernel: Kernel) -> float:
-    return START + kernel.get("right.gear.phi") - kernel.get("left.gear.phi")
+def fall(kernel: Kernel, count: int, h: float, *names: str) -> tuple[np.ndarray, ...]:
+    """Gap (m) and outputs after each of so many steps of h."""
+    right, left, *others = stepped(kernel, count, h, "right.gear.phi", "left.gear.phi", *names).T
+    return START + right - left, *others
 
 
 def reference(end: float) -> object:
@@ -77,14 +80,11 @@ def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: in
     """From beyond the reach down to 4 µm: the trajectory converges to the solution of the differential equation."""
     end, exact, worst = 4e-3, reference(4e-3), []
     for h in (4e-5, 2e-5, 1e-5):
-        kernel = falling(h, integrator, ON)
-        errors = []
-        for i in range(round(end / h)):
-            kernel.step(i * h, h)
-            errors.append(gap(kernel) - exact((i + 1) * h)[0])  # type: ignore[operator]
-        worst.append(np.abs(errors).max())
-    print(worst, gap(kernel))
-    assert gap(kernel) < 5e-6 and kernel.get("solver.retried_steps") == 0
+        kernel, count = falling(h, integrator, ON), round(end / h)
+        (d,) = fall(kernel, count, h)
+        worst.append(np.abs(d - exact(h * np.arange(1, count + 1))[0]).max())  # type: ignore[operator]
+    print(worst, d[-1])
+    assert d[-1] < 5e-6 and kernel.get("solver.retried_steps") == 0
     assert worst[-1] < 3e-9 if order else worst[-1] < 1e-10
     if order:
         assert worst[0] / worst[2] > 0.7 * 4**order
@@ -93,14 +93,9 @@ def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: in
 def test_momentum_and_thickness_are_the_closed_form() -> None:
     """What the film took is ∫ c dd between the thicknesses, in every step: m Δv + F t = I(d₀) − I(d), exactly. It
     lies between no oil and oil that reaches without end."""
-    h, taken = 1e-5, []
-    kernel = falling(h, DG4, ON)
-    for i in range(400):
-        kernel.step(i * h, h)
-        speed = kernel.get("left.gear.w") - kernel.get("right.gear.w")
-        momentum = MASS * (SPEED - speed) + LOAD * (i + 1) * h
-        taken.append([gap(kernel), momentum])
-    d, momentum = np.array(taken).T
+    h = 1e-5
+    d, left, right = fall(falling(h, DG4, ON), 400, h, "left.gear.w", "right.gear.w")
+    momentum = MASS * (SPEED - left + right) + LOAD * h * np.arange(1, 401)
     expected = np.array([film_impulse(REACH, **OIL) - film_impulse(min(at, REACH), **OIL) for at in d])
     print(np.abs(momentum - expected).max(), momentum[-1])
     assert momentum == pytest.approx(expected, abs=2e-5 * momentum[-1])
@@ -117,13 +112,9 @@ def test_force_is_continuous_where_flanks_touch() -> None:
     for h in (2e-6, 1e-6):
         thin = {**ON, "oil_viscosity": 2e-4, "effect.contact_damping": 0.0}
         kernel = falling(h, DG4, thin, compliance=1e-8)
-        force, pairs = [], []
-        for i in range(round(6e-3 / h)):
-            kernel.step(i * h, h)
-            force.append(kernel.get("mesh.force"))
-            pairs.append(kernel.get("mesh.pairs"))
+        _, force, pairs = fall(kernel, round(6e-3 / h), h, "mesh.force", "mesh.pairs")
         touch = int(np.flatnonzero(pairs)[0])
-        assert force[touch - 1] > 0 and min(force) >= 0.0
+        assert force[touch - 1] > 0 and force.min() >= 0.0
         largest.append(np.abs(np.diff(force[touch - 5 : touch + 5])).max())
     print(largest)
     assert largest[1] < 0.65 * largest[0]
@@ -132,18 +123,12 @@ def test_force_is_continuous_where_flanks_touch() -> None:
 def test_a_film_does_not_pull() -> None:
     """Bodies that part feel nothing: half-Sommerfeld."""
     kernel = falling(1e-5, DG4, ON)
-    for i in range(300):
-        kernel.step(i * 1e-5, 1e-5)
-    assert kernel.get("mesh.force") > 0
-    kernel.set("left.tau", -LOAD)
-    kernel.set("right.tau", LOAD)
-    forces, opening = [], []
-    for i in range(300, 1500):
-        before = gap(kernel)
-        kernel.step(i * 1e-5, 1e-5)
-        forces.append(kernel.get("mesh.force"))
-        opening.append(gap(kernel) > before)
-    assert min(forces) == 0.0 and any(opening) and all(f == 0.0 for f, o in zip(forces, opening, strict=True) if o)
+    _, force = fall(kernel, 300, 1e-5, "mesh.force")
+    assert force[-1] > 0
+    give(kernel, {"left.tau": -LOAD, "right.tau": LOAD})
+    d, force = fall(kernel, 1200, 1e-5, "mesh.force")
+    opening = np.diff(d) > 0
+    assert force.min() == 0.0 and opening.any() and not force[1:][opening].any()
 
 
 # ---- gears -----------------------------------------------------------------------------------------------------------
@@ -167,10 +152,10 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
         assert 0 < kernel.get("mesh.film_loss") <= 1.001 * found.dissipated[-1]
 
 
-def test_off_reads_nothing_of_the_oil(spec: Stage, bodies: list[Body]) -> None:
-    model, bits = assemble(spec, bodies), []
+def test_off_reads_nothing_of_the_oil(plain: StageModel) -> None:
+    bits = []
     for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
-        trace = simulate(model, Steady(model, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
+        trace = simulate(plain, Steady(plain, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
         bits.append(trace["mesh.te"].tobytes() + trace["mesh.force"].tobytes())
         assert trace["mesh.film_loss"][-1] == 0.0
     assert bits[0] == bits[1]

@@ -93,6 +93,8 @@ def in_motion(model: StageModel, case: Case) -> list[float]:
     for mesh, end in zip(case.engagements, ends, strict=True):
         impulse = STEP * np.cumsum(trace[f"{mesh}.force_mean"])
         lost, pressed = (np.ptp(np.interp(end, trace.time, x)) for x in (trace[f"{mesh}.friction_loss"], impulse))
+        power = STEP * np.cumsum(trace[f"{mesh}.friction_power"])
+        assert np.ptp(np.interp(end, trace.time, power)) == pytest.approx(lost, rel=0.01)
         found.append(float(lost / pressed))
     return found
 
