@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
@@ -30,10 +31,7 @@ def held(spec: Stage, bodies: list[Body]) -> StageModel:
 
 def at_rest(held: StageModel, torque: float) -> Kernel:
     """In equilibrium under the torque (N·m) on the pinion; only flanks carry, along the line of action."""
-    kernel = held.kernel(level=FAST, **{"effect.tip_contact": 0.0})
-    kernel.set("pinion.tau", torque)
-    kernel.initialize()
-    return kernel
+    return begun(held.kernel(level=FAST, **{"effect.tip_contact": 0.0}), {"pinion.tau": torque})
 
 
 def bearing(kernel: Kernel, shaft: str, mean: bool = False) -> np.ndarray:

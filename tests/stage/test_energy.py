@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builds import edited_library
+from driven import give, stepped
 
 from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
@@ -80,13 +81,10 @@ def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -
     start = Rattle(load=2.0, play=2e-3, speed=0.0)
     kernel = started(pair_free, start, {"level": FAST, "h": 5e-6, "effect.hertz": 0, **rolling})
     elastic = started(pair_free, start, {"level": FAST, "effect.hertz": 0}).get("energy.stored")
-    for port in kernel.ports:
-        kernel.set(f"{port}.tau", 0.0)
-    stored = np.empty(200)
-    for i in range(len(stored)):
-        kernel.step(i * 1e-3, 1e-3)
-        stored[i] = kernel.get("energy.stored") - kernel.get("energy.work")
-        assert kernel.get("mesh.contact") == 0
+    give(kernel, dict.fromkeys((f"{port}.tau" for port in kernel.ports), 0.0))
+    held, work, contact = stepped(kernel, 200, 1e-3, "energy.stored", "energy.work", "mesh.contact").T
+    stored = held - work
+    assert not contact.any()
     trend = len(stored) * np.polyfit(np.arange(1, len(stored)), stored[1:], 1)[0]
     print(f"{speed} rad/s: {trend / elastic:.1e}")
     assert abs(trend) < 4e-7 * elastic
@@ -113,13 +111,10 @@ def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> n
     """Speeds of both gears every 3.2 µs of 0.16 ms; loaded, linear law, no contact opens, place frozen."""
     parameters = {"level": FAST, "h": h, "slices": 1, "effect.hertz": 0.0, "integrator": integrator}
     kernel = started(pair, Rattle(position=0.8, load=LOAD, speed=0.05), parameters, library)
-    inner, samples = round(3.2e-6 / h), []
-    for i in range(50):
-        for j in range(inner):
-            kernel.step((i * inner + j) * h, h)
-        samples.append([kernel.get(f"{shaft}.gear.w") for shaft in ("pinion", "wheel")])
+    inner = round(3.2e-6 / h)
+    found = stepped(kernel, 50 * inner, h, "pinion.gear.w", "wheel.gear.w")[inner - 1 :: inner]
     assert kernel.get("mesh.pairs") > 0
-    return np.array(samples)
+    return found
 
 
 @pytest.fixture(scope="module")

@@ -50,12 +50,8 @@ def rigid_error(spec: Stage, bodies: list[Body], along: int, nodes_of: str = "bo
     free = free_pair(with_nodes(spec, along=along, across=5, penalty=PENALTY, nodes_of=nodes_of), bodies)
     off = {"effect.elastic": 0.0, "effect.bearings": 0.0, "effect.roll_motion": 1.0}
     kernel = started(free, Rattle(position=0.5, speed=0.05, offset=28e-6), {"level": PAPER, **off})
-    found = []
-    for i in range(300):
-        kernel.step(i * 2e-6, 2e-6)
-        found.append([kernel.get("mesh.force"), kernel.get("mesh.te") - 2e-6, kernel.get("mesh.pairs")])
-    force, depth, pairs = np.array(found).T
-    depth = np.maximum(depth, 0.0)
+    force, te, pairs = stepped(kernel, 300, 2e-6, "mesh.force", "mesh.te", "mesh.pairs").T
+    depth = np.maximum(te - 2e-6, 0.0)
     exact = spec.written.gears[0].face_width * 4 * math.sqrt(2) / 3 * PENALTY * math.sqrt(radius) * depth**1.5
     assert pairs.max() == 1 and force.max() > 500
     return float(np.abs(force - exact).max() / force.max())

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.bearing import rest
 from gearfmu.body import load_bodies
@@ -172,9 +173,7 @@ def test_the_blob_holds_the_whole_tangent(name: str) -> None:
 def test_displacements_and_dampers_follow_the_whole_tangent() -> None:
     """At rest a displacement output is the compliance times all forces of its bearing; dampers press through κ K_s⁻¹ on
     the supports."""
-    kernel = model(PAIR).kernel(level=1.0)
-    kernel.set("pinion.phi", 0.01)
-    kernel.initialize()
+    kernel = begun(model(PAIR).kernel(level=1.0), {"pinion.phi": 0.01})
     sections, compliance = springs(model(PAIR))
     forces = np.array([kernel.get(entry) for entry in str(sections["support_names"]).split("|")])
     moved = np.array([kernel.get(entry) for entry in str(sections["displacement_names"]).split("|")])

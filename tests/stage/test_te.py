@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
@@ -146,10 +147,6 @@ def test_rest_under_torques_on_both_ports_is_the_transmission_there(relieved: St
     assert kernel.ports == ["pinion", "wheel"]
     phi = kernel.rest(torques)
     assert phi["pinion"] == pytest.approx(kernel.transmission(phi["wheel"], LOAD).phi, rel=4e-3)
-    started = relieved.kernel(level=0.0)
-    for name, torque in torques.items():
-        stiffness = relieved.stage.ports[name].k
-        assert stiffness is not None
-        started.set(f"{name}.phi", phi[name] + torque / stiffness)
-    started.initialize()
-    assert [started.get(f"{name}.tau") for name in torques] == pytest.approx([-t for t in torques.values()], rel=4e-3)
+    ends = {f"{name}.phi": phi[name] + torque / relieved.stage.ports[name].k for name, torque in torques.items()}
+    wound = begun(relieved.kernel(level=0.0), ends)
+    assert [wound.get(f"{name}.tau") for name in torques] == pytest.approx([-t for t in torques.values()], rel=4e-3)

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import SpecError
-from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import RotorSpec, Stage
@@ -27,21 +28,13 @@ FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
 
 
-def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[str, np.ndarray]:
-    """Outputs (steps + 1,) by name. drives: functions of time → inputs, each with a prefix for its names."""
-    kernel = model.kernel(level=FAST, **parameters)
-    names = [v.name for v in kernel.variables.values() if v.causality == "output"]
-    rows = []
-    for step in range(STEPS + 1):
-        for prefix, drive in drives.items():
-            for name, value in drive(max(step - 1, 0) * H).items():
-                kernel.set(prefix + name, value)
-        if step == 0:
-            kernel.initialize()
-        else:
-            kernel.step((step - 1) * H, H)
-        rows.append([kernel.get(name) for name in names])
-    return dict(zip(names, np.array(rows).T, strict=True))
+def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
+    """drives: of the pairs in a stage, each with a prefix for its names."""
+
+    def inputs(time: float) -> dict[str, float]:
+        return {prefix + name: value for prefix, drive in drives.items() for name, value in drive(time).items()}
+
+    return simulate(model, inputs, STEPS * H, H, {"level": FAST})
 
 
 def side_by_side(pair: Stage) -> Stage:
@@ -82,7 +75,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
     first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
     together = run(both, {"": first, "b_": second})
     for prefix, alone in (("", run(relieved, {"": first})), ("b_", run(apart, {"": second}))):
-        for name in alone:
+        for name in alone.channels:
             if name.startswith(("energy.", "solver.")):
                 continue
             head, _, rest = name.partition(".")
@@ -93,10 +86,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
 
 def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
     """Outputs in static equilibrium under TORQUE, input and output wound against each other."""
-    kernel = model.kernel(level=FAST, **parameters)
-    for name, value in Steady(model, 0.0, TORQUE)(0.0).items():
-        kernel.set(name, value)
-    kernel.initialize()
+    kernel = begun(model.kernel(level=FAST, **parameters), Steady(model, 0.0, TORQUE)(0.0))
     return {v.name: kernel.get(v.name) for v in kernel.variables.values() if v.causality == "output"}
 
 
