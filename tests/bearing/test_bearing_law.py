@@ -8,12 +8,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bearings import ANGULAR, AT, DEEP, KINDS, ROLLERS, TAPER, load
 from scipy.integrate import quad
 
 from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, Row, filled_ball, pass_orders, pass_swing, rest
 from gearfmu.bearing.hertz import line_pressure, point
 from gearfmu.bearing.rest import preloaded
+
+DEEP = Balls(8, 12e-3, 50e-3, (0.52, 0.53), 0.0, 10e-6)
+ANGULAR = Balls(12, 9.5e-3, 46e-3, (0.515, 0.525), np.radians(30.0), 0.0)
+ROLLERS = Rollers(13, 8e-3, 46e-3, 10e-3, 8e-6)
+TAPER = Rollers(17, 7.5e-3, 50e-3, 14e-3, 0.0, np.radians(15.0))
+KINDS = {
+    "deep groove": Rolling((Row(DEEP),)),
+    "angular": Rolling((Row(ANGULAR),)),
+    "mirrored, beside the centre": Rolling((Row(ANGULAR, 20e-3, -1, 5e-6),)),
+    "two in O arrangement": Rolling((Row(ANGULAR, -30e-3, 1, 8e-6), Row(ANGULAR, 30e-3, -1, 8e-6))).spread(4),
+    "roller": Rolling((Row(ROLLERS),)),
+    "taper": Rolling((Row(TAPER),)),
+}
+_AT = np.array([18e-6, -9e-6, 40e-6, 2e-4, -3e-4])
+AT = {name: _AT * ([1, 1, -1, -1, -1] if "mirrored" in name else 1.0) for name in KINDS}  # where they carry
+
+
+def load(*values: float) -> np.ndarray:
+    """Fx, Fy, Fz, Mx, My; zeros for those that are not said."""
+    return np.array([*values, *[0.0] * (5 - len(values))])
+
 
 # Seven balls of 11.5 mm on 43.5 mm, grooves 0.52 and 0.53, E 210 GPa: deflections that a commercial program prints, as
 # quoted in the tests of github.com/minzhun/ISO16281. Load N, N·m; clearance µm; radial and axial µm, tilt mrad.

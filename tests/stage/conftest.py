@@ -1,4 +1,4 @@
-"""The shipped FZG stages, assembled once."""
+"""Shipped stages, assembled once."""
 
 from __future__ import annotations
 
@@ -39,7 +39,21 @@ def plain(spec: Stage, bodies: list[Body]) -> StageModel:
 
 @pytest.fixture(scope="session")
 def helical() -> StageModel:
-    stage = load_stage("helical_demo")
+    return shipped("helical_demo")
+
+
+@pytest.fixture(scope="session")
+def planetary() -> StageModel:
+    return shipped("planetary54")
+
+
+@pytest.fixture(scope="session")
+def two_stage() -> StageModel:
+    return shipped("two_stage")
+
+
+def shipped(name: str) -> StageModel:
+    stage = load_stage(name)
     return assemble(stage, load_bodies(stage))
 
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
@@ -30,10 +31,7 @@ def held(spec: Stage, bodies: list[Body]) -> StageModel:
 
 def at_rest(held: StageModel, torque: float) -> Kernel:
     """In equilibrium under the torque (N·m) on the pinion; only flanks carry, along the line of action."""
-    kernel = held.kernel(level=FAST, **{"effect.tip_contact": 0.0})
-    kernel.set("pinion.tau", torque)
-    kernel.initialize()
-    return kernel
+    return begun(held.kernel(level=FAST, **{"effect.tip_contact": 0.0}), {"pinion.tau": torque})
 
 
 def bearing(kernel: Kernel, shaft: str, mean: bool = False) -> np.ndarray:
@@ -81,16 +79,3 @@ def test_on_average_nothing_is_left_of_contact_and_bearing_forces(relieved: Stag
             found = [trace[f"bearing.{shaft}.f{axis}{kind}"][settled].mean() for axis in "xy"]
             print(f"{shaft} {kind or 'end'}: {np.array(found)} N, {sign * wanted} N")
             assert np.allclose(found, sign * wanted, rtol=0, atol=share * force)
-
-
-def test_the_mean_of_a_bearing_force_is_that_of_its_values(relieved: StageModel) -> None:
-    """A communication step of one internal step after the other: their mean forces and the values at their ends."""
-    h = 2e-6
-    trace = simulate(relieved, Steady(relieved, SPEED, LOAD), 3e-3, h, {"level": FAST, "h": h})
-    for shaft in SHAFTS:
-        for axis in "xy":
-            ends, means = (trace[f"bearing.{shaft}.f{axis}{kind}"] for kind in ("", "_mean"))
-            middle = 0.5 * (ends[1:] + ends[:-1])
-            error = np.abs(means[1:] - middle).max() / np.ptp(ends)
-            print(f"{shaft} {axis}: {np.ptp(ends):.0f} N alternate, mean against ends {error:.1e}")
-            assert error < 0.02

@@ -9,7 +9,7 @@ from few_modes import with_modes
 
 from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
-from gearfmu.stage import Steady, assemble
+from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 
@@ -41,17 +41,9 @@ def halved(body: Body) -> Body:
 
 def alternating(spec: Stage, bodies: list[Body]) -> np.ndarray:
     model = assemble(spec, bodies)
-    kernel, steady = model.kernel(level=1.0, h=3.75e-6), Steady(model, SPEED, LOAD)
-    for name, value in steady(0.0).items():
-        kernel.set(name, value)
-    kernel.initialize()
-    te = np.empty(SAMPLES)
-    for i in range(SAMPLES):
-        for name, value in steady(i * STEP).items():
-            kernel.set(name, value)
-        kernel.step(i * STEP, STEP)
-        te[i] = kernel.get("mesh.te")
-    return te[SETTLED:] - te[SETTLED:].mean()
+    trace = simulate(model, Steady(model, SPEED, LOAD), SAMPLES * STEP, STEP, {"level": 1.0, "h": 3.75e-6})
+    te = trace["mesh.te"][1 + SETTLED :]
+    return te - te.mean()
 
 
 def test_the_same_bodies_take_the_same_constant(relief_spec: Stage, bodies: list[Body]) -> None:

@@ -4,6 +4,7 @@ and whichever ports decide them, the third shaft follows by Willis' equation."""
 from __future__ import annotations
 
 import pytest
+from driven import begun
 
 from gearfmu.stage import StageModel
 from tests.relations.kinds import KINDS, assembled, bodies_of
@@ -34,11 +35,8 @@ def differential(ports: tuple[str, str, str]) -> StageModel:
 
 def at_rest(model: StageModel, carrier: float, ring: float) -> tuple[float, float, float, float]:
     """Angle of the sun less that of Willis (rad); torques of sun, ring and carrier (N·m), the sun's spring wound up."""
-    kernel = model.kernel(level=1.0)
     sun = (1 + RATIO) * carrier - RATIO * ring
-    for name, phi in {"carrier": carrier, "ring": ring, "sun": sun + WOUND}.items():
-        kernel.set(f"{name}.phi", phi)
-    kernel.initialize()
+    kernel = begun(model.kernel(level=1.0), {"carrier.phi": carrier, "ring.phi": ring, "sun.phi": sun + WOUND})
     turned = {name: kernel.get(f"{name}.gear.phi") for name in ("sun", "ring", "carrier")}
     astray = turned["sun"] - (1 + RATIO) * turned["carrier"] + RATIO * turned["ring"]
     return (astray, *(kernel.get(f"{name}.tau") for name in ("sun", "ring", "carrier")))

@@ -17,7 +17,7 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.scenefile.scene import Effects
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
-from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
+from gearfmu.stage.effects import EFFECTS, costs, torque_on_flanks_alone
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
@@ -320,6 +320,16 @@ def test_builds_leave_out_the_effects_of_the_kernels_table() -> None:
     table = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_effects.inc").read_text(encoding="utf-8")
     names = re.findall(r"^GK_(?:EFFECT|PART)\((\w+)", table, re.MULTILINE)
     assert sorted(names) == sorted(effect.build for effect in EFFECTS)
+
+
+def test_what_is_off_costs_nothing() -> None:
+    """At most 5 % more instructions than a kernel compiled without it, by the table in the package, which the
+    documentation shows. evidence.price.effects_cost, which makes it, fails where a run with the effect off has other
+    bits, too."""
+    found = costs()
+    assert list(found) == [effect.name for effect in EFFECTS]
+    for cost in found.values():
+        assert math.isfinite(cost.share) and -0.05 < cost.price_of_off <= 0.05, cost
 
 
 def test_the_verb_prints_the_table_with_the_numbers_of_a_stage(capsys: pytest.CaptureFixture[str]) -> None:

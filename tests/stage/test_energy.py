@@ -4,7 +4,6 @@ closed contact; the balance of a loaded damped run closes; central is the same p
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builds import edited_library
+from driven import give, stepped
 
 from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
@@ -73,15 +73,6 @@ def test_invariant_holds_and_damping_never_adds(
         assert energy.keeps(case, line)
 
 
-@pytest.mark.parametrize("slices", [*(pytest.param(n, marks=pytest.mark.full) for n in (1, 5)), 10])
-def test_free_rattle_of_50_ms(pair_free: FreePair, libraries: dict[str, Path | None], slices: int) -> None:
-    case = energy.CASES["free rattle"]
-    run = {**SHORT, "duration": 0.05, "libraries": libraries}
-    for build in ("double", "shipped"):
-        line = energy.row(pair_free, "free rattle", case, (build, 1, slices, 7.5e-6), run)
-        assert energy.keeps(case, line) and line["changes"] >= 20
-
-
 @pytest.mark.parametrize("speed", [0.0, 0.1])
 def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -> None:
     """40 000 steps in which gears that have sprung apart turn slowly and ring. Turns below the last place of a speed
@@ -90,13 +81,10 @@ def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -
     start = Rattle(load=2.0, play=2e-3, speed=0.0)
     kernel = started(pair_free, start, {"level": FAST, "h": 5e-6, "effect.hertz": 0, **rolling})
     elastic = started(pair_free, start, {"level": FAST, "effect.hertz": 0}).get("energy.stored")
-    for port in kernel.ports:
-        kernel.set(f"{port}.tau", 0.0)
-    stored = np.empty(200)
-    for i in range(len(stored)):
-        kernel.step(i * 1e-3, 1e-3)
-        stored[i] = kernel.get("energy.stored") - kernel.get("energy.work")
-        assert kernel.get("mesh.contact") == 0
+    give(kernel, dict.fromkeys((f"{port}.tau" for port in kernel.ports), 0.0))
+    held, work, contact = stepped(kernel, 200, 1e-3, "energy.stored", "energy.work", "mesh.contact").T
+    stored = held - work
+    assert not contact.any()
     trend = len(stored) * np.polyfit(np.arange(1, len(stored)), stored[1:], 1)[0]
     print(f"{speed} rad/s: {trend / elastic:.1e}")
     assert abs(trend) < 4e-7 * elastic
@@ -119,23 +107,14 @@ def test_controls_are_seen_to_fail(pair_free: FreePair, libraries: dict[str, Pat
     assert line["drift"] > case.at_least
 
 
-@pytest.mark.full
-def test_the_whole_table_of_the_fast_level(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sys, "argv", ["energy.py", "--starts", "5", "--out", str(tmp_path / "energy.csv")])
-    assert energy.main() == 0
-
-
 def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> np.ndarray:
     """Speeds of both gears every 3.2 µs of 0.16 ms; loaded, linear law, no contact opens, place frozen."""
     parameters = {"level": FAST, "h": h, "slices": 1, "effect.hertz": 0.0, "integrator": integrator}
     kernel = started(pair, Rattle(position=0.8, load=LOAD, speed=0.05), parameters, library)
-    inner, samples = round(3.2e-6 / h), []
-    for i in range(50):
-        for j in range(inner):
-            kernel.step((i * inner + j) * h, h)
-        samples.append([kernel.get(f"{shaft}.gear.w") for shaft in ("pinion", "wheel")])
+    inner = round(3.2e-6 / h)
+    found = stepped(kernel, 50 * inner, h, "pinion.gear.w", "wheel.gear.w")[inner - 1 :: inner]
     assert kernel.get("mesh.pairs") > 0
-    return np.array(samples)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -189,9 +168,3 @@ def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: Sta
     found, wanted = (statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, 2.5e-6))
     line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
     assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
-
-
-@pytest.mark.full
-def test_light_load_rattle_from_four_starts(relieved: StageModel) -> None:
-    lines = light_rattle.table(relieved, 0.3, FAST)
-    assert not [light_rattle.missed(line) for line in lines if line["start"] == -1 and light_rattle.missed(line)]

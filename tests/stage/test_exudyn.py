@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
@@ -22,17 +21,6 @@ def rotor() -> exudyn_rotor.Rotor:
     return exudyn_rotor.make_rotor()
 
 
-@pytest.fixture(scope="module")
-def table() -> dict[float, dict[float, dict[str, float]]]:
-    """Speed → step of Exudyn → differences."""
-    found: dict[float, dict[float, dict[str, float]]] = {}
-    with exudyn_rotor.TABLE.open(encoding="utf-8") as file:
-        for row in csv.DictReader(file):
-            values = {name: float(value) for name, value in row.items()}
-            found.setdefault(values["speed"], {})[values["step"]] = values
-    return found
-
-
 def test_a_kicked_gear_whirls_as_in_exudyn(rotor: exudyn_rotor.Rotor) -> None:
     """1 ms at 600 rad/s against what Exudyn's steps converge to: bore within 2e-4, the pairs of ν ≥ 2 within 3e-3 (40
     periods), where without gyroscopic forces they differ by 45 and 10 %. What is left grows with the square of the
@@ -47,24 +35,6 @@ def test_a_kicked_gear_whirls_as_in_exudyn(rotor: exudyn_rotor.Rotor) -> None:
         print(known, found)
         assert found[0] < bore and found[1] < high
         assert known or min(found) > 0.08
-
-
-def test_exudyn_comes_nearer_by_the_square_of_its_step(table) -> None:
-    """Halving its step quarters the difference, down to what differs by the square of the speed."""
-    for speed in (300.0, 600.0):
-        of_step = table[speed]
-        for name in ("bore", "modes"):
-            coarse, middle, fine, limit = (of_step[h][name] for h in (1e-6, 5e-7, 2.5e-7, 0.0))
-            assert coarse / middle == pytest.approx(4.0, rel=0.05)
-            assert middle / fine == pytest.approx(4.0, rel=0.07)
-            assert limit < 0.3 * fine
-    left = [table[speed][0.0]["modes"] for speed in (300.0, 600.0, 1200.0)]
-    assert left[0] < left[1] and left[2] / left[1] == pytest.approx(4.0, rel=0.3)
-
-
-def test_the_centrifugal_stretch_is_exudyn_s(table) -> None:
-    """Ω² f_c/ω² of the fan mode, within 6e-4 at the largest speed."""
-    assert all(abs(table[speed][0.0]["growth"]) < 6e-4 for speed in table)
 
 
 @pytest.mark.full

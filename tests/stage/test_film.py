@@ -1,5 +1,5 @@
-"""Squeeze film in open gaps: exact solutions of a falling body, energy, no tension, rattle with and without, stages,
-and what a stage file says of it."""
+"""Squeeze film in open gaps: exact solutions of a falling body, energy, no tension, and what a stage file says of it.
+Stages on oil: tests/relations."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from driven import give, stepped
 from scipy.integrate import solve_ivp
 
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
-from evidence.stability.planetary import ALL_MESHES, RATIO, PlanetSet, set_bodies, set_spec
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
-from gearfmu.body import Body, load_bodies
+from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.meshes import REACH, film_impulse
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import FilmSpec
 
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
@@ -58,8 +57,10 @@ def falling(h: float, integrator: float, settings: Mapping[str, float], complian
     return kernel
 
 
-def gap(kernel: Kernel) -> float:
-    return START + kernel.get("right.gear.phi") - kernel.get("left.gear.phi")
+def fall(kernel: Kernel, count: int, h: float, *names: str) -> tuple[np.ndarray, ...]:
+    """Gap (m) and outputs after each of so many steps of h."""
+    right, left, *others = stepped(kernel, count, h, "right.gear.phi", "left.gear.phi", *names).T
+    return START + right - left, *others
 
 
 def reference(end: float) -> object:
@@ -79,14 +80,11 @@ def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: in
     """From beyond the reach down to 4 µm: the trajectory converges to the solution of the differential equation."""
     end, exact, worst = 4e-3, reference(4e-3), []
     for h in (4e-5, 2e-5, 1e-5):
-        kernel = falling(h, integrator, ON)
-        errors = []
-        for i in range(round(end / h)):
-            kernel.step(i * h, h)
-            errors.append(gap(kernel) - exact((i + 1) * h)[0])  # type: ignore[operator]
-        worst.append(np.abs(errors).max())
-    print(worst, gap(kernel))
-    assert gap(kernel) < 5e-6 and kernel.get("solver.retried_steps") == 0
+        kernel, count = falling(h, integrator, ON), round(end / h)
+        (d,) = fall(kernel, count, h)
+        worst.append(np.abs(d - exact(h * np.arange(1, count + 1))[0]).max())  # type: ignore[operator]
+    print(worst, d[-1])
+    assert d[-1] < 5e-6 and kernel.get("solver.retried_steps") == 0
     assert worst[-1] < 3e-9 if order else worst[-1] < 1e-10
     if order:
         assert worst[0] / worst[2] > 0.7 * 4**order
@@ -95,14 +93,9 @@ def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: in
 def test_momentum_and_thickness_are_the_closed_form() -> None:
     """What the film took is ∫ c dd between the thicknesses, in every step: m Δv + F t = I(d₀) − I(d), exactly. It
     lies between no oil and oil that reaches without end."""
-    h, taken = 1e-5, []
-    kernel = falling(h, DG4, ON)
-    for i in range(400):
-        kernel.step(i * h, h)
-        speed = kernel.get("left.gear.w") - kernel.get("right.gear.w")
-        momentum = MASS * (SPEED - speed) + LOAD * (i + 1) * h
-        taken.append([gap(kernel), momentum])
-    d, momentum = np.array(taken).T
+    h = 1e-5
+    d, left, right = fall(falling(h, DG4, ON), 400, h, "left.gear.w", "right.gear.w")
+    momentum = MASS * (SPEED - left + right) + LOAD * h * np.arange(1, 401)
     expected = np.array([film_impulse(REACH, **OIL) - film_impulse(min(at, REACH), **OIL) for at in d])
     print(np.abs(momentum - expected).max(), momentum[-1])
     assert momentum == pytest.approx(expected, abs=2e-5 * momentum[-1])
@@ -119,13 +112,9 @@ def test_force_is_continuous_where_flanks_touch() -> None:
     for h in (2e-6, 1e-6):
         thin = {**ON, "oil_viscosity": 2e-4, "effect.contact_damping": 0.0}
         kernel = falling(h, DG4, thin, compliance=1e-8)
-        force, pairs = [], []
-        for i in range(round(6e-3 / h)):
-            kernel.step(i * h, h)
-            force.append(kernel.get("mesh.force"))
-            pairs.append(kernel.get("mesh.pairs"))
+        _, force, pairs = fall(kernel, round(6e-3 / h), h, "mesh.force", "mesh.pairs")
         touch = int(np.flatnonzero(pairs)[0])
-        assert force[touch - 1] > 0 and min(force) >= 0.0
+        assert force[touch - 1] > 0 and force.min() >= 0.0
         largest.append(np.abs(np.diff(force[touch - 5 : touch + 5])).max())
     print(largest)
     assert largest[1] < 0.65 * largest[0]
@@ -134,18 +123,12 @@ def test_force_is_continuous_where_flanks_touch() -> None:
 def test_a_film_does_not_pull() -> None:
     """Bodies that part feel nothing: half-Sommerfeld."""
     kernel = falling(1e-5, DG4, ON)
-    for i in range(300):
-        kernel.step(i * 1e-5, 1e-5)
-    assert kernel.get("mesh.force") > 0
-    kernel.set("left.tau", -LOAD)
-    kernel.set("right.tau", LOAD)
-    forces, opening = [], []
-    for i in range(300, 1500):
-        before = gap(kernel)
-        kernel.step(i * 1e-5, 1e-5)
-        forces.append(kernel.get("mesh.force"))
-        opening.append(gap(kernel) > before)
-    assert min(forces) == 0.0 and any(opening) and all(f == 0.0 for f, o in zip(forces, opening, strict=True) if o)
+    _, force = fall(kernel, 300, 1e-5, "mesh.force")
+    assert force[-1] > 0
+    give(kernel, {"left.tau": -LOAD, "right.tau": LOAD})
+    d, force = fall(kernel, 1200, 1e-5, "mesh.force")
+    opening = np.diff(d) > 0
+    assert force.min() == 0.0 and opening.any() and not force[1:][opening].any()
 
 
 # ---- gears -----------------------------------------------------------------------------------------------------------
@@ -169,102 +152,13 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
         assert 0 < kernel.get("mesh.film_loss") <= 1.001 * found.dissipated[-1]
 
 
-def test_thicker_oil_leaves_less_rebound(pair_free: FreePair) -> None:
-    left = []
-    for viscosity in (1e-4, 3e-3, 1e-2, 0.1):
-        settings = {"effect.film": 1.0, "oil_viscosity": viscosity, "h": 5e-6, "level": 1.0}
-        kernel = started(pair_free, Rattle(speed=0.2), settings)
-        found = energies(kernel, 5e-6, 1e-3)
-        left.append(1 - found.dissipated[-1] / found.kinetic)
-    print(left)
-    assert np.all(np.diff(left) < 0)
-
-
-def test_integrators_agree_on_a_light_run(spec: Stage, bodies: list[Body]) -> None:
-    model, found = assemble(spec, bodies), {}
-    for integrator, h in ((DG4, 1e-6), (CENTRAL, 1e-6), (RK45, 1e-6)):
-        run = {"level": 1.0, "integrator": integrator, "effect.film": 1.0, "h": h}
-        found[integrator] = simulate(model, Steady(model, 100.0, 1.0), 4e-4, 20e-6, run)["mesh.force"]
-    scale = np.abs(found[RK45]).max()
-    assert found[CENTRAL] == pytest.approx(found[RK45], abs=2e-3 * scale)
-    assert found[DG4] == pytest.approx(found[RK45], abs=0.05 * scale)
-
-
-def test_off_reads_nothing_of_the_oil(spec: Stage, bodies: list[Body]) -> None:
-    model, bits = assemble(spec, bodies), []
+def test_off_reads_nothing_of_the_oil(plain: StageModel) -> None:
+    bits = []
     for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
-        trace = simulate(model, Steady(model, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
+        trace = simulate(plain, Steady(plain, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
         bits.append(trace["mesh.te"].tobytes() + trace["mesh.force"].tobytes())
         assert trace["mesh.film_loss"][-1] == 0.0
     assert bits[0] == bits[1]
-
-
-def test_statics_and_the_linearised_stage_know_no_film(spec: Stage, bodies: list[Body]) -> None:
-    model, found = assemble(spec, bodies), []
-    for on in (0.0, 1.0):
-        kernel = model.kernel(**{"level": 1.0, "effect.film": on})
-        kernel.prepare()
-        found.append(kernel.transmission(0.01, 100.0).te)
-    assert found[0] == found[1]
-
-
-def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
-    """Free rattle from four starts: impacts in 30 ms, mean over the starts."""
-    mean = []
-    for film in ({}, {"effect.film": 1.0, "oil_viscosity": 5e-3}):
-        impacts = []
-        for i in (0, 3, 6, 9):
-            start = Rattle(position=0.1 * i, speed=0.15 + 0.01 * i)
-            kernel = started(pair_free, start, {"h": 1e-5, "level": 1.0, "effect.contact_damping": 1.0, **film})
-            energies(kernel, 1e-5, 0.03)
-            impacts.append(kernel.get("mesh.impacts"))
-        mean.append(np.mean(impacts))
-    print(mean)
-    assert mean[1] < 0.8 * mean[0]
-
-
-@pytest.mark.parametrize("torque", [1.0, pytest.param(100.0, marks=pytest.mark.full)])
-def test_a_helical_pair_runs_on_oil(helical: StageModel, torque: float) -> None:
-    run = {"level": 1.0, "effect.film": 1.0, "h": 5e-6}
-    trace = simulate(helical, Steady(helical, 100.0, torque), 2e-3, 20e-6, run)
-    passed = trace["energy.stored"].max()
-    assert trace.meta["outcome"] == "completed" and trace["solver.retried_steps"][-1] == 0
-    assert trace["mesh.film_loss"][-1] > 0
-    dry = simulate(helical, Steady(helical, 100.0, torque), 2e-3, 20e-6, run | {"effect.film": 0.0})
-    assert abs(trace["energy.residual"][-1]) < 1.2 * abs(dry["energy.residual"][-1]) + 1e-6 * passed
-
-
-def test_a_train_runs_on_oil() -> None:
-    spec = load_stage("two_stage")
-    model = assemble(spec, load_bodies(spec))
-    trace = simulate(model, Steady(model, 20.0, 5.0), 1e-3, 2e-5, {"level": 1.0, "effect.film": 1.0})
-    lost = {name: trace[name][-1] for name in trace.channels if name.endswith(".film_loss")}
-    print(lost, trace["energy.residual"][-1], trace["solver.retried_steps"][-1])
-    assert trace.meta["outcome"] == "completed" and sum(lost.values()) > 0
-    assert (
-        all(math.isfinite(value) and value >= 0 for value in lost.values()) and trace["solver.retried_steps"][-1] <= 5
-    )
-    assert abs(trace["energy.residual"][-1]) < 1e-3 * trace["energy.stored"].max()
-
-
-@pytest.mark.full
-def test_a_planetary_set_runs_on_oil() -> None:
-    """Lightly loaded at a tenth of its speed: every mesh squeezes, the balance holds."""
-    speed, step = 8.5, 2e-5
-    kernel = Kernel(assemble(set_spec(PlanetSet()), set_bodies()).blob, {"level": 1.0, "effect.film": 1.0})
-    for name, value in {"carrier.w": speed, "sun.tau": -2.0, "sun.w_start": RATIO * speed}.items():
-        kernel.set(name, value)
-    kernel.initialize()
-    for i in range(100):
-        kernel.set("carrier.phi", speed * i * step)
-        kernel.step(i * step, step)
-    lost = [kernel.get(f"{mesh}.film_loss") for mesh in ALL_MESHES]
-    residual, stored, retried_steps = (
-        kernel.get(name) for name in ("energy.residual", "energy.stored", "solver.retried_steps")
-    )
-    print(lost, residual, stored, retried_steps)
-    assert min(lost) >= 0 and sum(lost) > 0 and retried_steps <= 5
-    assert abs(residual) < 1e-3 * stored
 
 
 # ---- what a stage says -----------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stage.run.te import statics_of
-from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.bodies import (
@@ -35,7 +35,6 @@ from gearfmu.stagefile.tables.bodies import (
     TipRelief,
     Wobble,
 )
-from gearfmu.stagefile.tables.connections import PortSpec
 
 NO_CORNERS = {"effect.tip_contact": 0.0}
 PROFILES: dict[str, dict[str, Any]] = {
@@ -128,18 +127,17 @@ def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_an
             assert te == pytest.approx(nominal + gaps[0], abs=0.1e-6)  # rows at rolls of the pair turned by the gap
 
 
+@pytest.mark.parametrize(
+    ("effect", "pinion"),
+    [("flank_deviations", PROFILES["slope"]), ("runout", {"eccentricity": Eccentricity(amount=20e-6)})],
+    ids=["flank_deviations", "runout"],
+)
 def test_without_the_effect_flanks_are_nominal_to_the_last_bit(
-    spec: Stage, bodies: list[Body], plain: StageModel
+    effect: str, pinion: dict[str, Any], spec: Stage, bodies: list[Body], plain: StageModel
 ) -> None:
-    off = {"effect.flank_deviations": 0.0}
-    modified = assemble(changed(spec, *list(PROFILES.values())[:2]), bodies)
-    assert np.array_equal(loaded_te(modified, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
-    assert "effect.flank_deviations" not in plain.kernel().variables
-
-
-def test_a_stage_that_says_nothing_of_its_flanks_is_the_stage_it_was(spec: Stage, plain: StageModel) -> None:
-    sections = read_blob(plain.blob)
-    assert not [name for name in sections if name.startswith(("flank", "runout", "index", "lead"))]
+    model, off = assemble(changed(spec, pinion), bodies), {f"effect.{effect}": 0.0}
+    assert np.array_equal(loaded_te(model, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
+    assert f"effect.{effect}" not in plain.kernel().variables
 
 
 # ---- eccentricity ----------------------------------------------------------------------------------------------------
@@ -253,33 +251,6 @@ def test_an_eccentric_helical_pinion_is_a_true_one_at_another_place(torque: floa
     assert found < limit and np.ptp(turn.true) > 35e-6
 
 
-def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: Stage, bodies: list[Body]) -> None:
-    """The pinion under a constant torque, the wheel's shaft end turning evenly; one turn of the pinion of two. The
-    shaft's inertia and spring carry 32 Hz without resonance."""
-    e, ports = 100e-6, spec.ports | {"pinion": PortSpec(kind="torque")}
-    eccentric = changed(spec, {"eccentricity": Eccentricity(amount=e)})
-    model = assemble(with_ports(eccentric, ports), bodies)
-    speed, steps = 200.0, 640
-    turn = 2 * math.pi / speed
-
-    def inputs(time: float) -> dict[str, float]:
-        return {"pinion.tau": 302.0, "wheel.phi": -speed / 1.5 * time, "wheel.w": -speed / 1.5}
-
-    start = {"level": 0.0, "pinion.w_start": speed}
-    trace = simulate(model, inputs, 2 * turn, turn / steps, start)
-    te = trace["mesh.te"][-steps:]
-    found = orders(te)
-    print(f"once a turn {1e6 * found[1]:.3f} µm, sidebands of the mesh {1e6 * found[15:18]}")
-    assert found[1] == pytest.approx(e, rel=0.01) and min(found[15], found[17]) > 5 * found[20]
-    assert abs(trace["energy.residual"]).max() < 1e-3 * trace["energy.stored"].max()
-
-
-def test_without_the_effect_gears_run_true(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
-    model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6)}), bodies)
-    off = {"effect.runout": 0.0}
-    assert np.array_equal(loaded_te(model, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
-
-
 # ---- wobble ----------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("quarter", [0, 1])
 def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodies: list[Body]) -> None:
@@ -299,49 +270,39 @@ def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: Stage, bodi
     assert np.allclose(slices, same, rtol=1e-4, atol=1e-3) and np.ptp(slices[0]) > 0.05 * slices[0].mean()
 
 
-def test_a_wobble_tips_the_load_over_once_a_turn(spec: Stage, bodies: list[Body]) -> None:
-    """The first slice's share swings as a cosine of the pinion's angle; its mean is that of true running."""
-    model = assemble(changed(spec, {"wobble": Wobble(amount=1e-4)}), bodies)
-    kernel = statics_of(model)
-    share = []
-    for k in range(16):
-        forces = np.sum(list(kernel.transmission(-2 * math.pi * k / 24, 302.0).forces.values()), axis=0)
-        share.append((forces[0] - forces[-1]) / forces.sum())
-    lines = 2 / 16 * np.abs(np.fft.rfft(share))
-    print(f"difference of the end slices: {lines[:4]}")
-    assert lines[1] > 0.01 and max(lines[2:]) < 0.05 * lines[1] and abs(lines[0]) < 0.05 * lines[1]
-
-
 # ---- topography ------------------------------------------------------------------------------------------------------
-def write_topography(path: Path, roll: np.ndarray, z: np.ndarray, deviation: np.ndarray) -> None:
-    """A CSV file of both flanks, the same on all teeth; deviation (R, W) m."""
-    rows = [
-        f"{1e3 * r:.15g},{1e3 * y:.15g},{1e6 * d:.15g}"
-        for r, line in zip(roll, deviation, strict=True)
-        for y, d in zip(z, line, strict=True)
-    ]
-    path.write_text("\n".join(["# made for a test", "roll_mm,z_mm,deviation_um", *rows]), encoding="utf-8")
-
-
 def crowned(shape: GearGeometry, width: float, roll: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Profile crowning 6 µm, slope 4 µm, lead crowning 5 µm as material (R, W) m."""
     x = 2 * (roll - shape.s_form) / (shape.s_tip - shape.s_form) - 1
     return (2e-6 * x - 6e-6 * x**2)[:, None] - 5e-6 * (2 * z / width) ** 2
 
 
+CLOSED_FORM = {"profile": ProfileSpec(slope=4e-6, crowning=6e-6), "lead": LeadSpec(crowning=5e-6)}
+
+
+@pytest.fixture
+def topography(tmp_path: Path, spec: Stage, pair: PairGeometry) -> dict[str, Any]:
+    """A coarse CSV file of both flanks of the pinion, `crowned` on all teeth."""
+    shape, width = pair.gears[0], spec.written.gears[0].face_width
+    roll, z = np.linspace(shape.s_form, shape.s_tip, 7), np.linspace(-width / 2, width / 2, 5)
+    rows = [
+        f"{1e3 * r:.15g},{1e3 * y:.15g},{1e6 * d:.15g}"
+        for r, line in zip(roll, crowned(shape, width, roll, z), strict=True)
+        for y, d in zip(z, line, strict=True)
+    ]
+    path = tmp_path / "flanks.csv"
+    path.write_text("\n".join(["# made for a test", "roll_mm,z_mm,deviation_um", *rows]), encoding="utf-8")
+    return {"topography": str(path)}
+
+
 def test_a_topography_is_the_same_flank_as_its_closed_form(
-    tmp_path: Path, spec: Stage, bodies: list[Body], pair: PairGeometry
+    topography: dict[str, Any], spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
-    """A coarse file of a flank that is a parabola both ways: splines through its points are that parabola, so that
+    """The flank is a parabola both ways: splines through its points are that parabola, so that
     table and transmission error are those of `profile` and `lead`. Across the width strips take means of straight
     lines between 33 places either way."""
     shape, gear = pair.gears[0], spec.written.gears[0]
-    roll = np.linspace(shape.s_form, shape.s_tip, 7)
-    z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
-    write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
-    measured = assemble(changed(spec, {"topography": str(tmp_path / "flanks.csv")}), bodies)
-    profile, lead = ProfileSpec(slope=4e-6, crowning=6e-6), LeadSpec(crowning=5e-6)
-    designed = assemble(changed(spec, {"profile": profile, "lead": lead}), bodies)
+    measured, designed = (assemble(changed(spec, update), bodies) for update in (topography, CLOSED_FORM))
     found, closed = read_blob(measured.blob), read_blob(designed.blob)
     teeth, places, rolls = found["flank_size0"]
     field = np.asarray(found["flank0"]).reshape(teeth, 2, places, rolls)
@@ -402,17 +363,10 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     assert te == pytest.approx(found, abs=0.3e-6)
 
 
-def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: Stage, bodies: list[Body]) -> None:
+def test_nodal_contact_sees_the_same_flanks(topography: dict[str, Any], spec: Stage, bodies: list[Body]) -> None:
     """Lead and profile crowning as said and as a topography: nodes of flanks run alike; and not as without."""
-    pair = spec.written.geometry
-    shape, gear = pair.gears[0], spec.written.gears[0]
-    roll = np.linspace(shape.s_form, shape.s_tip, 7)
-    z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
-    write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
-    profile, lead = ProfileSpec(slope=4e-6, crowning=6e-6), LeadSpec(crowning=5e-6)
-    kinds: list[dict[str, Any]] = [{"topography": str(tmp_path / "flanks.csv")}, {"profile": profile, "lead": lead}, {}]
     runs = []
-    for update in kinds:
+    for update in (topography, CLOSED_FORM, {}):
         model = assemble(changed(spec, update | {"eccentricity": Eccentricity(amount=5e-6)}), bodies)
         steady = Steady(model, 200.0, 302.0)
         runs.append(simulate(model, steady, 4e-4, 2e-5, {"contact": 2.0, "integrator": 2.0, "level": 0.0})["mesh.te"])

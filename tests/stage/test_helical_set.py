@@ -1,6 +1,5 @@
 """Helical planetary sets of rigid bodies on an elastic foundation of teeth, by hand: axial forces, balance of all
-forces and moments, the moment that tilts a planet on its pin, both hands, the spur set as the limit, load sharing; and
-the shipped one of finite elements, at rest and in motion."""
+forces and moments, the moment that tilts a planet on its pin, both hands, the spur set as the limit."""
 
 from __future__ import annotations
 
@@ -10,14 +9,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from rigid_set import SPRINGS, Rigid, RigidSet
+from driven import begun
+from rigid_set import SPRINGS, RigidSet
 from slices import by_functions_alone
 
-from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.run.te import TeResult, loaded_te
-from gearfmu.stagefile.stage import load_stage
+from gearfmu.stage.run.te import loaded_te
 
 BETA, TORQUE, SLICES, WIDTH, STEEL = math.radians(20), 300.0, 6, 30e-3, 2.06e11
 SUPPORTS = ("bearing.sun", "bearing.ring", "bearing.carrier")
@@ -36,11 +33,8 @@ BOTH = pytest.mark.parametrize("name", ["three", pytest.param("six", marks=pytes
 def at_rest(name: str, torque: float) -> Kernel:
     """Static equilibrium under torques on carrier and sun."""
     rigid = SETS[name]
-    kernel = rigid.model().kernel(**FOUNDATION)
-    kernel.set("carrier.tau", torque)
-    kernel.set("sun.tau", -torque / rigid.ratio)
-    kernel.initialize()
-    return kernel
+    loads = {"carrier.tau": torque, "sun.tau": -torque / rigid.ratio}
+    return begun(rigid.model().kernel(**FOUNDATION), loads)
 
 
 def wrench(kernel: Kernel, name: str) -> np.ndarray:
@@ -77,21 +71,16 @@ def test_mean_axial_force_of_a_mesh_is_the_tangential_one_times_tan_beta(name: s
 
 
 @BOTH
-def test_axial_forces_on_a_planet_cancel(name: str) -> None:
-    rigid, kernel = SETS[name], at_rest(name, TORQUE)
-    for k in range(rigid.planets):
-        assert abs(wrench(kernel, f"pin.planet{k + 1}")[2]) < 1e-6 * tangential(rigid)
-
-
-@BOTH
-def test_all_forces_and_moments_of_the_set_balance(name: str) -> None:
+def test_all_forces_and_moments_of_the_set_and_axial_ones_of_planets_balance(name: str) -> None:
     """On the ground, about the origin: what bearings and mounts carry, and torques."""
     rigid, kernel = SETS[name], at_rest(name, TORQUE)
-    total = sum(wrench(kernel, held) for held in SUPPORTS)
-    largest = max(np.abs(wrench(kernel, held)).max() for held in SUPPORTS)
+    carried = np.array([wrench(kernel, held) for held in SUPPORTS])
+    total, largest = carried.sum(axis=0), np.abs(carried).max()
     assert np.abs(total[:3]).max() < 1e-6 * largest
     assert np.abs(total[3:]).max() < 1e-6 * largest * rigid.distance
     assert kernel.get("bearing.ring.mz") == pytest.approx(TORQUE * (1 - 1 / rigid.ratio), rel=1e-6)
+    for k in range(rigid.planets):
+        assert abs(wrench(kernel, f"pin.planet{k + 1}")[2]) < 1e-6 * tangential(rigid)
 
 
 @BOTH
@@ -126,10 +115,6 @@ def test_a_set_of_the_other_hand_is_the_mirror_image() -> None:
         assert forces[0] == pytest.approx(forces[1][::-1], rel=1e-6)
 
 
-def errors(rigid: RigidSet, torque: float = TORQUE, positions: int = 12) -> TeResult:
-    return loaded_te(rigid.model(), [torque], positions, **FOUNDATION)
-
-
 def test_a_vanishing_helix_is_the_spur_set() -> None:
     """But for what helical slices yield of their own, which spur gears go without."""
     models = [by_functions_alone(replace(HELICAL, helix_angle=beta).model()) for beta in (1e-7, 0.0)]
@@ -138,95 +123,13 @@ def test_a_vanishing_helix_is_the_spur_set() -> None:
     assert np.abs(nearly.sharing - spur.sharing).max() < 1e-6
 
 
-def overlapping(slices: int, helix_angle: float = BETA) -> TeResult:
-    """At an overlap ratio of one, flanks of steel: parts of a line of contact yield each by itself."""
-    width = math.pi * HELICAL.module / math.sin(BETA)
-    rigid = replace(HELICAL, teeth=(27, 33), width=width, slices=slices, youngs_modulus=STEEL, helix_angle=helix_angle)
-    return loaded_te(rigid.model(), [TORQUE], 6, **FOUNDATION | {"slices": float(slices)})
-
-
 def test_overlap_smooths_the_transmission_error() -> None:
     """Teeth on a foundation at an overlap ratio of one: lines of contact have one length in all positions, where the
     spur set changes between one and two pairs of teeth, all planets at once. 0.15: six slices (0.10)."""
-    found, spur = overlapping(SLICES), overlapping(SLICES, 0.0)
+    width = math.pi * HELICAL.module / math.sin(BETA)
+    rigid = replace(HELICAL, teeth=(27, 33), width=width, youngs_modulus=STEEL)
+    found, spur = (
+        loaded_te(replace(rigid, helix_angle=beta).model(), [TORQUE], 6, **FOUNDATION) for beta in (BETA, 0.0)
+    )
     print(np.ptp(found.te), np.ptp(spur.te))
     assert np.ptp(found.te) < 0.15 * np.ptp(spur.te)
-
-
-@pytest.mark.full
-def test_more_slices_than_width_functions_find_the_same_equilibrium() -> None:
-    """Twelve slices of teeth with six width functions: the mean within 1e-3 of that of six, and smoother still."""
-    six, twelve = overlapping(SLICES), overlapping(2 * SLICES)
-    print(six.te.mean(), twelve.te.mean(), np.ptp(six.te), np.ptp(twelve.te))
-    assert twelve.te.mean() == pytest.approx(six.te.mean(), rel=1e-3)
-    assert np.ptp(twelve.te) < np.ptp(six.te)
-
-
-@pytest.mark.full
-def test_three_helical_planets_share_alike_whatever_the_error_of_a_pin() -> None:
-    """The sun floats to where its three forces are in balance; on a bearing it does not."""
-    rigid = replace(HELICAL, pins={1: (5e-6, 12e-6)}, sun=Rigid(0.4, 0.39, 1e4))
-    assert errors(rigid, 1000.0, 6).sharing.mean(axis=1).max() == pytest.approx(1.0, abs=1e-3)
-    held = errors(replace(rigid, sun=Rigid(0.4, 0.39, 1e9)), 1000.0, 6)
-    assert held.sharing.mean(axis=1).max() > 1.03 and held.load_factor.min() > 1.03
-
-
-CARRIER, RATIO = 400.0, 90 / 26  # N·m; speed of the sun over that of the carrier
-TANGENT = CARRIER / RATIO / 3 / (1.75e-3 * 26 / 2 / math.cos(BETA))  # N on the sun's reference circle, one mesh
-AXIAL = TANGENT * math.tan(BETA)
-
-
-@pytest.fixture(scope="module")
-def shipped() -> StageModel:
-    spec = load_stage("helical_set")
-    return assemble(spec, load_bodies(spec))
-
-
-@pytest.fixture(scope="module")
-def running(shipped: StageModel) -> tuple[Kernel, dict[str, np.ndarray]]:
-    """helical_set at 85 rad/s under 400 N·m on the carrier: 2 ms, means of 40 steps, the first 10 left out."""
-    kernel, found = shipped.kernel(level=0.0), []
-    for name, value in {"tau": CARRIER, "w_start": 85.0}.items():
-        kernel.set(f"carrier.{name}", value)
-        kernel.set(f"sun.{name}", value * (-1 / RATIO if name == "tau" else RATIO))
-    kernel.initialize()
-    names = [f"{name}.{component}_mean" for name in (*SUPPORTS, "pin.planet1", "pin.planet2", "pin.planet3")
-             for component in ("fx", "fy", "fz", "mx", "my")]  # fmt: skip
-    for i in range(40):
-        kernel.step(5e-5 * i, 5e-5)
-        found.append([kernel.get(name) for name in names])
-    return kernel, dict(zip(names, np.array(found)[10:].T, strict=True))
-
-
-def test_the_shipped_set_runs_and_carries_its_axial_forces(running: tuple[Kernel, dict[str, np.ndarray]]) -> None:
-    """Sun and ring push opposite ways by N F_t tan β, 1 %: the run is short; planets stay where they are along their
-    pins; the energy of 2 ms is closed to 1e-3 of what goes through."""
-    kernel, found = running
-    mean = {name: values.mean() for name, values in found.items()}
-    assert mean["bearing.sun.fz_mean"] == pytest.approx(-3 * AXIAL, rel=0.01)
-    assert mean["bearing.ring.fz_mean"] == pytest.approx(3 * AXIAL, rel=0.01)
-    for k in range(3):
-        assert abs(mean[f"pin.planet{k + 1}.fz_mean"]) < 0.01 * AXIAL
-    assert kernel.get("solver.retried_steps") == 0
-    assert abs(kernel.get("energy.residual")) < 1e-3 * CARRIER * 85.0 * 2e-3
-
-
-def test_tilting_planets_of_the_shipped_set_take_load_to_the_ends_of_their_teeth(
-    running: tuple[Kernel, dict[str, np.ndarray]],
-) -> None:
-    """About the tangent of its place a pin carries what pressing at mid-width would give, less what the load gives
-    back that a soft pin lets wander: between two thirds and all of F_t tan β d."""
-    _, found = running
-    by_hand = AXIAL * 1.75e-3 * 19 / math.cos(BETA)
-    for k, angle in enumerate(2 * math.pi / 3 * np.arange(3)):
-        moment = [found[f"pin.planet{k + 1}.m{axis}_mean"].mean() for axis in "xy"]
-        assert 0.66 < np.dot(moment, [-math.sin(angle), math.cos(angle)]) / by_hand < 1.0
-
-
-@pytest.mark.full
-def test_the_shipped_set_is_smooth_and_shares_alike(shipped: StageModel) -> None:
-    """At 400 N·m: 0.2 µm of 172 µm, planets a third of a pitch apart."""
-    found = loaded_te(shipped, [CARRIER], 12)
-    print(found.te.mean(), np.ptp(found.te), found.load_factor)
-    assert np.ptp(found.te) < 0.3e-6 and found.load_factor.max() < 1.01
-    assert found.sharing.mean(axis=1) == pytest.approx(1.0, abs=1e-3)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import pytest
+from driven import give
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
@@ -44,7 +44,7 @@ def test_an_angle_at_the_start_is_no_speed(relieved: StageModel) -> None:
         values = dict(drive(n * 1e-4))
         values["pinion.phi"] += 40.0
         values["wheel.phi"] += 40.0 / ratio
-        put(kernel, values)
+        give(kernel, values)
         kernel.initialize(0.0) if n == 0 else kernel.step((n - 1) * 1e-4, 1e-4)
         assert int(kernel.get("solver.status")) == 0
 
@@ -69,18 +69,13 @@ def test_speeds_that_come_after_the_start_are_told(relieved: StageModel) -> None
     for late in (False, True):
         kernel = Kernel(relieved.blob, FAST)
         if not late:
-            put(kernel, drive(0.0))
+            give(kernel, drive(0.0))
         kernel.initialize(0.0)
         assert int(kernel.get("solver.status")) & JUMP == 0
         for n in range(20):
-            put(kernel, drive(n * 1e-4))
+            give(kernel, drive(n * 1e-4))
             kernel.step(n * 1e-4, 1e-4)
             peak[late] = max(peak.get(late, 0.0), kernel.get("mesh.force_max"))
         words = status_words(int(kernel.get("solver.status")))
         assert any("set speeds before the initialisation ends" in word for word in words) is late
     assert peak[True] > 2 * peak[False]
-
-
-def put(kernel: Kernel, values: Mapping[str, float]) -> None:
-    for name, value in values.items():
-        kernel.set(name, value)

@@ -5,19 +5,18 @@ paper."""
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from driven import begun, stepped
 
 from evidence.energy.free import Rattle, energies, free_pair, started
-from gearfmu.body import Body, load_bodies
+from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.meshes import flank_nodes, mesh_penalty
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.stage import load_stage
 
 PAPER, LINE, NODAL = 4, 1, 2
 SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion
@@ -51,12 +50,8 @@ def rigid_error(spec: Stage, bodies: list[Body], along: int, nodes_of: str = "bo
     free = free_pair(with_nodes(spec, along=along, across=5, penalty=PENALTY, nodes_of=nodes_of), bodies)
     off = {"effect.elastic": 0.0, "effect.bearings": 0.0, "effect.roll_motion": 1.0}
     kernel = started(free, Rattle(position=0.5, speed=0.05, offset=28e-6), {"level": PAPER, **off})
-    found = []
-    for i in range(300):
-        kernel.step(i * 2e-6, 2e-6)
-        found.append([kernel.get("mesh.force"), kernel.get("mesh.te") - 2e-6, kernel.get("mesh.pairs")])
-    force, depth, pairs = np.array(found).T
-    depth = np.maximum(depth, 0.0)
+    force, te, pairs = stepped(kernel, 300, 2e-6, "mesh.force", "mesh.te", "mesh.pairs").T
+    depth = np.maximum(te - 2e-6, 0.0)
     exact = spec.written.gears[0].face_width * 4 * math.sqrt(2) / 3 * PENALTY * math.sqrt(radius) * depth**1.5
     assert pairs.max() == 1 and force.max() > 500
     return float(np.abs(force - exact).max() / force.max())
@@ -101,40 +96,24 @@ def test_mean_transmission_is_that_of_line_contact(relief_spec: Stage, bodies: l
     assert nodal == pytest.approx(line, rel=5e-3) and nodal != line
 
 
-def test_helical_gears_and_their_axial_force() -> None:
+def test_helical_gears_and_their_axial_force(helical: StageModel) -> None:
     """Mean transmission as with line contact; the bearings carry the axial force of a normal to the flank."""
-    spec = load_stage("helical_demo")
-    model = assemble(spec, load_bodies(spec))
     runs = []
     for law in (LINE, NODAL):
-        trace = simulate(model, Steady(model, SPEED, 150.0), 4e-4, 2e-6, {"level": PAPER, "contact": law})
+        trace = simulate(helical, Steady(helical, SPEED, 150.0), 4e-4, 2e-6, {"level": PAPER, "contact": law})
         runs.append([trace[name][100:].mean() for name in ("mesh.te", "mesh.force", "bearing.pinion.fz")])
     print(f"te, force, axial force: {runs}")
     assert runs[1] == pytest.approx(runs[0], rel=0.02)
 
 
-@pytest.fixture(scope="module")
-def planetary() -> SimpleNamespace:
-    spec = load_stage("planetary54")
-    return SimpleNamespace(model=assemble(spec, load_bodies(spec)))
-
-
-def test_the_papers_planetary_set(planetary: SimpleNamespace) -> None:
+def test_the_papers_planetary_set(planetary: StageModel) -> None:
     """Level paper: 400 modes a gear, carrier of 120, nodal contact in all eight meshes, rk45; 600 N·m on the carrier at
     85 rad/s. Forces stay around those of the static balance, opposite planets carry the same."""
-    kernel = planetary.model.kernel(level=PAPER)
-    for name, value in (("carrier.tau", 600.0), ("sun.tau", -150.0)):
-        kernel.set(name, value)
-    kernel.set("carrier.w_start", 85.0)
-    kernel.set("sun.w_start", 340.0)
-    kernel.initialize(0.0)
+    loads = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}
+    kernel = begun(planetary.kernel(level=PAPER), loads)
     assert "nodal" in kernel.warning and kernel.get("solver.n_dyn") > 2500
-    meshes = [f"{central}_planet{k}" for central in ("sun", "ring") for k in (1, 2, 3, 4)]
-    found = []
-    for i in range(3):
-        kernel.step(i * 1e-5, 1e-5)
-        found.append([kernel.get(f"{mesh}.force") for mesh in meshes])
-    force = np.array(found)
+    meshes = [f"{central}_planet{k}.force" for central in ("sun", "ring") for k in (1, 2, 3, 4)]
+    force = stepped(kernel, 3, 1e-5, *meshes)
     print(np.round(force[-1]))
     assert np.all(force[:, :4] < -1000) and np.all(force[:, 4:] > 1000)
     for mesh in (0, 1, 4, 5):

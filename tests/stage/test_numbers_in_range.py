@@ -192,38 +192,6 @@ def refused(path: Path) -> dict[str, Problem]:
     return {problem.field: problem for problem in caught.value.problems}
 
 
-def test_numbers_that_failed_late_are_refused_at_once_with_the_file(tmp_path: Path) -> None:
-    text = """
-[contact]
-damping = "50e9 N*s/m^2"
-[gears.pinion]
-modal_damping = 0.95
-[gears.pinion.material]
-density = "7.85 kg/m^3"
-[gears.wheel]
-bore_diameter = "100 mm"
-[gears.wheel.bearing]
-stiffness = "3e2 N/m"
-"""
-    found = refused(variant(tmp_path, text))
-    assert set(found) == {
-        "contact.damping",
-        "gears.pinion.modal_damping",
-        "gears.pinion.material.density",
-        "gears.wheel.bearing.stiffness",
-        "gears.wheel.bore_diameter",
-    }
-    density = found["gears.pinion.material.density"]
-    assert density.file == str(tmp_path / "stage.toml") and density.value == '"7.85 kg/m^3"'
-    assert density.remedy.startswith("out of range: must be from 100 kg/m^3 to 30000 kg/m^3; steel has 7850 kg/m^3")
-
-
-@pytest.mark.parametrize("planets", [7, 12])
-def test_more_planets_than_the_kernel_holds_are_refused_before_the_reduction(tmp_path: Path, planets: int) -> None:
-    found = refused(variant(tmp_path, f"[set]\nplanets = {planets}\n", "planetary54"))
-    assert "must be from 2 to 6; the kernel holds 12 meshes" in found["set.planets"].remedy
-
-
 def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) -> None:
     """Each by itself in its range: axes that tilt too much, pitches that add up."""
     with pytest.raises(ValueError, match="the axes tilt by 0.02 rad, at most 0.01 rad"):

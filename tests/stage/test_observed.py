@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import begun, stepped
 from numpy.polynomial import legendre
 from scipy.interpolate import BarycentricInterpolator
 from turned_rows import on_tooth
@@ -52,12 +53,9 @@ def observed(spec: Stage, bodies: list[Body]) -> StageModel:
 
 def started(model: StageModel, level: float) -> Kernel:
     """The pair wound up by some 300 N·m."""
-    kernel = model.kernel(level=level)
-    pinion = model.stage.ports["pinion"]
-    assert pinion.k is not None
-    kernel.set("pinion.phi", 300.0 / pinion.k)
-    kernel.initialize()
-    return kernel
+    stiffness = model.stage.ports["pinion"].k
+    assert stiffness is not None
+    return begun(model.kernel(level=level), {"pinion.phi": 300.0 / stiffness})
 
 
 def test_what_is_not_asked_for_is_not_there(plain: StageModel, observed: StageModel) -> None:
@@ -65,11 +63,8 @@ def test_what_is_not_asked_for_is_not_there(plain: StageModel, observed: StageMo
     assert not [name for name in read_blob(plain.blob) if "observed" in name or "own_" in name]
     without, asked = started(plain, FAST), started(observed, FAST)
     assert not [name for name in without.variables if MODE in name or MOTION in name]
-    for n in range(20):
-        without.step(n * 5e-5, 5e-5)
-        asked.step(n * 5e-5, 5e-5)
     outputs = [name for name, variable in without.variables.items() if variable.causality == "output"]
-    assert [without.get(name) for name in outputs] == [asked.get(name) for name in outputs]
+    assert np.array_equal(*(stepped(kernel, 20, 5e-5, *outputs) for kernel in (without, asked)))
 
 
 def test_an_unknown_gear_is_refused(spec: Stage, bodies: list[Body]) -> None:
@@ -134,11 +129,7 @@ def set_model(set_spec: Stage, set_bodies: list[Any]) -> StageModel:
 @pytest.fixture(scope="module")
 def at_rest(set_model: StageModel) -> Kernel:
     """600 N·m on the carrier, every mode dynamic."""
-    kernel = set_model.kernel(level=FULL)
-    kernel.set("carrier.tau", TORQUE)
-    kernel.set("sun.tau", -TORQUE / 4)
-    kernel.initialize()
-    return kernel
+    return begun(set_model.kernel(level=FULL), {"carrier.tau": TORQUE, "sun.tau": -TORQUE / 4})
 
 
 def slice_coefficients() -> np.ndarray:

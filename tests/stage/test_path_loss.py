@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from driven import begun
 
 import gearfmu as gf
 from gearfmu.geometry.mesh import RingMesh
@@ -66,10 +67,8 @@ def by_the_path(model: StageModel, case: Case, engagement: str) -> float:
 def wound_up(model: StageModel, gear: str, carrier: str | None, case: Case) -> float:
     """Angle (rad) of a gear under load on its path, where the output's bore is at 0."""
     driven = model.driven_by_springs()
-    kernel = driven.kernel(**{"level": 0.0} | dict(case.parameters))
-    for name, value in Steady(driven, 0.0, case.torque)(0.0).items():
-        kernel.set(name, value)
-    kernel.initialize()
+    parameters = {"level": 0.0} | dict(case.parameters)
+    kernel = begun(driven.kernel(**parameters), Steady(driven, 0.0, case.torque)(0.0))
     rotors = (model.stage.rotor_of(gear), *([carrier] if carrier else []))
     return kernel.get(f"{rotors[0]}.gear.phi") - sum(kernel.get(f"{rotor}.gear.phi") for rotor in rotors[1:])
 
@@ -93,6 +92,8 @@ def in_motion(model: StageModel, case: Case) -> list[float]:
     for mesh, end in zip(case.engagements, ends, strict=True):
         impulse = STEP * np.cumsum(trace[f"{mesh}.force_mean"])
         lost, pressed = (np.ptp(np.interp(end, trace.time, x)) for x in (trace[f"{mesh}.friction_loss"], impulse))
+        power = STEP * np.cumsum(trace[f"{mesh}.friction_power"])
+        assert np.ptp(np.interp(end, trace.time, power)) == pytest.approx(lost, rel=0.01)
         found.append(float(lost / pressed))
     return found
 

@@ -3,15 +3,11 @@ the other gear on one side and away from it on the other."""
 
 from __future__ import annotations
 
-import csv
 import math
-import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gearfmu import cli
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
@@ -20,7 +16,6 @@ from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stored import expected_hash
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
@@ -78,22 +73,6 @@ def test_coast_flanks_see_the_other_side(spec: Stage, bodies: list[Body], pair: 
     assert np.all(receding < -pair.normal_backlash + 5e-9)
 
 
-def test_deviations_of_mating_teeth_cancel(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
-    """A wheel tooth that gives way by as much as the pinion's protrudes: the pair runs as if both were in place, but
-    for the slight roll along the flanks."""
-    te = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {0: -DEVIATION}), bodies), [LOAD], 16).te[0]
-    nominal = loaded_te(plain, [LOAD], 16).te[0]
-    assert np.abs(te - nominal).max() < 0.02 * nominal.mean()
-
-
-def test_a_protruding_tooth_carries_all_until_its_deflection_brings_the_next_one_in(
-    spec: Stage, bodies: list[Body]
-) -> None:
-    result = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {}), bodies), [80.0, 1500.0], 16)
-    tooth_0 = result.shares[:, :4, 2]
-    assert np.all(tooth_0[0] == 1.0) and np.all(tooth_0[1] < 1.0)
-
-
 def test_all_teeth_out_by_the_same_are_a_turned_gear(spec: Stage, bodies: list[Body], plain: StageModel) -> None:
     """But for the elastic rows, which stay with the teeth's nominal places and directions (F_pi/r = 1.4 mrad)."""
     tables = ({k: DEVIATION for k in range(TEETH[0])}, {})
@@ -120,19 +99,3 @@ def test_the_kernel_refuses_what_are_no_index_deviations(spec: Stage, bodies: li
         with pytest.raises(ModelError, match="index has the wrong length|index deviations"):
             Kernel(write_blob(sections | {"index0": wrong}))
     assert Kernel(write_blob(sections | {"index0": -angles})).hash
-
-
-def test_gearfmu_te_of_a_stage_file_with_a_pitch_error(tmp_path: Path) -> None:
-    """The bodies are those of the stage without it: nothing is reduced again."""
-    shipped = find_stage("fzg_c").parent
-    for name in ("pinion.h5", "wheel.h5"):
-        shutil.copy(shipped / name, tmp_path / name)
-    base = f'base = "{(shipped / "stage.toml").as_posix()}"'
-    table = '[gears.pinion]\nindex_deviation = { "0" = "50 µm", "3" = "-5 µm" }'
-    (tmp_path / "stage.toml").write_text(f'{base}\nname = "worn"\n{table}\n', encoding="utf-8")
-    out = tmp_path / "te.csv"
-    order = ["te", str(tmp_path / "stage.toml"), "--torque", "1 mN*m", "--positions", "4", "--out", str(out)]
-    assert cli.outcome(order) == 0
-    found = [float(row["te_um"]) for row in csv.DictReader(out.open())]
-    assert found[0] == pytest.approx(-50 * math.cos(math.radians(20)), abs=2e-3)
-    assert found[3] == pytest.approx(0, abs=2e-3)

@@ -15,17 +15,14 @@ from typing import Any
 import lin_parker
 import numpy as np
 import pytest
+from driven import begun, give, stepped
 from rigid_set import SPRINGS, TORQUE, Motion, Rigid, RigidSet, kernel_of
 from scipy.integrate import cumulative_trapezoid
 
-from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.modes.linear import linearised
-from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
-from gearfmu.stagefile.forms.expand import rewritten
-from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import PortSpec
 
 KNOWN = lin_parker.published()["params"]
@@ -80,24 +77,19 @@ def excitation(rigid: RigidSet, library: Path | None = None) -> float:
 def response(rigid: RigidSet, library: Path | None = None) -> float:
     """A step of both torques at a standing mesh: what central bodies move across the axis and planets move unlike each
     other, over what planets move."""
-    model, planets = rigid.model(), range(1, rigid.planets + 1)
-    kernel = kernel_of(model, library, h=H, **{"effect.roll_motion": 0.0})
-    for torque in (100.0, 150.0):
-        kernel.set("carrier.tau", torque)
-        kernel.set("sun.tau", -torque / rigid.ratio)
-        if torque == 100.0:
-            kernel.initialize()
-    turn = np.exp(-1j * rigid.angles())
-    across, unlike, moved = 0.0, 0.0, 0.0
-    for i in range(100):
-        kernel.step(10 * H * i, 10 * H)
-        central = [kernel.get(f"{name}.{d}") for name in ("sun.gear", "ring.gear", "bearing.carrier") for d in "xy"]
-        local = np.array([kernel.get(f"pin.planet{k}.x") + 1j * kernel.get(f"pin.planet{k}.y") for k in planets]) * turn
-        spin = np.array([kernel.get(f"planet{k}.gear.phi") for k in planets]) * rigid.base("planet")
-        across = max(across, np.abs(central).max())
-        unlike = max(unlike, np.abs(local - local.mean()).max(), np.ptp(spin))
-        moved = max(moved, np.abs(local).max())
-    return max(across, unlike) / moved
+    kernel = kernel_of(rigid.model(), library, h=H, **{"effect.roll_motion": 0.0})
+    loads = {"carrier.tau": 100.0, "sun.tau": -100.0 / rigid.ratio}
+    begun(kernel, loads)
+    give(kernel, {name: 1.5 * torque for name, torque in loads.items()})
+    planets = range(1, rigid.planets + 1)
+    central = [f"{name}.{d}" for name in ("sun.gear", "ring.gear", "bearing.carrier") for d in "xy"]
+    pins = [f"pin.planet{k}.{d}" for k in planets for d in "xy"]
+    found = stepped(kernel, 100, 10 * H, *central, *pins, *(f"planet{k}.gear.phi" for k in planets))
+    across, local, spin = np.split(found, [6, 6 + 2 * rigid.planets], axis=1)
+    local = (local[:, ::2] + 1j * local[:, 1::2]) * np.exp(-1j * rigid.angles())
+    unlike = np.abs(local - local.mean(axis=1, keepdims=True)).max()
+    turned_unlike = rigid.base("planet") * np.ptp(spin, axis=1).max()
+    return float(max(np.abs(across).max(), unlike, turned_unlike) / np.abs(local).max())
 
 
 @pytest.mark.parametrize(("planets", "teeth"), [(3, (26, 34)), slow(4, (24, 36)), (5, (26, 34))])
@@ -180,21 +172,6 @@ def test_four_planets_share_in_pairs() -> None:
     assert behind[0] - 1 == pytest.approx(-off, abs=1e-4)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("pins", [{}, {1: (0.0, 12e-6)}, {0: (-10e-6, -20e-6)}])
-def test_three_elastic_planets_share_alike(pins: dict[int, tuple[float, float]]) -> None:
-    """planetary54 with three planets on a rigid carrier, its sun as it ships (5e7 N/m) and floating."""
-    spec = load_stage("planetary54")
-    bearing = spec.written.sun.bearing.model_copy(update={"stiffness": FLOATING.bearing})  # type: ignore[union-attr]
-    three = spec.written.set.model_copy(update={"planets": 3, "pin_errors": pins})
-    sun = spec.written.sun.model_copy(update={"bearing": bearing})
-    carrier = RigidSet(3, (18, 18), module=2.5e-3).bodies()[3]
-    model = assemble(rewritten(spec, set=three, sun=sun), [*load_bodies(spec)[:3], carrier])
-    found = loaded_te(model, [450.0], 6)
-    print(found.sharing.mean(axis=1), found.load_factor)
-    assert found.sharing.mean(axis=1).max() == pytest.approx(1.0, abs=5e-3)
-
-
 @pytest.mark.parametrize(
     ("planets", "teeth"),
     [
@@ -227,16 +204,9 @@ def test_mesh_phasing_suppresses_harmonics(planets: int, teeth: tuple[int, int])
 
 def turned(rigid: RigidSet, inputs: dict[str, float], steps: int, *names: str) -> tuple[Kernel, np.ndarray]:
     """(steps + 1, names), before and after communication steps of ten internal ones."""
-    kernel = kernel_of(rigid.model(), h=H)
-    for name, value in inputs.items():
-        kernel.set(name, value)
-    kernel.initialize()
-    found = np.empty((steps + 1, len(names)))
-    found[0] = [kernel.get(name) for name in names]
-    for i in range(steps):
-        kernel.step(10 * H * i, 10 * H)
-        found[i + 1] = [kernel.get(name) for name in names]
-    return kernel, found
+    kernel = begun(kernel_of(rigid.model(), h=H), inputs)
+    start = [kernel.get(name) for name in names]
+    return kernel, np.vstack([start, stepped(kernel, steps, 10 * H, *names)])
 
 
 DAMPED = RigidSet(4, contact_ratio=1.6, damping_ratio=0.05, contact_damping=2e3)
@@ -279,9 +249,7 @@ def test_mean_torques_balance() -> None:
     torque, step = 1000.0, 10 * H
     speed = 2 * math.pi / (rigid.ring_teeth * 40 * step)  # 40 communication steps a mesh period
     kernel = kernel_of(rigid.model(), h=H)
-    for name, value in (("carrier.tau", torque), ("carrier.w_start", speed), ("sun.w", speed * rigid.ratio)):
-        kernel.set(name, value)
-    kernel.initialize()
+    begun(kernel, {"carrier.tau": torque, "carrier.w_start": speed, "sun.w": speed * rigid.ratio})
     found = np.empty((1600, 2))
     for i in range(len(found)):
         kernel.set("sun.phi", speed * rigid.ratio * step * (i + 1))
@@ -324,11 +292,7 @@ def released(rigid: RigidSet, start: Sequence[float], steps: int, **parameters: 
     moved += [f"pin.planet{k}.{d}" for k in planets for d in "xy"]
     turning = [f"{name}.gear.w" for name in (*speeds, *(f"planet{k}" for k in planets))]
     names = [*moved, *turning, "carrier.gear.phi", "energy.stored", "energy.residual"]
-    found = np.empty((steps, len(names)))
-    for i in range(steps):
-        kernel.step(2 * H * i, 2 * H)
-        found[i] = [kernel.get(name) for name in names]
-    return kernel, found
+    return kernel, stepped(kernel, steps, 2 * H, *names)
 
 
 def spin_momentum(rigid: RigidSet, found: np.ndarray) -> np.ndarray:
@@ -415,11 +379,10 @@ def test_a_sun_in_free_flight_moves_straight_on(coriolis: float) -> None:
     start = {"carrier.w_start": speed, "sun.w_start": speed * rigid.ratio + 2.0, "effect.contact_damping": 0.0}
     kernel = kernel_of(rigid.model(), h=H, **start, **{"effect.coriolis": coriolis})
     kernel.initialize()
-    place, touched = np.empty(1500, complex), np.empty(1500, bool)
-    for i in range(len(place)):
-        kernel.step(step * i, step)
-        place[i] = kernel.get("sun.gear.x") + 1j * kernel.get("sun.gear.y")
-        touched[i] = any(kernel.get(f"sun_planet{k + 1}.force_max") > 0 for k in range(4))
+    x, y, *force = stepped(
+        kernel, 1500, step, "sun.gear.x", "sun.gear.y", *(f"sun_planet{k + 1}.force_max" for k in range(4))
+    ).T
+    place, touched = x + 1j * y, (np.array(force) > 0).any(axis=0)
     flies = ~np.convolve(touched, np.ones(15), mode="same").astype(bool)[1:-1]
     velocity, here = (place[2:] - place[:-2])[flies] / (2 * step), place[1:-1][flies]
     bent = np.diff(place, 2)[flies] / step**2 + (stiffness / rigid.sun.mass + speed**2) * here

@@ -52,14 +52,6 @@ def test_a_ramp_in_a_file_is_the_run_up_to_an_end_speed(tmp_path: Path, capsys: 
     assert abs(first["pinion.gear.w"][-1] / (2600 * RPM) - 1) < 0.01, "it did gather speed"
 
 
-def test_a_constant_profile_is_the_steady_run_of_python(model) -> None:
-    profile = Profile(np.array([0.0, 4e-3]), np.array([200.0, 200.0]), np.array([150.0, 150.0]))
-    along = gf.simulate(model, profile=profile, level="rigid")
-    steady = gf.simulate(model, 200.0, 150.0, 4e-3, level="rigid")
-    assert along.time[-1] == pytest.approx(4e-3)
-    assert np.allclose(along["mesh.force"], steady["mesh.force"], rtol=1e-7)
-
-
 def test_the_mean_mesh_force_follows_the_torque(model) -> None:
     """Slowly from 100 to 300 N·m, then on to −300 through the backlash: the mean force over a mesh cycle times the base
     radius is the torque, to 2 % of the largest plus what the torque changes by within half a mesh cycle."""

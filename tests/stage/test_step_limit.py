@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven import begun
 from inner import Inner
 
 from gearfmu.errors import ModelError, SimulationError
@@ -25,10 +26,7 @@ def standing(inner_library: Path, model: StageModel, level: int, h: float) -> tu
     """Outcome and transmission error of a standing pair under load, undamped, γ = 1 whatever the limit says, after a
     millionth of the load is added."""
     inner, calm = Inner(inner_library, model.blob, {"level": level, "h": h, **UNDAMPED}), Steady(model, 0.0, LOAD)(0.0)
-    kernel = inner.kernel
-    for name, value in calm.items():
-        kernel.set(name, value)
-    kernel.initialize()
+    kernel = begun(inner.kernel, calm)
     inner.force_gamma(1.0)
     kernel.set("pinion.phi", calm["pinion.phi"] * (1 + 1e-6))
     te = []
@@ -64,10 +62,7 @@ def test_default_step_is_the_largest_that_meets_the_limit(
     probe = Inner(inner_library, relieved.blob, {"level": LEVELS[level]})
     good = np.array([probe.mu(h) <= MU for h in LADDER])
     wanted = LADDER[np.flatnonzero(good)[-1]]
-    kernel, calm = relieved.kernel(level=LEVELS[level]), Steady(relieved, 0.0, LOAD)(0.0)
-    for name, value in calm.items():
-        kernel.set(name, value)
-    kernel.initialize()
+    kernel = begun(relieved.kernel(level=LEVELS[level]), Steady(relieved, 0.0, LOAD)(0.0))
     kernel.step(0.0, 1e-3)
     used = kernel.get("solver.h")
     assert 1e-3 / used == pytest.approx(np.ceil(1e-3 / wanted - 1e-9)), f"{used:.3g} s, rule: {wanted:.3g} s"

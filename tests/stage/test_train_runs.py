@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import begun
 
 from gearfmu.body import load_bodies
-from gearfmu.errors import ModelError, SpecError
-from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.errors import SpecError
+from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import RotorSpec, Stage
@@ -27,27 +28,13 @@ FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
 
 
-@pytest.fixture(scope="module")
-def two_stage() -> StageModel:
-    spec = load_stage("two_stage")
-    return assemble(spec, load_bodies(spec))
+def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
+    """drives: of the pairs in a stage, each with a prefix for its names."""
 
+    def inputs(time: float) -> dict[str, float]:
+        return {prefix + name: value for prefix, drive in drives.items() for name, value in drive(time).items()}
 
-def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[str, np.ndarray]:
-    """Outputs (steps + 1,) by name. drives: functions of time → inputs, each with a prefix for its names."""
-    kernel = model.kernel(level=FAST, **parameters)
-    names = [v.name for v in kernel.variables.values() if v.causality == "output"]
-    rows = []
-    for step in range(STEPS + 1):
-        for prefix, drive in drives.items():
-            for name, value in drive(max(step - 1, 0) * H).items():
-                kernel.set(prefix + name, value)
-        if step == 0:
-            kernel.initialize()
-        else:
-            kernel.step((step - 1) * H, H)
-        rows.append([kernel.get(name) for name in names])
-    return dict(zip(names, np.array(rows).T, strict=True))
+    return simulate(model, inputs, STEPS * H, H, {"level": FAST})
 
 
 def side_by_side(pair: Stage) -> Stage:
@@ -88,7 +75,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
     first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
     together = run(both, {"": first, "b_": second})
     for prefix, alone in (("", run(relieved, {"": first})), ("b_", run(apart, {"": second}))):
-        for name in alone:
+        for name in alone.channels:
             if name.startswith(("energy.", "solver.")):
                 continue
             head, _, rest = name.partition(".")
@@ -99,10 +86,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
 
 def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
     """Outputs in static equilibrium under TORQUE, input and output wound against each other."""
-    kernel = model.kernel(level=FAST, **parameters)
-    for name, value in Steady(model, 0.0, TORQUE)(0.0).items():
-        kernel.set(name, value)
-    kernel.initialize()
+    kernel = begun(model.kernel(level=FAST, **parameters), Steady(model, 0.0, TORQUE)(0.0))
     return {v.name: kernel.get(v.name) for v in kernel.variables.values() if v.causality == "output"}
 
 
@@ -141,17 +125,6 @@ def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
     assert carried == pytest.approx(found["seat.wheel1.fz"] + found["seat.pinion2.fz"], rel=1e-4)
     assert abs(carried) < 0.6 * max(pushed.values())
     assert found["solver.status"] == 0 == at_rest(two_stage)["solver.status"]
-
-
-def test_every_mesh_of_a_train_has_its_transmission_error(two_stage) -> None:
-    """Each over its own pitch: positive against the direction in which gear A is driven; periodic; a mesh that there is
-    not is refused."""
-    found = {mesh: loaded_te(two_stage, [100.0, 200.0], 3, mesh=mesh) for mesh in ("stage1", "stage2")}
-    assert found["stage1"].te.min() > 0 > found["stage2"].te.max()
-    assert all(np.all(np.diff(np.abs(result.te), axis=0) > 0) for result in found.values())
-    assert all(np.all(result.mesh_stiffness > 0) for result in found.values())
-    with pytest.raises(ModelError, match="it has stage1, stage2"):
-        loaded_te(two_stage, [100.0], 3, mesh="stage3")
 
 
 def as_general_file(pair: dict[str, Any]) -> dict[str, Any]:

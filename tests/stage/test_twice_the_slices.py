@@ -8,20 +8,12 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.body import load_bodies
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.planning.choice import space
 from gearfmu.scenefile.scene import load_scene
-from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage import StageModel, loaded_te
 from gearfmu.stage.run import refinement
 from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, Change, left_of_slices, twice
-from gearfmu.stagefile.stage import load_stage
-
-
-@pytest.fixture(scope="module")
-def helical() -> StageModel:
-    demo = load_stage("helical_demo")
-    return assemble(demo, load_bodies(demo))
 
 
 def test_the_change_is_that_of_two_runs(helical: StageModel) -> None:
