@@ -50,7 +50,7 @@ def test_a_reduction_is_stored_to_what_the_layout_says_and_packed_once(made, tmp
     save_body(body, first)
     again = load_body(first)
     save_body(again, second)
-    assert first.read_bytes() == second.read_bytes()
+    assert first.read_bytes() == second.read_bytes() and again.name == body.name and again.how == body.how
     for entry in entries_of(body):
         found, exact = value_of(again, entry.field), value_of(body, entry.field)
         if not entry.bits:
@@ -61,15 +61,6 @@ def test_a_reduction_is_stored_to_what_the_layout_says_and_packed_once(made, tmp
         assert np.all(np.abs(found - exact) <= (3 if "R" in entry.shape else 0.5) * step), entry.path
     assert np.allclose(again.picture.points, body.picture.points, rtol=0, atol=1e-7 * np.ptp(body.picture.points))
     assert np.array_equal(again.picture.quads, body.picture.quads)
-
-
-def test_a_body_reads_back_as_it_was_written(made):
-    spec, bodies, _ = made
-    for index, body in enumerate(bodies):
-        again = load_body(body_path(spec, spec.written.gears[index].name))
-        for entry in entries_of(body):
-            assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
-        assert again.name == body.name and again.how == body.how
 
 
 def test_every_dataset_says_its_unit_and_meaning(made):
@@ -98,16 +89,6 @@ def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(ma
     assert np.allclose(
         remade.flank.static, 2 * bodies[0].flank.static, rtol=0, atol=1e-9 * bodies[0].flank.static.max()
     )
-
-
-def test_a_body_of_an_older_reduction_is_refused_by_its_version(made, tmp_path):
-    spec, bodies, _ = made
-    for body in bodies:
-        save_body(
-            replace(body, how=replace(body.how, algorithm=1, hash="0" * 64)), body_path(spec, body.name, tmp_path)
-        )
-    with pytest.raises(BodyError, match="pinion.h5: stale: made by version 1 of the reduction, this program has"):
-        load_bodies(spec, tmp_path)
 
 
 def test_contact_ports_and_backlash_leave_the_body_alone(made):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from blocks import STEEL, ring
-from small_helical import coarse
+from small_gear import BETA, coarse
 
 from gearfmu.fem import hex20, refined
 from gearfmu.fem.factor import CondensedFactor
@@ -18,7 +18,7 @@ COUNT = 6
 
 def space_of(samples: tuple[int, ...]) -> LowFields:
     """The space of the modes of some of the seven nodal diameters of a small helical gear."""
-    (space,) = coarse().spaces
+    (space,) = coarse(BETA).spaces
     low = LowFields(space)
     for nu in samples:
         low.add(space.harmonic(nu), lowest_modes(space.harmonic(nu), COUNT + 6, 1e-4)[1])
@@ -55,7 +55,7 @@ def test_the_space_gives_bounds_from_above_and_holds_what_it_was_given() -> None
 
 
 def test_loads_of_several_nodal_diameters_are_answered_at_once_as_one_by_one() -> None:
-    (space,) = coarse().spaces
+    (space,) = coarse(BETA).spaces
     harmonics = [space.harmonic(nu) for nu in (0, 1, 3, 6)]
     rng = np.random.default_rng(0)
     loads = [rng.standard_normal((h.size, 2)).astype(h.dtype) for h in harmonics]

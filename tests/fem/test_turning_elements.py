@@ -61,7 +61,7 @@ def test_a_thin_ring_grows_by_its_hoop_stress(ring: SimpleNamespace) -> None:
 def test_the_modes_of_a_gear_turn_as_those_of_its_whole_model() -> None:
     """Frequencies in turning axes at a tenth of the lowest one, from sectors and from the whole gear: the 16 lowest
     modes of each, coupled and stiffened."""
-    body, whole = small_gear.coarse(), small_gear.whole()
+    body, whole = small_gear.coarse(), small_gear.whole(small_gear.coarse())
     modes = elastic_modes(body, 16)
     count = modes.frequency.size
     squared, shapes = lowest_modes(whole.free, count)

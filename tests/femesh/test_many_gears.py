@@ -1,4 +1,5 @@
-"""Any pair is either refused with a reason or gives valid meshes: z 12–80, profile shifts, module, face width, bore."""
+"""Any pair is either refused with a reason or gives valid meshes: z 12–80, profile shifts, module, face width, bore.
+Many helical gears and rings mesh well."""
 
 from __future__ import annotations
 
@@ -10,8 +11,10 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from sections import section
 
-from gearfmu.femesh import gear_sector, scaled_jacobian, volume
+from gearfmu.femesh import FeMesh, gear_sector, ring_sector, scaled_jacobian, volume
+from gearfmu.femesh.mesh import rotated
 from gearfmu.geometry import GearGeometry, involute
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.checks.gears import Meshed, mesh_problems
 from gearfmu.stagefile.forms.expand import pair_gears
 from gearfmu.stagefile.forms.shapes import gear_geometry
@@ -53,16 +56,20 @@ def pair_of(teeth, shifts, module, widths, bores, widening) -> tuple[PairSpec, l
     return pair, gears
 
 
+def cut_gap(mesh: FeMesh) -> float:
+    """Largest distance (m) of nodes on one cut, turned by a pitch, from those on the other."""
+    return float(
+        np.abs(rotated(mesh.nodes[mesh.cut_minus], 2 * math.pi / mesh.teeth) - mesh.nodes[mesh.cut_plus]).max()
+    )
+
+
 def check_meshes(pair: PairSpec, gears: list[GearSpec], scale: float) -> None:
     for gear in gears:
         shape = gear_geometry(gear, pair)
         mesh = gear_sector(shape, gear.face_width, MeshSpec(scale=scale))
         assert scaled_jacobian(mesh).min() > 0.35
         assert volume(mesh) == pytest.approx(section(shape)[0] * gear.face_width, rel=5e-4)
-        angle = 2 * math.pi / gear.teeth
-        turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
-        gap = np.abs(mesh.nodes[mesh.cut_minus] @ turn.T - mesh.nodes[mesh.cut_plus]).max()
-        assert gap <= 1e-12 * shape.r_a
+        assert cut_gap(mesh) <= 1e-12 * shape.r_a
 
 
 def problems_of(pair: PairSpec, gears: list[GearSpec]) -> list[Found]:
@@ -140,9 +147,7 @@ def test_helical_sectors_of_any_angle_are_sound(numbers: dict) -> None:
     mesh = gear_sector(shape, width, MeshSpec(flank=8, thickness=2, root=4, rim=2, width=layers))
     assert scaled_jacobian(mesh).min() > 0.3
     assert volume(mesh) == pytest.approx(section(shape)[0] * width, rel=5e-4)
-    angle = 2 * math.pi / shape.z
-    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
-    assert np.abs(mesh.nodes[mesh.cut_minus] @ turn.T - mesh.nodes[mesh.cut_plus]).max() <= 1e-12 * shape.r_a
+    assert cut_gap(mesh) <= 1e-12 * shape.r_a
 
 
 def test_ordinary_pairs_are_not_refused() -> None:
@@ -155,3 +160,23 @@ def test_ordinary_pairs_are_not_refused() -> None:
                 refused += problems_of(pair, gears)
                 check_meshes(pair, gears, 0.3)
     assert not refused
+
+
+@settings(max_examples=25, derandomize=True)
+@given(
+    z=st.integers(36, 160), x=st.floats(-0.3, 0.5), tip=st.floats(0.5, 0.9), fillet=st.floats(0.1, 0.3),
+    rim=st.floats(1.1, 6), scale=st.sampled_from([0.5, 1.0]),
+)  # fmt: skip
+def test_many_rings_mesh_well(z, x, tip, fillet, rim, scale):
+    m, r = 2e-3, 1e-3 * z
+    r_f = r + m * (x + 1.25)
+    ring = InternalGearGeometry(
+        z, m, math.radians(20), x, r + m * (x - tip), r_f, r_f + rim * m, 0.04 * m, fillet * m
+    )  # fmt: skip
+    if ring.s_tip <= 0 or ring.fillet_centre[1] <= 0 or ring.tip_land_half_angle < 0:
+        event("no such ring")
+        return
+    mesh = ring_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
+    assert scaled_jacobian(mesh).min() > 0.35
+    assert volume(mesh) == pytest.approx(section(ring)[0] * 5 * m, rel=5e-4)
+    assert cut_gap(mesh) < 1e-12 * r + 1e-15

@@ -8,12 +8,11 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-from fzg import PAIR, PINION
 from hypothesis import given
 from hypothesis import strategies as st
 from sections import half_outline
 
-from gearfmu.geometry import GearGeometry, PairGeometry, involute
+from gearfmu.geometry import GearGeometry, PairGeometry
 
 MODULE, ALPHA, BETA = 8e-3, math.radians(20), math.radians(15.8)
 
@@ -156,9 +155,3 @@ def test_normal_backlash_and_wheel_phase() -> None:
     for z in (-0.05, 0.03):  # and so in every other section, since both turn by the same arc on the base circles
         moved = rolls[0] + FIRST.r_b * FIRST.twist * z + rolls[1] + SECOND.r_b * SECOND.twist * z
         assert moved == pytest.approx(pair.length, rel=1e-13)
-
-
-def test_spur_numbers_are_untouched() -> None:
-    assert (PINION.beta, PINION.beta_b, PINION.m_t, PINION.alpha_t) == (0.0, 0.0, PINION.m, PINION.alpha)
-    assert PAIR.overlap_ratio(14e-3) == 0.0
-    assert float(involute.inv(PINION.alpha_t)) == float(involute.inv(PINION.alpha))

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfmu.geometry import involute
 from gearfmu.stagefile.forms.shapes import carrier_geometry, set_geometry
 from gearfmu.stagefile.stage import load_stage
 
@@ -103,9 +102,3 @@ def test_carrier_volume_is_a_sum_of_cylinders():
     plate, bolt = math.pi * (60e-3**2 - 20e-3**2) * 12e-3, math.pi * 8e-3**2 * 22e-3
     assert g.volume == pytest.approx(plate + 4 * bolt)
     assert g.bolt_axis(1) == pytest.approx([0, 45e-3, 0], abs=1e-15)
-
-
-def test_inv_of_the_roll_is_the_polar_angle():
-    roll = np.linspace(RING.s_a, RING.s_form, 9)
-    point = RING.flank_point(roll)
-    assert np.arctan2(point[:, 1], point[:, 0]) == pytest.approx(involute.flank_angle(roll, RING.r_b, RING.psi_b))

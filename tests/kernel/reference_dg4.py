@@ -3,22 +3,20 @@
 Written from the formulas of the theory page alone, not from the C kernel, so that the two can be compared step by step.
 
 The problem. Modes q_k with unit mass, q̈ + 2ζωq̇ + ω²q = F + Wᵀλ (ω = 0: rigid), unknown forces λ and their gaps
-G = offset + W q + C λ. A contact has 0 ≤ λ ⊥ G ≥ 0, a bilateral row G = 0. C is the compliance of what has no mass.
+G = offset + W q + C λ with 0 ≤ λ ⊥ G ≥ 0. C is the compliance of what has no mass.
 
 The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η): impulses h f at the ends of steps. With E the exact flow
 of a mode, its state is ρ times the exact response to them at the middle of an impulse. ρ and κ, the compliance that is
 taken off at once, make the response exact at rest and, matched at rest (no mesh mode is known here), up to Ω². γ < ½
 goes back to κ = 0 (`em`). Modes too fast for the step yield a share θ at once (κ = −θ/ω²), the rest by the trapezoidal
 rule with a step h √(1 − θ). 1 > γ > ¾ raises θ from .7 to .95, ¾ > γ > ½ halves the limit of ωh.
-η, along one direction
-and of one scalar, makes the work of a step in which a contact opens or closes equal to the change of ½ λᵀC′λ (a
-discrete
-gradient after Gonzalez, J. Nonlinear Sci. 6, 1996).
+η, along one direction and of one scalar, makes the work of a step in which a contact opens or closes equal to the
+change of ½ λᵀC′λ (a discrete gradient after Gonzalez, J. Nonlinear Sci. 6, 1996).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
@@ -34,9 +32,8 @@ class Problem:
     """Modes and unknown forces; n modes, m forces.
 
     omega (n,) rad/s, 0 for rigid · zeta (n,) · rows (m, n): gap per modal coordinate · compliance (m, m), m/N ·
-    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, parallel to `path` (m, m), m/N,
-    the part of the compliance that is each contact's own (all of it where not said) ·
-    weight (m,): share of a row in η, proportional to the length it stands for.
+    offset (m,), m · dashpot (m,), N·s/m, parallel to `path` (m, m), m/N, the part of the compliance that is each
+    contact's own.
     """
 
     omega: np.ndarray
@@ -44,32 +41,16 @@ class Problem:
     rows: np.ndarray
     compliance: np.ndarray
     offset: np.ndarray
-    bilateral: np.ndarray = field(default=None)
-    dashpot: np.ndarray = field(default=None)
-    path: np.ndarray = field(default=None)
-    weight: np.ndarray = field(default=None)
-
-    def __post_init__(self) -> None:
-        m = len(self.offset)
-        for name, default in (
-            ("bilateral", np.zeros(m, bool)),
-            ("dashpot", np.zeros(m)),
-            ("path", self.compliance),
-            ("weight", np.ones(m)),
-        ):
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, default)
+    dashpot: np.ndarray
+    path: np.ndarray
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """h: step, s · gamma: 1 for dg4, 0 for em · energy: whether a change of contact is made to conserve energy ·
-    epsilon: dissipation of closed steps, η = 2ε(λ₁ − λ₀) · tolerance: of the energy equation."""
+    """h: step, s · gamma: 1 for dg4, 0 for em · tolerance: of the energy equation."""
 
     h: float
     gamma: float = 1.0
-    energy: bool = True
-    epsilon: float = 0.0
     tolerance: float = 1e-9
 
     @property
@@ -109,20 +90,13 @@ class State:
         """Contact forces at the end of the step, with what their dashpots do there."""
         return self.force + self.late
 
-    @property
-    def reported(self) -> np.ndarray:
-        """Contact forces whose sum times h is the impulse."""
-        return self.force + 0.5 * self.eta
 
-
-def solve_lcp(
-    matrix: np.ndarray, gap: np.ndarray, bilateral: np.ndarray, start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Forces and active set of 0 ≤ λ ⊥ gap + matrix λ ≥ 0 (bilateral rows: = 0, λ of any sign); matrix is a P-matrix.
+def solve_lcp(matrix: np.ndarray, gap: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces and active set of 0 ≤ λ ⊥ gap + matrix λ ≥ 0; matrix is a P-matrix.
 
     Block principal pivoting: flip everything that is violated; after four rounds without progress only the last one
     (Júdice and Pires, Comput. Oper. Res. 21, 1994; Murty's rule makes it end)."""
-    active = start | bilateral
+    active = start
     fewest, patience = len(gap) + 1, 4
     scale = np.abs(gap).max(initial=0.0) * 1e-14
     for _ in range(50 * len(gap) + 50):
@@ -130,7 +104,7 @@ def solve_lcp(
         if active.any():
             force[active] = np.linalg.solve(matrix[np.ix_(active, active)], -gap[active])
         slack = gap + matrix @ force
-        wrong = np.where(active, force <= 0, slack < -scale) & ~bilateral
+        wrong = np.where(active, force <= 0, slack < -scale)
         if not wrong.any():
             return force, active
         if wrong.sum() < fewest:
@@ -191,22 +165,15 @@ class Reference:
         self.a = self.c - problem.path
         self.rounds = self.changes = self.failures = 0
 
-    def mu(self) -> float:
-        """μ′ = 1 − λ_min(C^−½ C′ C^−½): 0 for h → 0; the energy is no longer positive beyond 1."""
-        root = np.linalg.cholesky(self.problem.compliance)
-        scaled = np.linalg.solve(root, np.linalg.solve(root, self.c).T)
-        return float(1 - np.linalg.eigvalsh(0.5 * (scaled + scaled.T)).min())
-
     def start(self, q: np.ndarray, v: np.ndarray, external: np.ndarray) -> State:
         """State for physical modal displacements and velocities (n,) and external modal forces (n,)."""
         p = self.problem
         gap = p.offset + p.rows @ q
-        force, _ = solve_lcp(p.compliance, gap, p.bilateral, gap < 0)
+        force, _ = solve_lcp(p.compliance, gap, gap < 0)
         f = external + p.rows.T @ force
         y = q + self.kappa * f
         at_gap = self._gap(y, external)
-        closed = (force > 0) | p.bilateral
-        return State(y, v, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force))))
+        return State(y, v, f, force, np.where(force > 0, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force))))
 
     def step(self, state: State, external: np.ndarray) -> State:
         """The state h later; `external` (n,): external modal forces at the end of the step."""
@@ -228,48 +195,35 @@ class Reference:
         held = self.a @ state.late @ (state.force + 0.5 * state.late)
         return float(modal + 0.5 * state.force @ self.c @ state.force + held - state.shift)
 
-    def displacement(self, state: State) -> np.ndarray:
-        """Physical modal displacements (n,)."""
-        return state.y - self.kappa * state.f
-
-    def velocity(self, state: State) -> np.ndarray:
-        """Physical modal velocities (n,); of second order where the force changes."""
-        return state.v
-
     def _gap(self, y: np.ndarray, external: np.ndarray) -> np.ndarray:
         return self.problem.offset + self.w @ (y - self.kappa * external)
 
     def _forces(self, gap: np.ndarray, state: State) -> tuple:
         """λ₁, η, η_d, the dashpots' force at the end and the account of jumps: complementarity, then energy where a
-        contact changed, or dissipation where none did."""
-        p, s = self.problem, self.scheme
-        was = (state.force > 0) | p.bilateral
+        contact changed."""
+        was = state.force > 0
         none = np.zeros_like(gap)
         if not was.any() and np.all(gap >= 0):
             return none, none, none, none, state.shift
         solved, eta, shift = self._solve(gap, state, was), none, state.shift
         changed = bool(np.any(solved.active != was))
         self.changes += changed
-        if changed and s.energy:
+        if changed:
             solved, eta, shift = self._conserve(gap, state, solved, was)
-        elif not changed and s.epsilon:
-            solved = self._solve(gap, state, was, 2 * s.epsilon)
-            eta = 2 * s.epsilon * (solved.force - state.force)
         force, dashpots = solved.force, solved.dashpots
         dash = dashpots.by @ force + dashpots.fixed
         return force, eta + dash, dash, dashpots.late_by @ force + dashpots.late_fixed, shift
 
-    def _solve(self, gap: np.ndarray, state: State, start: np.ndarray, slow: float = 0.0) -> Solved:
-        """The complementarity problem with η = η_d + slow (λ₁ − λ₀). Where a dashpot stands follows from λ₁ and is
-        sought; for each stand η_d and f_d are linear in λ₁ whether a contact is open or closed, and nothing jumps
-        between them."""
-        was = (state.force > 0) | self.problem.bilateral
+    def _solve(self, gap: np.ndarray, state: State, start: np.ndarray) -> Solved:
+        """The complementarity problem with η = η_d. Where a dashpot stands follows from λ₁ and is sought; for each
+        stand η_d and f_d are linear in λ₁ whether a contact is open or closed, and nothing jumps between them."""
+        was = state.force > 0
         nowhere = np.zeros(len(gap), int)
         dashpots = self._dashpots(state, was.astype(int), nowhere, nowhere, np.ones(len(gap)))
         for i in range(200):
-            lagged = (1 + slow) * self.d + self.d @ dashpots.by + self.a @ dashpots.late_by
-            shifted = gap + self.d @ (dashpots.fixed - slow * state.force) + self.a @ dashpots.late_fixed
-            force, active = solve_lcp(lagged + self.c, shifted, self.problem.bilateral, start)
+            lagged = self.d + self.d @ dashpots.by + self.a @ dashpots.late_by
+            shifted = gap + self.d @ dashpots.fixed + self.a @ dashpots.late_fixed
+            force, active = solve_lcp(lagged + self.c, shifted, start)
             left = np.maximum(0.0, shifted + (lagged + self.c) @ force)
             found = self._stand(state, force, was | active, left)
             if found.stand_as(dashpots):
@@ -293,9 +247,9 @@ class Reference:
 
     def _jump(self, state: State, solved: Solved) -> float:
         """Half the jump of the invariant in the step: its states lead the motion by h²/12 of the rate of the force."""
-        force, rigid = solved.force, self.problem.bilateral
+        force = solved.force
         own, moved = self._moved(state, force, np.maximum(0.0, solved.gap + (solved.lagged + self.c) @ force))
-        passes = (own > 0) & ~rigid & ((state.force > 0) != (force > 0))
+        passes = (own > 0) & ((state.force > 0) != (force > 0))
         power = (force - state.force) * np.square(moved) / np.where(passes, own, 1.0)
         return -min(1.0, 4 * self.scheme.gamma - 1) / 24 * float(power[passes].sum())
 
@@ -307,7 +261,7 @@ class Reference:
         one = np.ones_like(force)
         linear = self._dashpots(state, acts, 0 * acts, 0 * acts, one)
         free = linear.by @ force + linear.fixed
-        passes = (acts > 0) & ~self.problem.bilateral & ((state.force > 0) != (force > 0)) & (sums > 0)
+        passes = (acts > 0) & ((state.force > 0) != (force > 0)) & (sums > 0)
         share, most = np.abs(free) / np.where(passes, sums, 1.0), self._touching(state, force, left)
         part = np.where(passes, np.where(share < 2 * most, share * (1 - share / (4 * most)), most), 1.0)
         clip = np.where(passes, np.where(free < 0, -1, 1), self._beyond(free, sums))
@@ -324,8 +278,8 @@ class Reference:
         return self._dashpots(state, *(np.where(moved, there, here) for here, there in nearer), new.part)
 
     def _beyond(self, wished: np.ndarray, limit: np.ndarray) -> np.ndarray:
-        """(m,): the sign of what is beyond ± limit, else 0. Bilateral rows have no limit."""
-        return np.where((np.abs(wished) > limit) & ~self.problem.bilateral, np.sign(wished), 0).astype(int)
+        """(m,): the sign of what is beyond ± limit, else 0."""
+        return np.where(np.abs(wished) > limit, np.sign(wished), 0).astype(int)
 
     def _dashpots(
         self, state: State, acts: np.ndarray, clip: np.ndarray, hold: np.ndarray, part: np.ndarray
@@ -335,7 +289,7 @@ class Reference:
         rate = (2 * acts * p.dashpot / self.scheme.h)[:, None] * p.path
         by = np.where(clip[:, None] == 0, rate, (clip * part)[:, None] * one)
         fixed = np.where(clip == 0, -rate @ state.force, clip * part * state.force)
-        acted = (state.dash != 0.0) & ((state.force > 0) | p.bilateral)
+        acted = (state.dash != 0.0) & (state.force > 0)
         beta = np.where(acted, 0.25 * (3 + MEMORY), 0.5)
         tail = np.where(acted, -0.25 * (1 - MEMORY) * state.dash - MEMORY * state.late, 0.0)
         late_by = np.where(hold[:, None] == 0, beta[:, None] * by, hold[:, None] * one)
@@ -353,7 +307,7 @@ class Reference:
         reached = solved.gap + solved.lagged @ solved.force
         most = 0.05 * solved.force @ c @ solved.force
         shift = float(np.clip(state.shift + self._jump(state, solved), -most, most))
-        direction = np.where(solved.active | was, self.problem.weight * (reached - before), 0.0)
+        direction = np.where(solved.active | was, reached - before, 0.0)
         alpha, plain = 0.0, solved
         for i in range(2 * ROUNDS):
             if i == ROUNDS:  # no root was found: without the jump

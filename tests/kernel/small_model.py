@@ -29,7 +29,6 @@ from gearfmu.stage.assembly.groups import Group, Layout, Support, mount
 from gearfmu.stagefile.tables.connections import LevelSpec
 
 NAMES = ("pinion", "wheel")
-OFFSETS = np.arange(-3, 4)
 DISTANCE, TEETH, SHIFT, MASS, INERTIA = 91.5e-3, (16, 24), (0.1817, 0.1715), (0.35, 0.95), (2.2e-4, 1.5e-3)
 ALPHA = np.radians(20)
 BASE = tuple(0.5 * 4.5e-3 * z * np.cos(ALPHA) for z in TEETH)
@@ -80,18 +79,14 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     return write_blob(order_sections(sections))
 
 
-def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
-    """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
-    strip of 1 m, 1/Pa (as good as rigid when left out)."""
-    return flat_blob("bars", bar_bodies(bars, modes), FlatContact(gap=gap, local=local))
-
-
-def bar_bodies(bars: tuple[Bar, Bar], modes: tuple[int, int]) -> list[FlatBody]:
-    """The bars of `bars_blob`."""
-    return [
+def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float) -> bytes:
+    """Two coaxial bars `gap` apart, with the residual of the modes left out; 2 (1 − ν²)/(πE) of the contact of 1 m
+    is as good as rigid."""
+    bodies = [
         FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.residual(n)]]))
         for b, n in zip(bars, modes, strict=True)
     ]
+    return flat_blob("bars", bodies, FlatContact(gap=gap, local=1e-20))
 
 
 def with_nodes(blob: bytes, share: float = 0.5, nodes: tuple[int, int] = (9, 5), penalty: float = 2e9) -> bytes:

@@ -3,70 +3,38 @@ GK_ASSERT, of which none fails."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import re
-import struct
 import subprocess
 import sys
 import traceback
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 import pytest
 from builds import checked_library
 from golden import REALS, moved, results, stored
 from probes import build, compilers, source_folder
-from small_model import pair_blob
 
 from gearfmu import cosim
-from gearfmu.kernel import Kernel, binding, instance
+from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import FLAGS, fmi_headers
 from gearfmu.scenefile.scene import load_scene
 
-FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": (), "native": ("-march=native",)}
-VARIANTS = [pytest.param(c, f, marks=pytest.mark.full) for c in compilers() for f in FLAG_SETS]
+FLAGS_OF = {"float": (("-O0",), ("-O1",), ("-O3",), ("-march=native",)), "double": (("-O1",), ("-O3",))}
+BUILDS = [(real, compiler, flags) for real in REALS for compiler in compilers() for flags in FLAGS_OF[real]]
 CHECKS = 150  # GK_ASSERT in the sources, at least
 QUICK_SCENES = [("pair_loaded", {"duration": "60 ms"}), ("clutch_closure", {"duration": "130 ms"})]  # it has locked
 LONG_SCENES = ("pair_loaded", "clutch_closure", "clutch_closure_train", "planetary_closure")
-WATCHED = ("mesh.force", "mesh.te", "energy.stored", "energy.residual", "bearing.pinion.fx", "wheel.gear.phi")
 
 
-@lru_cache
-def bits(library: Path) -> str:
-    """SHA-256 over states and outputs of short runs: every integrator through reversals of torque,
-    dg4 with a slipping clutch."""
-    digest = hashlib.sha256()
-    for integrator in range(3):
-        digest.update(run(library, ("torque", "spring"), integrator, 200))
-    digest.update(run(library, ("chain", "spring"), 0, 300))
-    return digest.hexdigest()
-
-
-def run(library: Path, ports: tuple[str, str], integrator: int, steps: int) -> bytes:
-    """Outputs and last state of a run with a swinging input; the contact opens and closes."""
-    kernel = Kernel(pair_blob(ports), {"integrator": integrator, "h": 2e-6 if integrator == 2 else 7.5e-6}, library)
-    if ports[0] == "chain":
-        kernel.set("pinion.w", 30.0)
-        kernel.set("pinion.clutch.capacity", 120.0)
-    kernel.initialize()
-    record = []
-    for i in range(steps):
-        if ports[0] == "torque":
-            kernel.set("pinion.tau", 200.0 if i // 40 % 2 else -150.0)
-        else:
-            kernel.set("pinion.phi", 30.0 * i * 2e-5)
-        kernel.step(i * 2e-5, 2e-5)
-        record += [kernel.get(name) for name in WATCHED]
-    assert max(map(abs, record[:: len(WATCHED)])) > 100  # the teeth did meet
-    return struct.pack(f"<{len(record)}d", *record) + kernel.save()
-
-
-@pytest.mark.parametrize(("compiler", "flags"), VARIANTS)
-def test_same_bits_from_every_compiler(system_library: Path, compiler: str, flags: str, tmp_path: Path) -> None:
-    assert bits(build(tmp_path, compilers()[compiler], FLAG_SETS[flags])) == bits(system_library)
+@pytest.mark.full
+@pytest.mark.parametrize(("real", "compiler", "flags"), BUILDS)
+def test_same_bits_from_every_compiler(real: str, compiler: str, flags: tuple[str, ...], tmp_path: Path) -> None:
+    """All golden runs: every integrator, kind of stage and effect."""
+    assert not moved(stored(real), results(build(tmp_path, compilers()[compiler], flags, real=real)))
 
 
 FUSED_ONCE = ("problem/gk_nodal.c", "run/gk_amplitudes.c", "run/gk_supports.c", "setup/gk_deviation.c")
@@ -86,25 +54,6 @@ def test_no_product_and_sum_are_fused(files: str) -> None:
         done = subprocess.run(line, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         assert not re.search(r"\bvfn?m(add|sub)", done.stdout), path.name
-
-
-@pytest.mark.full
-@pytest.mark.skipif("gcc" not in compilers(), reason="needs gcc")
-def test_a_native_build_runs_every_kind_of_stage_with_the_same_bits(system_library: Path, tmp_path: Path) -> None:
-    native = build(tmp_path, ("gcc",), ("-march=native",))
-    for stage in ("pair", "deviating", "nodal", "pin_errors"):
-        assert results(native, f"{stage}/") == results(system_library, f"{stage}/")
-
-
-def test_same_bits_with_checks_and_patterned_memory(system_library: Path) -> None:
-    assert bits(checked_library()) == bits(system_library)
-
-
-def test_a_second_run_repeats_the_first(system_library: Path) -> None:
-    """Nothing of an instance stays behind in the library."""
-    first = run(system_library, ("chain", "spring"), 0, 60)
-    run(system_library, ("torque", "spring"), 0, 30)
-    assert run(system_library, ("chain", "spring"), 0, 60) == first
 
 
 # ---- with GK_ASSERT --------------------------------------------------------------------------------------------------

@@ -95,15 +95,3 @@ def test_each_rule_finds_what_breaks_it(rule: str, tmp_path: Path) -> None:
     assert told in found[rule]
     nothing: dict[str, dict[str, int]] = {r: {} for r in RULES}
     assert any(told in line for line in new(found, nothing)) and gone(nothing, {**nothing, rule: {told: 1}})
-
-
-def test_comments_strings_and_other_branches_are_not_code(tmp_path: Path) -> None:
-    (tmp_path / "base").mkdir()
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "f.c").write_text("void gk_f(void)\n{\n}\n")
-    (tmp_path / "base" / "a.c").write_text(
-        '/* gk_f(); */\n#ifdef A\nstatic void a(int x)\n{\n#else\nstatic void a(void)\n{\n#endif\n'
-        '    say("/* gk_f() //");\n}\n'
-    )  # fmt: skip
-    read = Sources.below(tmp_path)
-    assert not read.calls() and [f.name for f in read.files["base/a.c"].functions] == ["a"]

@@ -150,17 +150,6 @@ def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(
     assert found
 
 
-def test_corner_gap_grows_quadratically_off_the_line_of_action(plain: Inner):
-    over, gap = [], []
-    for phi in np.linspace(0, 2 * np.pi / TEETH[0], 800, endpoint=False):
-        for p in plain.places(turned(phi), 3e-4):
-            virtual = BASE[0] * (phi + p.tooth * 2 * np.pi / TEETH[0] + PSI[0] + WORKING) - TIP[0]
-            if p.flank == DRIVE and p.roll[0] >= TIP[0] and 2e-4 < virtual < 1.5e-3:
-                over.append(virtual), gap.append(p.gap)
-    order = np.polyfit(np.log(over), np.log(gap), 1)[0]
-    assert len(over) > 10 and 1.7 < order < 2.1
-
-
 def test_local_law_is_continuous_with_its_slope_and_its_energy_is_the_integral(plain: Inner):
     force = np.concatenate([np.geomspace(1e-3, 2e5, 4001)])
     approach, slope, energy = np.array([plain.law(f, 150.0) for f in force]).T
@@ -187,10 +176,3 @@ def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(
     local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"] * case["L"])
     expected = 2 * local * case["F"] * (np.log(4 * 1e-3 / case["b"]) - 1)
     assert inner.law(case["F"], curvature)[0] == pytest.approx(expected, rel=1e-12)
-
-
-def test_step_limit_grows_with_the_step_and_falls_with_gamma(plain: Inner):
-    steps = [2e-6, 4e-6, 8e-6, 16e-6]
-    mu = [plain.mu(h) for h in steps]
-    assert all(0 < a < b for a, b in zip(mu, mu[1:], strict=False))
-    assert plain.mu(8e-6, 0.0) < 1e-7 and plain.mu(8e-6, 0.5) < mu[2]

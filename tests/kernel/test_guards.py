@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builds import edited_library
-from small_model import BASE, INERTIA, LENGTH, PSI, TEETH, WORKING, pair_blob
+from small_model import BASE, LENGTH, PSI, TEETH, WORKING, pair_blob
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
@@ -94,28 +94,6 @@ def test_a_step_that_would_turn_the_gears_too_far_is_halved_until_it_does_not(tu
     assert kernel.get("solver.steps") == 60 * halves and kernel.get("solver.retried_steps") == 60 * (halves - 1)
     assert kernel.get("pinion.phi") == pytest.approx(angle, rel=1e-13) and status(kernel) == 0
     assert abs(kernel.get("energy.residual")) < 1e-13 * kernel.get("energy.stored")
-
-
-def test_halving_begins_when_the_speed_is_reached() -> None:
-    """Torques that turn both gears faster and faster without contact: half of the run at full steps, half at halves;
-    the speed is ω + αt but for what the bodies swing, and the work of the torques is the gain of energy."""
-    steps, internal = 20, STEP / 3
-    limit = QUARTER / internal
-    angular = 0.2 * limit / (steps * STEP)
-    kernel = Kernel(pair_blob(("torque", "torque")))
-    for shaft, ratio, inertia in (("pinion", 1.0, INERTIA[0]), ("wheel", -TEETH[0] / TEETH[1], INERTIA[1])):
-        kernel.set(f"{shaft}.w_start", 0.9 * limit * ratio)
-        kernel.set(f"{shaft}.tau", angular * inertia * ratio)
-    kernel.initialize()
-    for i in range(steps):
-        kernel.step(i * STEP, STEP)
-    time = steps * STEP
-    assert kernel.get("mesh.force_max") == 0.0
-    assert 25 <= kernel.get("solver.retried_steps") <= 35 and kernel.get("solver.steps") == 60 + kernel.get(
-        "solver.retried_steps"
-    )
-    assert kernel.get("pinion.gear.w") == pytest.approx(0.9 * limit + angular * time, rel=2e-4)
-    assert abs(kernel.get("energy.residual")) < 1e-6 * kernel.get("energy.work")
 
 
 def heavier(blob: bytes, factor: float) -> bytes:

@@ -12,7 +12,7 @@ from small_model import pair_blob, with_nodes
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.stage.assembly.blob import order_sections, read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob, write_blob
 
 DG4, RK45, CENTRAL = 0, 2, 3
 FULL, PAPER = 3, 4
@@ -102,20 +102,17 @@ def _pair_run(blob: bytes, level: int, parameters: dict[str, float]) -> np.ndarr
 
 
 @pytest.mark.parametrize(
-    ("parameters", "words"),
+    ("blob", "parameters", "words"),
     [
-        ({"integrator": DG4, "level": FULL}, "use integrator rk45 or central"),
-        ({"contact_penalty": 0.0}, "contact_penalty is 0"),
+        (with_nodes(blocks()), {"integrator": DG4, "level": FULL}, "use integrator rk45 or central"),
+        (with_nodes(blocks()), {"contact_penalty": 0.0}, "contact_penalty is 0"),
+        (blocks(), {}, "no flank nodes"),
     ],
+    ids=["dg4", "penalty", "no nodes"],
 )
-def test_what_nodal_contact_cannot_do_is_refused(parameters: dict[str, float], words: str) -> None:
+def test_what_nodal_contact_cannot_do_is_refused(blob: bytes, parameters: dict[str, float], words: str) -> None:
     with pytest.raises((ModelError, SimulationError), match=words):
-        run(with_nodes(blocks()), 2e-6, 1, ("mesh.force",), **parameters)
-
-
-def test_a_model_without_nodes_says_so() -> None:
-    with pytest.raises((ModelError, SimulationError), match="no flank nodes"):
-        run(blocks(), 2e-6, 1, ("mesh.force",))
+        run(blob, 2e-6, 1, ("mesh.force",), **parameters)
 
 
 @pytest.mark.parametrize(
@@ -133,9 +130,3 @@ def test_a_blob_with_wrong_nodes_is_refused(damage: dict, words: str) -> None:
     sections = dict(read_blob(with_nodes(blocks()))) | damage
     with pytest.raises(ModelError, match=words):
         Kernel(write_blob({name: value for name, value in sections.items() if value is not None}))
-
-
-def test_sections_are_in_the_order_of_the_table() -> None:
-    sections = {name: value for name, value in read_blob(with_nodes(blocks())).items()}
-    with pytest.raises(AssertionError, match="nodal has shape"):
-        order_sections(sections | {"nodal": np.zeros((1, 3))})

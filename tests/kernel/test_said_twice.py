@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,6 @@ from gearfmu.kernel import binding, instance
 from gearfmu.kernel.build import sources
 from gearfmu.stage.assembly import assemble, blob, compact, meshes, teeth
 
-ROOT = Path(__file__).resolve().parents[2]
 COMMENT = re.compile(r"/\*.*?\*/", re.S)
 
 

@@ -56,10 +56,6 @@ def test_one_mode_is_the_shape_that_the_finite_elements_found() -> None:
         assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
-def test_the_surface_of_a_body_is_that_of_its_sectors(body: Any) -> None:
-    assert np.array_equal(moved(body, {0: 1.0}).surface[0].astype("f4"), body.picture.points)
-
-
 def test_a_pair_turns_a_tooth_on(body: Any) -> None:
     """Amplitudes cos ν2π/z and −sin… of a pair: the first member's pattern, one tooth further."""
     first = int(np.flatnonzero(body.flank.part == 1)[3])

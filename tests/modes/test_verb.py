@@ -57,17 +57,6 @@ def test_the_whole_stage(tmp_path: Path) -> None:
     assert all(float(row["lowest_Hz"]) <= float(row["frequency_Hz"]) <= float(row["highest_Hz"]) for row in rows)
 
 
-@pytest.mark.full  # nine seconds
-def test_a_train(tmp_path: Path) -> None:
-    """Torque on the input that brings no mesh beyond its torque_max; a column and orders of its own for each mesh."""
-    code, out, err = call("modes", "two_stage", "--count", 4, "--out", tmp_path)
-    assert (code, err) == (0, "") and "linearised at 300 N·m" in out
-    assert "rpm of the input (stage1)" in out and "rpm of the input (stage2)" in out
-    with open(tmp_path / "two_stage_frequencies.csv", newline="", encoding="utf-8") as file:
-        (first, *_) = csv.DictReader(file)
-    assert float(first["stage1_force_per_te_N_per_um"]) > 0 and float(first["stage2_force_per_te_N_per_um"]) > 0
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [

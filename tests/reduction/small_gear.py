@@ -1,9 +1,11 @@
-"""A small gear (z = 12, m = 2.5 mm) on a coarse mesh, and the same gear as one whole finite-element model."""
+"""Small gears (z = 12, m_n = 2.5 mm), spur and helical, on a coarse mesh, by one sector; and any body by one sector as
+whole finite elements."""
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,13 +15,16 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
-from gearfmu.reduction.cyclic.flank import Points, ToothFlank, flank_loads
+from gearfmu.reduction.couplings import Elements
+from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.elastic import Elastic
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
 STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 WIDTH = 8e-3
 MODULE = 2.5e-3
+BETA = math.radians(20)
 GEAR = GearGeometry(
     z=12,
     m=MODULE,
@@ -35,34 +40,58 @@ COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 FINER = MeshSpec(flank=16, thickness=3, root=4, rim=2, width=4)
 
 
-def flank(half_width: float = 3e-4) -> ToothFlank:
-    return ToothFlank(GEAR.r_b, GEAR.psi_b, GEAR.s_form, GEAR.s_tip, WIDTH, half_width)
+def gear(beta: float) -> GearGeometry:
+    """The small spur gear with another helix angle (rad) and the tip circle that goes with it."""
+    own = replace(GEAR, beta=beta)
+    return replace(own, r_a=GEAR.r_a + own.r - GEAR.r)
 
 
-def body(mesh: MeshSpec = COARSE, rolls: int = 4, functions: int = 3) -> SectorBody:
-    shape = flank()
-    return SectorBody(gear_sector(GEAR, WIDTH, mesh), STEEL, shape, Points(shape.chebyshev_rolls(rolls), functions))
+def flank(half_width: float = 3e-4, shape: GearGeometry = GEAR) -> ToothFlank:
+    return ToothFlank(
+        shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, WIDTH, half_width, base_helix_angle=shape.beta_b
+    )
 
 
-@lru_cache(maxsize=1)
-def coarse() -> SectorBody:
-    return body()
+def body(beta: float = 0.0, mesh: MeshSpec = COARSE, rolls: int = 4, functions: int = 3) -> SectorBody:
+    own = flank(shape=gear(beta))
+    return SectorBody(gear_sector(gear(beta), WIDTH, mesh), STEEL, own, Points(own.chebyshev_rolls(rolls), functions))
 
 
-@lru_cache(maxsize=1)
-def whole() -> SimpleNamespace:
-    """The coarse gear without any symmetry: free body, flank rows (2·R·A, 3N) of every tooth, bore rows (6, 3N)."""
-    sector, full = coarse().mesh, coarse().mesh.full()
-    free = free_body(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
-    rows = []
-    for tooth in range(GEAR.z):
-        index = sector.sector_nodes(tooth)
-        angle = 2 * np.pi * tooth / GEAR.z
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-        local = coarse().flank_rows.reshape(-1, len(sector.nodes), 3)
-        whole_rows = np.zeros((len(local), len(full.nodes), 3))
-        np.add.at(whole_rows, (slice(None), index), local @ turn.T)
-        rows.append(whole_rows.reshape(len(local), -1))
-    bore = averaging_rows(full.nodes, surface.faces_within(full.elements, full.sets["bore"]))
-    own = np.concatenate([flank_loads(full.nodes, full.flank[s].quads, flank(), s, coarse().points) for s in (0, 1)])
-    return SimpleNamespace(free=free, flank_rows=np.array(rows), bore_rows=bore, tooth_0=own.reshape(len(rows[0]), -1))
+@cache
+def coarse(beta: float = 0.0) -> SectorBody:
+    return body(beta)
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A body without any symmetry: its sector, its finite elements, and these as a free body."""
+
+    sector: SectorBody
+    elements: Elements
+    free: Elastic
+
+    def loads(self, tooth: int) -> np.ndarray:
+        """(m, 3N): all loads of a tooth, as those of tooth 0 in the sector (`load_matrix`), turned."""
+        mesh, rows = self.sector.mesh, self.sector.load_matrix.toarray()
+        result = np.zeros((len(rows), len(self.elements.nodes), 3))
+        local = rows.reshape(len(rows), -1, 3) @ turn(tooth, mesh.teeth).T
+        np.add.at(result, (slice(None), mesh.sector_nodes(tooth)), local)
+        return result.reshape(len(rows), -1)
+
+    def held_rows(self) -> np.ndarray:
+        """(6, 3N): the averaging node of the bore, of a ring that of its rim."""
+        nodes = self.sector.mesh.full().sets["rim" if self.sector.internal else "bore"]
+        return averaging_rows(self.elements.nodes, surface.faces_within(self.elements.elements, nodes))
+
+
+@cache
+def whole(sector: SectorBody) -> Whole:
+    full = sector.mesh.full()
+    elements = Elements(full.nodes, full.elements, *hex20.assemble(full.nodes, full.elements, sector.material))
+    return Whole(sector, elements, free_body(elements.stiffness, elements.mass, full.nodes, full.elements))
+
+
+def turn(tooth: int, teeth: int) -> np.ndarray:
+    """(3, 3): vectors in the frame of a sector → in the body's frame."""
+    angle = 2 * np.pi * tooth / teeth
+    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])

@@ -1,14 +1,14 @@
-"""Couplings at interfaces: rigid (RBE2) and averaging (RBE3) nodes against what they mean; carrier and gears."""
+"""Couplings at interfaces: rigid (RBE2) and averaging (RBE3) nodes against what they mean; carriers whose bolts are
+alike: one bolt's part factorised for all gives the solutions of the whole body."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
-from sections import carrier_moments
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20
@@ -17,14 +17,13 @@ from gearfmu.fem.factor import Factor
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.toothed import gear_full_order
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.stage import load_stage
 
 SPEC = load_stage("planetary54")
 SCALE = 0.34
-STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 
 
 def with_couplings(**kinds: str):
@@ -51,12 +50,6 @@ def elements() -> Elements:
     )
 
 
-def test_interfaces_are_bolts_then_bore_and_the_bore_is_the_ground(carrier):
-    assert [i.name for i in carrier.interfaces] == ["bolt0", "bolt1", "bolt2", "bolt3", "bore"]
-    assert carrier.ground == ("bore",) and carrier.length == 45e-3
-    assert carrier.rows("bolt0", "bolt1", "bolt2", "bolt3").shape == (24, carrier.size)
-
-
 def test_kinds_are_chosen_for_each_interface(averaged, elements):
     assert [i.kind for i in averaged.interfaces] == ["rigid", "averaging", "rigid", "rigid", "averaging"]
     slaves = elements.nodes.shape[0] * 3 - (averaged.size - 18)  # three rigid bolts have eliminated theirs
@@ -70,14 +63,6 @@ def test_rigid_motion_costs_nothing_and_every_node_follows_it(name, request):
     for interface in body.interfaces:
         expected = np.vstack([rigid_fields(interface.point), np.eye(6)[3:]])
         assert interface.rows @ body.rigid == pytest.approx(expected, abs=1e-12)
-
-
-def test_mass_and_inertia_are_the_analytic_ones(carrier):
-    geometry, mass = carrier_geometry(SPEC.bodies["carrier"]), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
-    centre, polar = carrier_moments(geometry)
-    assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=2e-3)
-    assert mass[5, 5] == pytest.approx(7850 * polar, rel=2e-3)
-    assert mass[0, 4] / mass[0, 0] == pytest.approx(centre, rel=2e-3)
 
 
 def test_rigid_coupling_is_the_body_with_its_slaves_moved_by_hand(carrier, elements):
@@ -99,26 +84,6 @@ def test_rigid_coupling_is_the_body_with_its_slaves_moved_by_hand(carrier, eleme
     moved = spl.splu(sp.csc_matrix(k[rest][:, rest]), "MMD_AT_PLUS_A").solve(-(k[rest][:, dofs] @ motion))
     theirs = motion.T @ (k[dofs][:, rest] @ moved + k[dofs][:, dofs] @ motion)
     assert mine == pytest.approx(theirs, rel=1e-8, abs=1e-9 * np.abs(theirs).max())
-
-
-def test_averaging_node_is_softer_than_a_rigid_one(carrier, averaged):
-    """A rigid coupling stiffens the seat; both read the same rigid motion."""
-    stiff, soft = (_held_flexibility(body, "bolt1") for body in (carrier, averaged))
-    assert np.all(np.diag(soft) > np.diag(stiff)) and np.all(np.diag(soft) < 4 * np.diag(stiff))
-
-
-def _held_flexibility(body: FullOrder, name: str) -> np.ndarray:
-    """Compliance (6, 6) at an interface with the plate's underside at the bore held by springs of 1e12 N/m."""
-    weight = 1e12 * body.rows("bore").T @ sp.diags_array([1, 1, 1, 1e-3, 1e-3, 1e-3]) @ body.rows("bore")
-    rows = body.rows(name).toarray()
-    return rows @ spl.splu(sp.csc_matrix(body.stiffness + weight), "MMD_AT_PLUS_A").solve(rows.T)
-
-
-def test_cells_cover_every_coupling_so_that_the_factorisation_is_right(carrier):
-    shifted = sp.csr_array(carrier.stiffness + 1e8 * carrier.mass)
-    load = np.random.default_rng(0).standard_normal((carrier.size, 3))
-    solution = Factor(shifted, carrier.cells, carrier.node_of_dof).solve(load)
-    assert np.abs(shifted @ solution - load).max() < 1e-7 * np.abs(load).max()
 
 
 def test_springs_of_mounts_carry_the_load_to_the_ground(elements):
@@ -146,15 +111,43 @@ def test_two_rigid_couplings_cannot_share_a_node(elements):
         full_order("test", elements, [Coupling("empty", "rigid", seat[:0], np.zeros(3))], Judgement((), 1.0))
 
 
-def test_a_whole_gear_has_one_node_a_tooth_and_its_bore():
-    body = gear_full_order(SPEC.by_file["sun"], 0.25)
-    assert [i.name for i in body.interfaces] == [*(f"tooth{k}" for k in range(18)), "bore"]
-    assert body.ground == ("bore",) and body.length == pytest.approx(22.5e-3)
-    pair = gear_full_order(load_stage("fzg_c").by_file["pinion"], 0.2)
-    assert len(pair.interfaces) == 17
-
-
 def _seat(elements: Elements, bolt: int) -> np.ndarray:
     axis = carrier_geometry(SPEC.bodies["carrier"]).bolt_axis(bolt)
     distance = np.hypot(elements.nodes[:, 0] - axis[0], elements.nodes[:, 1] - axis[1])
     return np.flatnonzero((np.abs(distance - 8e-3) < 1e-9) & (elements.nodes[:, 2] > -10e-3 - 1e-9))
+
+
+# ---- bolts that are alike --------------------------------------------------------------------------------------------
+COARSE = 0.2
+SHIFTS = (-((2e4 * np.pi) ** 2), (2e4 * np.pi) ** 2)  # rad²/s², the second beyond the first elastic modes
+SOFT = {name: "averaging" for name in ("bolt0", "bolt1", "bolt2", "bolt3", "bore")}
+
+
+def alike(stage: str, coupling: dict[str, str]) -> FullOrder:
+    own = load_stage(stage).by_file["carrier"]
+    return carrier_full_order(own.model_copy(update={"coupling": coupling or own.coupling}), COARSE)
+
+
+@pytest.fixture(params=[("planetary54", {}), ("helical_set", {}), ("planetary54", SOFT)], scope="module")
+def body(request: pytest.FixtureRequest) -> FullOrder:
+    return alike(*request.param)
+
+
+def test_static_and_shifted_solutions_are_those_of_the_whole_body(body: FullOrder) -> None:
+    loads = body.rows().T.toarray()
+    parts, whole = Elastic(body), Elastic(replace(body, parts=None))
+    pairs = [(parts.flexibility(loads), whole.flexibility(loads))]
+    pairs += [(parts.shifted(shift).solve(loads), whole.shifted(shift).solve(loads)) for shift in SHIFTS]
+    for own, other in pairs:
+        assert np.abs(own - other).max() < 1e-9 * np.abs(other).max()
+
+
+def test_a_body_held_at_its_bore_is_solved_by_its_parts_too(body: FullOrder) -> None:
+    held = body.grounded()
+    loads = held.rows().T.toarray()
+    own, other = Elastic(held).flexibility(loads), Elastic(replace(held, parts=None)).flexibility(loads)
+    assert np.abs(own - other).max() < 1e-9 * np.abs(other).max()
+
+
+def test_bolts_that_are_coupled_differently_are_no_equal_parts() -> None:
+    assert alike("planetary54", {"bolt1": "averaging"}).parts is None

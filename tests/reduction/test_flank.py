@@ -1,4 +1,5 @@
-"""Flank loads: resultant, exactness of the strip integral, smoothness in the roll, width functions, refusals."""
+"""Flank loads: exactness of the strip integral, smoothness in the roll, width functions, refusals (resultants:
+`test_helical_rows`)."""
 
 from __future__ import annotations
 
@@ -6,12 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from small_gear import COARSE, FINER, GEAR, WIDTH, coarse, flank, whole
+from small_gear import COARSE, FINER, GEAR, WIDTH, flank
 
 from gearfmu.errors import MeshError
-from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, flank_loads
 
@@ -21,27 +19,6 @@ MESH = gear_sector(GEAR, WIDTH, FINER)
 def rows(side: int, rolls, functions: int = 5, half_width: float = 3e-4) -> np.ndarray:
     points = Points(np.atleast_1d(rolls), functions)
     return flank_loads(MESH.nodes, MESH.flank[side].quads, flank(half_width), side, points)
-
-
-@settings(max_examples=12)
-@given(share=st.floats(0, 1), side=st.integers(0, 1), half_width=st.floats(1e-4, 2e-3))
-def test_a_unit_load_is_one_newton_on_the_line_of_action(share, side, half_width):
-    roll = GEAR.s_form + share * (GEAR.s_tip - GEAR.s_form)
-    loads = rows(side, roll, half_width=half_width)[0]
-    resultant = loads @ rigid_modes(MESH.nodes)
-    assert np.hypot(*resultant[0, :2]) <= 1 + 1e-6  # less than 1 where the normal turns along the strip
-    assert np.hypot(*resultant[0, :2]) > 0.98
-    assert resultant[0, 5] == pytest.approx((1 - 2 * side) * GEAR.r_b, rel=1e-5)
-    assert np.abs(resultant[0, [2, 3, 4]]).max() < 1e-12
-    assert np.abs(resultant[1:, [0, 1, 5]]).max() < 1e-12
-    assert np.abs(resultant[[0, 2, 4]][:, [3, 4]]).max() < 1e-12
-
-
-def test_a_narrow_strip_pushes_along_the_normal_at_its_roll():
-    rolls = np.linspace(GEAR.s_form, GEAR.s_tip, 7)[1:-1]
-    for side in (0, 1):
-        loads = rows(side, rolls, 1, 1e-7)[:, 0].reshape(len(rolls), -1, 3)
-        assert np.allclose(loads.sum(axis=1)[:, :2], GEAR.flank_normal(rolls, 1 - 2 * side), atol=1e-6)
 
 
 def test_strip_mean_of_a_field_agrees_with_dense_sampling_of_the_flank():
@@ -81,11 +58,6 @@ def test_width_functions_read_legendre_fields_back():
         expected = np.zeros(5)
         expected[degree] = 1 / (2 * degree + 1)
         assert np.allclose(loads @ field.ravel(), expected, atol=1e-3)
-
-
-def test_loads_of_the_sector_are_those_of_the_whole_gear():
-    assert np.allclose(whole().flank_rows[0], whole().tooth_0, atol=1e-15)
-    assert coarse().points.rolls.min() > GEAR.s_form
 
 
 def test_a_flank_that_is_not_meshed_whole_is_refused():

@@ -1,125 +1,69 @@
-"""Helical gears: one sector against the whole gear, hands, the limit of no helix, resultants of the loads."""
+"""Loads and tables of gears and rings, spur and helical: resultants against closed forms, opposite hands, the limit of
+no helix, and flanks that touch along a line."""
 
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 import small_gear
-from blocks import COUNT, modes_of
-from sections import section
-from small_gear import GEAR, WIDTH
-from small_helical import BETA, COARSE, body, coarse, flank, gear, turned, whole
-from turned_rows import on_tooth
+import small_ring
+from small_gear import BETA, WIDTH, gear
 
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.femesh import gear_sector, scaled_jacobian
-from gearfmu.geometry import PairGeometry
-from gearfmu.reduction.cyclic.flank import Points, flank_loads
-from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.mesh import RingMesh
+from gearfmu.reduction.cyclic.flank import ToothFlank
+from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.reduction.cyclic.statics import Statics, static_tables
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
-FLANK_ROWS = 2 * 4 * 3
+Shape = GearGeometry | InternalGearGeometry
+SHAPES: dict[str, Callable[[float], Shape]] = {"gear": gear, "ring": small_ring.geometry}
+MAKERS: dict[str, Callable[..., SectorBody]] = {"gear": small_gear.body, "ring": small_ring.body}
+FINE = MeshSpec(flank=16, thickness=2, root=4, rim=2, width=8)
+KINDS = pytest.mark.parametrize("kind", MAKERS)
 
 
-@pytest.fixture(scope="module")
-def modes() -> Modes:
-    return elastic_modes(coarse(), COUNT)
-
-
-@pytest.fixture(scope="module")
-def statics() -> Statics:
-    return static_tables(coarse(), [0, 5])
-
-
-def block(table: np.ndarray) -> np.ndarray:
-    """Own-tooth table (2, 2, R, R, A, A) as a matrix."""
-    return table.transpose(0, 2, 4, 1, 3, 5).reshape(FLANK_ROWS, FLANK_ROWS)
-
-
-def test_frequencies_of_one_sector_are_those_of_the_whole_gear(modes: Modes) -> None:
-    squared, _ = modes_of(whole().free)
-    assert np.allclose(modes.frequency, (np.sqrt(squared) / (2 * np.pi))[: len(modes.frequency)], rtol=1e-8)
-    assert np.all(modes.parity == 0)
-
-
-def test_rows_along_normal_and_profile_and_of_the_bore_are_those_of_the_whole_gear(modes: Modes) -> None:
-    """Sums of N Nᵀ over each frequency cluster do not depend on how pairs are turned."""
-    _, shapes = modes_of(whole().free)
-    flanks = np.vstack([modes.flank_rows, modes.tangent_rows])
-    reduced_0 = np.vstack([flanks, modes.bore_rows])
-    full_0 = np.vstack([whole().rows[0], whole().bore_rows]) @ shapes
-    omega = 2 * np.pi * modes.frequency
-    ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1
-    for tooth in (0, 1, 5, 11):
-        reduced = np.vstack([on_tooth(modes, flanks, tooth, GEAR.z), modes.bore_rows])
-        full = np.vstack([whole().rows[tooth], whole().bore_rows]) @ shapes
-        for cluster in np.split(np.arange(len(omega)), ends)[:-1]:
-            mine, theirs = reduced_0[:, cluster] @ reduced[:, cluster].T, full_0[:, cluster] @ full[:, cluster].T
-            assert np.abs(mine - theirs).max() < 1e-6 * np.abs(reduced_0).max() ** 2
-
-
-def test_static_tables_are_those_of_the_whole_gear(statics: Statics) -> None:
-    """All tooth offsets along the normal, the own tooth along the profile, bore with all six loads."""
-    loads, own = np.vstack([*whole().rows, whole().bore_rows]), [whole().rows[0], whole().bore_rows]
-    full = whole().free.flexibility(np.vstack(own).T).T @ loads.T
-    scale, every = np.abs(statics.static_ff).max(), 2 * FLANK_ROWS
-    for tooth in range(GEAR.z):
-        mine = statics.static_ff[:, :, tooth].transpose(0, 2, 4, 1, 3, 5).reshape(FLANK_ROWS, FLANK_ROWS)
-        theirs = full[:FLANK_ROWS, tooth * every : tooth * every + FLANK_ROWS]
-        assert np.abs(mine - theirs).max() < 1e-9 * scale
-    assert np.abs(block(statics.static_nt) - full[:FLANK_ROWS, FLANK_ROWS:every]).max() < 1e-9 * scale
-    assert np.abs(block(statics.static_tt) - full[FLANK_ROWS:every, FLANK_ROWS:every]).max() < 1e-9 * scale
-    bore = statics.static_fb.reshape(FLANK_ROWS, 6)
-    assert np.abs(bore - full[:FLANK_ROWS, -6:]).max() < 1e-9 * np.abs(bore).max()
-    assert np.abs(bore).max(axis=0).min() > 0
-    assert np.abs(statics.static_bb - full[-6:, -6:]).max() < 1e-9 * np.abs(statics.static_bb).max()
-
-
-def test_even_and_odd_width_functions_see_each_other(statics: Statics) -> None:
-    assert np.abs(statics.static_ff[0, 0, 0, :, :, 0, 1]).max() > 0.02 * np.abs(statics.static_ff[0, 0, 0]).max()
-
-
-def test_half_a_turn_about_the_middle_line_changes_the_flanks(statics: Statics) -> None:
-    """Half a turn about x brings a helical gear with symmetric teeth onto itself: flank 1, −z, −m for flank 0, z, m."""
-    sign = (-1.0) ** np.arange(3)
-    back = (-np.arange(GEAR.z)) % GEAR.z
-    turned_over = statics.static_ff[::-1, ::-1, back] * sign[:, None] * sign
-    assert np.abs(turned_over - statics.static_ff).max() < 1e-10 * np.abs(statics.static_ff).max()
-
-
-def test_a_gear_of_the_other_hand_is_the_mirror_image() -> None:
+@KINDS
+def test_a_body_of_the_other_hand_is_the_mirror_image(kind: str) -> None:
     """Mirrored at z = 0: odd width functions change their sign, flanks, normals and profile directions go on."""
-    right, left = static_tables(coarse(1), []), static_tables(coarse(-1), [])
+    right, left = (static_tables(MAKERS[kind](sign * BETA), []) for sign in (1, -1))
     sign = (-1.0) ** np.arange(3)
-    both = sign[:, None] * sign
-    scale = np.abs(right.static_ff).max()
+    both, scale = sign[:, None] * sign, np.abs(right.static_ff).max()
     for name in ("static_ff", "static_nt", "static_tt"):
         assert np.abs(getattr(left, name) - getattr(right, name) * both).max() < 1e-10 * scale
+    assert np.abs(right.static_ff[..., 0, 1]).max() > 1e-3 * scale, "even and odd functions see each other"
     loads = np.array([1, 1, -1, -1, -1, 1])  # force and moment in the mirror
     mirrored = right.static_fb * sign[:, None] * loads
     assert np.abs(left.static_fb - mirrored).max() < 1e-10 * np.abs(mirrored).max()
-    here, there = elastic_modes(coarse(1), 40), elastic_modes(coarse(-1), 40)
+
+
+@KINDS
+def test_modes_of_the_other_hand_are_the_mirror_image(kind: str) -> None:
+    here, there = (elastic_modes(MAKERS[kind](sign * BETA), 40) for sign in (1, -1))
     assert np.allclose(here.frequency, there.frequency, rtol=1e-9)
-    rows = there.flank_rows.reshape(8, 3, -1) * sign[:, None]
-    single = here.part == 0
-    mine, theirs = here.flank_rows[:, single], rows.reshape(FLANK_ROWS, -1)[:, single]
+    single, sign = here.part == 0, (-1.0) ** np.arange(3)
+    rows = (there.flank_rows.reshape(8, 3, -1) * sign[:, None]).reshape(here.flank_rows.shape)
+    mine, theirs = here.flank_rows[:, single], rows[:, single]
     same = np.sign((mine * theirs).sum(axis=0))
     assert np.abs(mine - theirs * same).max() < 1e-6 * np.abs(mine).max()
 
 
-def test_a_vanishing_helix_is_the_spur_gear() -> None:
-    """β = 1e-6°, reduced without mirror symmetry: tables, rows and frequencies of the spur gear to 1e-6."""
-    nearly, spur = body(math.radians(1e-6)), small_gear.coarse()
+@KINDS
+def test_a_vanishing_helix_is_the_spur_body(kind: str) -> None:
+    """β = 1e-6°, reduced without mirror symmetry: tables, rows and frequencies of the spur body to 1e-6."""
+    nearly, spur = MAKERS[kind](math.radians(1e-6)), MAKERS[kind](0.0)
     assert len(nearly.spaces) == 1 and len(spur.spaces) == 2
     tables, expected = static_tables(nearly, []), static_tables(spur, [])
-    for name in ("static_ff", "static_nt", "static_tt", "static_fb", "static_bb"):
+    of_ring = ("static_fp", "static_pp") if spur.internal else ()
+    for name in ("static_ff", "static_nt", "static_tt", "static_fb", "static_bb", *of_ring):
         limit = 1e-6 * np.abs(getattr(expected, name)).max()
-        assert np.abs(getattr(tables, name) - getattr(expected, name)).max() < limit
+        assert np.abs(getattr(tables, name) - getattr(expected, name)).max() < limit, name
     assert abs(nearly.load_matrix - spur.load_matrix).max() < 1e-6 * abs(spur.load_matrix).max()
     modes, same = elastic_modes(nearly, 40), elastic_modes(spur, 40)
     assert np.allclose(modes.frequency, same.frequency, rtol=1e-6)
@@ -128,47 +72,50 @@ def test_a_vanishing_helix_is_the_spur_gear() -> None:
     assert np.abs(sums[0] - sums[1]).max() < 1e-5 * np.abs(sums[1]).max()
 
 
-def closed_form(own: SimpleNamespace, side: int, roll: np.ndarray, functions: int) -> np.ndarray:
-    """Resultant (R, A, 6) of the unit loads by dense quadrature over strip and width of the closed forms of n and r."""
-    first, last = own.flank.strip(roll)
-    u, w = np.polynomial.legendre.leggauss(24)
-    sg, result = 1 - 2 * side, np.zeros((len(roll), functions, 6))
+def closed_form(body: SectorBody, shape: Shape, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Resultants (R, A, 6) of the unit loads along normal and profile by dense quadrature over strip and width of the
+    closed forms of n, e_p and r. Out of a ring's material the normal points inwards; the profile outwards in both."""
+    roll, functions = body.points.rolls, body.points.functions
+    first, last = body.flank.strip(roll)
+    u, w = np.polynomial.legendre.leggauss(60)
+    sg, out = 1 - 2 * side, -1.0 if body.internal else 1.0
+    results = np.zeros((2, len(roll), functions, 6))
     for k, (low, high) in enumerate(zip(first, last, strict=True)):
-        s = np.sqrt(2 * own.flank.r_b * (0.5 * (low + high) + 0.5 * (high - low) * u))[:, None]
+        s = np.sqrt(2 * shape.r_b * (0.5 * (low + high) + 0.5 * (high - low) * u))[:, None]
         z = 0.5 * WIDTH * u[None, :]
-        d = sg * (own.flank.psi_b - s / own.flank.r_b) + own.shape.twist * z
-        n = np.stack(np.broadcast_arrays(-sg * np.sin(d), sg * np.cos(d), 0 * d), axis=-1) * np.cos(own.shape.beta_b)
-        n[..., 2] = -sg * np.sin(own.shape.beta_b)
+        d = sg * (shape.psi_b - s / shape.r_b) + shape.twist * z
         e_r, e_t = (np.stack([a, b, 0 * d], axis=-1) for a, b in ((np.cos(d), np.sin(d)), (-np.sin(d), np.cos(d))))
-        r = own.flank.r_b * e_r + sg * s[..., None] * e_t + z[..., None] * np.array([0, 0, 1])
+        n = sg * e_t * np.cos(shape.beta_b) - sg * np.sin(shape.beta_b) * np.array([0, 0, 1])
+        r = shape.r_b * e_r + sg * s[..., None] * e_t + z[..., None] * np.array([0, 0, 1])
         for a in range(functions):
             weight = 0.25 * w[:, None] * w * np.polynomial.legendre.legval(u, np.eye(functions)[a])
-            both = np.concatenate([n, np.cross(r, n)], axis=-1)
-            result[k, a] = (weight[..., None] * both).sum(axis=(0, 1))
-    return result
+            for result, unit in zip(results, (out * n, e_r), strict=True):
+                both = np.concatenate([unit, np.cross(r, unit)], axis=-1)
+                result[k, a] = (weight[..., None] * both).sum(axis=(0, 1))
+    return results[0], results[1]
 
 
-@pytest.mark.parametrize("beta", [BETA, -BETA, math.radians(35)])
-def test_resultants_are_the_closed_forms(beta: float) -> None:
-    """Forces to 1e-10: sum 1 N along n, axial part −sg sin β_b exactly; moments to the mesh's interpolation of r. In
-    the
-    closed form F_t tan β = F_a with F_t = M_z / r."""
-    shape = gear(beta)
-    own = SimpleNamespace(shape=shape, flank=flank(shape))
-    mesh = gear_sector(shape, WIDTH, MeshSpec(flank=16, thickness=2, root=4, rim=2, width=8))
-    points = Points(own.flank.chebyshev_rolls(5), 4)
+@pytest.mark.parametrize("beta", [0.0, BETA, -BETA, math.radians(35)])
+@KINDS
+def test_resultants_are_the_closed_forms(kind: str, beta: float) -> None:
+    """Forces to 1e-10: 1 N along n, axial part sin β_b; moments to the mesh's interpolation of r, worst near the base
+    circle (6e-7, along the profile 5e-6). In the closed form F_t tan β = F_a with F_t = M_z / r."""
+    body, shape = MAKERS[kind](beta, FINE), SHAPES[kind](beta)
+    normal, tangent = (rows.reshape(2, 4, 3, -1) for rows in (body.flank_rows, body.tangent_rows))
     for side, sg in ((0, 1), (1, -1)):
-        loads = flank_loads(mesh.nodes, mesh.flank[side].quads, own.flank, side, points)
-        resultant, expected = loads @ rigid_modes(mesh.nodes), closed_form(own, side, points.rolls, 4)
-        assert np.abs(resultant[..., :3] - expected[..., :3]).max() < 1e-10
-        assert np.abs(resultant[:, 0, 2] + sg * math.sin(shape.beta_b)).max() < 1e-13
-        assert np.abs(resultant[..., 3:] - expected[..., 3:]).max() < 1e-6 * shape.r_b
-        assert expected[:, 0, 5] == pytest.approx(sg * shape.r_b * math.cos(shape.beta_b), rel=1e-12)
-        assert expected[:, 0, 5] / shape.r * math.tan(beta) == pytest.approx(-expected[:, 0, 2], rel=1e-12)
+        along_normal, along_profile = closed_form(body, shape, side)
+        for loads, expected, most in ((normal, along_normal, 1e-6), (tangent, along_profile, 1e-5)):
+            resultant = loads[side] @ rigid_modes(body.mesh.nodes)
+            assert np.abs(resultant[..., :3] - expected[..., :3]).max() < 1e-10
+            assert np.abs(resultant[..., 3:] - expected[..., 3:]).max() < most * shape.r_b
+        turn = (-sg if body.internal else sg) * shape.r_b * math.cos(shape.beta_b)
+        assert along_normal[:, 0, 5] == pytest.approx(turn, rel=1e-12)
+        assert turn / shape.r * math.tan(beta) == pytest.approx(-along_normal[:, 0, 2], abs=1e-14)
 
 
 def test_the_profile_direction_lies_in_the_flank_and_in_the_transverse_plane() -> None:
-    own, shape = flank(gear(BETA)), gear(BETA)
+    shape = gear(BETA)
+    own = small_gear.flank(shape=shape)
     roll, z, step = np.linspace(shape.s_form, shape.s_tip, 7)[:, None], np.linspace(-1, 1, 5) * WIDTH / 2, 1e-7
     for side, sg in ((0, 1), (1, -1)):
         n, p = own.normal(roll, side, z), own.tangent(roll, side, z)
@@ -176,16 +123,9 @@ def test_the_profile_direction_lies_in_the_flank_and_in_the_transverse_plane() -
         assert np.abs(np.linalg.norm(n, axis=-1) - 1).max() < 1e-14
 
         def point(s: np.ndarray, at: np.ndarray, sg: int = sg) -> np.ndarray:
-            flat, angle = shape.flank_point(np.broadcast_to(s, (7, 5)), sg), shape.twist * at
-            x, y = flat[..., 0], flat[..., 1]
-            return np.stack(
-                [
-                    np.cos(angle) * x - np.sin(angle) * y,
-                    np.sin(angle) * x + np.cos(angle) * y,
-                    np.broadcast_to(at, (7, 5)),
-                ],
-                axis=-1,
-            )
+            flat = shape.flank_point(np.broadcast_to(s, (7, 5)), sg)
+            place = np.concatenate([flat, np.broadcast_to(at, (7, 5))[..., None]], axis=-1)
+            return np.einsum("ijkl,ijl->ijk", turns(np.broadcast_to(shape.twist * at, (7, 5))), place)
 
         along = (point(roll + step, z) - point(roll - step, z)) / (2 * step)
         across = (point(roll, z + step) - point(roll, z - step)) / (2 * step)
@@ -193,54 +133,48 @@ def test_the_profile_direction_lies_in_the_flank_and_in_the_transverse_plane() -
         assert np.allclose(along / np.linalg.norm(along, axis=-1, keepdims=True), p, atol=1e-6)
 
 
-def test_flanks_of_opposite_hand_touch_along_a_line_with_opposite_normals() -> None:
-    """Pinion at 0, wheel at its phase: in every section the points at the local rolls s ± z tan β_b coincide, the
-    normals
-    are opposite, and the profile directions too."""
+def planet_in_ring() -> tuple[tuple[Shape, Shape], tuple[float, float], RingMesh]:
+    """A planet of the ring's hand, and the ring: shapes, phases, and how they mesh."""
+    ring = small_ring.geometry(BETA)
+    planet = GearGeometry(
+        z=10, m=ring.m, alpha=ring.alpha, x=0.0, beta=BETA, r_a=0.015, r_bore=0.004, tip_edge=1e-4,
+        h_fp=1.25 * ring.m, rho_fp=0.3 * ring.m,
+    )  # fmt: skip
+    mesh = RingMesh(planet, ring, ring.r - planet.r + 1e-4, 0.0)
+    return (planet, ring), (0.0, mesh.ring_phase(0.0, 0.0)), mesh
+
+
+def external_pair() -> tuple[tuple[Shape, Shape], tuple[float, float], PairGeometry]:
     pair = PairGeometry((gear(BETA), gear(-BETA)), gear(BETA).r * 2 + 1.2e-3, 0.0)
-    first, second = pair.gears
-    t = -pair.alpha_wt
+    return pair.gears, (0.0, pair.wheel_phase), pair
+
+
+@pytest.mark.parametrize("make", [external_pair, planet_in_ring])
+def test_flanks_that_mesh_touch_along_a_line_with_opposite_normals(make: Callable) -> None:
+    """In every section the points at the local rolls s ± z tan β_b coincide and the normals are opposite. Profile
+    directions are opposite in a pair; in a ring both rolls grow outwards."""
+    shapes, phases, mesh = make()
+    internal = isinstance(mesh, RingMesh)
     for z in np.linspace(-WIDTH / 2, WIDTH / 2, 5):
-        rolls = []
-        points, normals, profiles = [], [], []
-        for shape, phase, towards in ((first, 0.0, t), (second, pair.wheel_phase, t + math.pi)):
-            roll = shape.r_b * (phase + shape.psi_b - towards) + z * math.tan(shape.beta_b)
-            own, turn = flank(shape), _turn(phase)
-            flat = np.append(shape.flank_point(roll), z)
-            points.append(turn @ _turn(shape.twist * z) @ flat)
-            normals.append(turn @ own.normal(np.array(roll), 0, z))
-            profiles.append(turn @ own.tangent(np.array(roll), 0, z))
+        rolls, points, normals, profiles = [], [], [], []
+        for k, (shape, phase) in enumerate(zip(shapes, phases, strict=True)):
+            towards = 0.0 if internal or k == 0 else math.pi
+            roll = shape.r_b * (phase + shape.psi_b + mesh.alpha_wt - towards) + z * math.tan(shape.beta_b)
+            ring = internal and k == 1
+            own = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, WIDTH, 3e-4, ring, shape.beta_b)
+            turned = turns(np.array(phase))
+            points.append(turned @ turns(np.array(shape.twist * z)) @ np.append(shape.flank_point(roll), z))
+            normals.append(turned @ own.normal(np.array(roll), 0, z))
+            profiles.append(turned @ own.tangent(np.array(roll), 0, z))
             rolls.append(roll)
-        assert sum(rolls) == pytest.approx(pair.length, rel=1e-12)
-        assert points[0] == pytest.approx(points[1] + [pair.a, 0, 0], abs=1e-15)
+        assert (rolls[1] - rolls[0] if internal else sum(rolls)) == pytest.approx(mesh.length, rel=1e-12)
+        centre = [-mesh.a, 0, 0] if internal else [mesh.a, 0, 0]
+        assert points[0] == pytest.approx(points[1] + centre, abs=1e-15)
         assert normals[0] == pytest.approx(-normals[1], abs=1e-14)
-        assert profiles[0] == pytest.approx(-profiles[1], abs=1e-14)
+        assert profiles[0] == pytest.approx(profiles[1] if internal else -profiles[1], abs=1e-14)
 
 
-def _turn(angle: float) -> np.ndarray:
-    return np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
-
-
-@pytest.mark.parametrize("degrees", [-35, -20, 8, 35])
-def test_twisted_sectors_are_sound(degrees: float) -> None:
-    """Positive Jacobians, cuts one pitch apart, flank nodes on the involute of their section, no mirror parity."""
-    shape = gear(math.radians(degrees))
-    mesh = gear_sector(shape, 4 * WIDTH, COARSE)
-    assert scaled_jacobian(mesh).min() > 0.25
-    assert np.abs(mesh.nodes[mesh.cut_minus] @ turned(1).T - mesh.nodes[mesh.cut_plus]).max() < 1e-15
-    for side, sg in ((0, 1), (1, -1)):
-        grid = mesh.flank[side]
-        points, angle = mesh.nodes[grid.quads], -shape.twist * grid.z
-        x, y = points[..., 0], points[..., 1]
-        back = np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y], axis=-1)
-        assert np.abs(back - shape.flank_point(grid.roll, sg)).max() < 1e-15
-        corners = points[:, :4]
-        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-        outward = flank(shape).normal(grid.roll.mean(axis=1), side, grid.z.mean(axis=1))
-        assert (normal * outward).sum(axis=1) == pytest.approx(np.linalg.norm(normal, axis=1), rel=0.05)
-
-
-def test_mass_is_that_of_the_section_times_the_width() -> None:
-    made: SectorBody = coarse()
-    assert made.inertia[0, 0] == pytest.approx(7850 * GEAR.z * section(gear(BETA))[0] * WIDTH, rel=2e-3)
-    assert np.abs(made.inertia[2, [0, 1, 3, 4, 5]]).max() < 1e-12 * made.inertia[0, 0]
+def turns(angle: np.ndarray) -> np.ndarray:
+    """(…, 3, 3): turns about z."""
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return np.stack([np.stack(row, -1) for row in ((c, -s, zero), (s, c, zero), (zero, zero, one))], -2)

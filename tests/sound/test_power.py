@@ -52,14 +52,6 @@ def test_a_tone_has_the_power_of_its_amplitudes() -> None:
     assert bands.sum() == pytest.approx(exact, rel=2e-3) and bands.argmax() == np.abs(found.bands - 500).argmin()
 
 
-def test_velocities_and_displacements_give_one_power() -> None:
-    time, moved = record(np.array([1.0, 0.5j]), 733.3)
-    _, velocity = record(2j * np.pi * 733.3 * np.array([1.0, 0.5j]), 733.3)
-    one = power_of(segments(time, moved), SOUND)
-    two = power_of(segments(time, velocity, moved=False), SOUND)
-    assert one.power.sum() == pytest.approx(two.power.sum(), rel=2e-3)
-
-
 def test_power_of_lines_adds_up_to_the_mean_power_of_noise() -> None:
     """R constant: the mean of ½ … is R times the mean square; Welch's window loses none of it on the average."""
     flat = Radiation(midbands(63, 8000), np.tile(3.0 * np.eye(2), (22, 1, 1)), np.eye(2), 400.0, 8e3, np.zeros(22))
