@@ -71,13 +71,6 @@ def test_efficiency_is_that_of_the_verb() -> None:
     assert found.coefficient == pytest.approx(0.05) and found.lost == pytest.approx(found.closed, rel=0.1)
 
 
-def test_validate_and_effects_are_there(tmp_path: Path) -> None:
-    (tmp_path / "no.fmu").write_bytes(b"nothing")
-    with pytest.raises(gf.GearfmuError, match="no.fmu"):
-        gf.validate(tmp_path / "no.fmu")
-    assert "friction" in {effect.name for effect in gf.effects()}
-
-
 def test_a_notebook_carries_the_whole_report(tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text('<p class="a">"&"</p>', encoding="utf-8")
     shown = Page(tmp_path / "report.html")._repr_html_()

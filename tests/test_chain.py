@@ -65,12 +65,6 @@ def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
     assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_te_is_zero_without_load(tmp_path: Path) -> None:
-    shown = gearfmu("te", "fzg_c", "--torque", "0 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
-    data = np.genfromtxt(tmp_path / "te.csv", delimiter=",", skip_header=1)
-    assert np.abs(data[:, 2]).max() < 1e-5 and np.all(data[:, 3] > 50) and "0.0 N·m: mean" in shown
-
-
 def test_te_names_mesh_and_stage_stiffness_alike_in_table_and_on_the_console(tmp_path: Path) -> None:
     order = ("te", "fzg_c", "--torque", "302 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
     alone, both = (
@@ -102,29 +96,6 @@ def test_run_through_the_fmu_equals_the_kernel_bit_for_bit(tmp_path: Path) -> No
     fmu, kernel = (Trace.load(tmp_path / unit / "trace.h5") for unit in ("fmu", "kernel"))
     assert list(fmu.channels) == list(kernel.channels)
     assert all(fmu[name].tobytes() == kernel[name].tobytes() for name in fmu.channels)
-
-
-def test_simulate_writes_the_same_kind_of_trace(tmp_path: Path) -> None:
-    gearfmu(
-        "simulate",
-        "fzg_c/stage_relief",
-        "--torque",
-        "302 N*m",
-        "--speed",
-        "2000 rpm",
-        "--duration",
-        "5 ms",
-        "--settle",
-        "1 ms",
-        "--set",
-        "level=rigid",
-        "--set",
-        "effect.tip_relief=false",
-        "--out",
-        tmp_path,
-    )
-    trace = Trace.load(tmp_path / "trace.h5")
-    assert trace.meta["level"] == "rigid" and trace.meta["n_dyn"] == 4 and trace.time[-1] == pytest.approx(5e-3)
 
 
 @pytest.mark.full

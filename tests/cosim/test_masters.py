@@ -12,7 +12,6 @@ from analytic_stage import Plant
 from gearfmu.cosim.masters import Cut, Jacobi, master
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Ramp
-from gearfmu.errors import CouplingError
 
 DURATION = 0.1
 VIBRATION = Plant(ripple=80.0)
@@ -91,11 +90,6 @@ def test_gs_mean_is_stable_near_its_limit_and_unstable_beyond():
     calm = np.ptp(coupled(plant, "gs_mean", 1.5 / 775)[0][:, 0])
     wild = np.ptp(coupled(plant, "gs_mean", 2.9 / 775)[0][:, 0])
     assert calm < 100.0 and wild > 1e3 * calm
-
-
-def test_unknown_master():
-    with pytest.raises(CouplingError, match="no master 'strong'; choose one of gs_mean, jacobi"):
-        master("strong", Cut(PyUnit(VIBRATION.stage()), PyUnit(VIBRATION.drive()), ("pinion", "wheel")))
 
 
 def test_jacobi_holds_the_torque_of_the_communication_point():

@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from gearfmu import fmu
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model, summary
-from gearfmu.errors import ModelError, SpecError
 from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
 
 
@@ -40,15 +38,6 @@ def test_a_scene_switches_effects(tmp_path: Path) -> None:
             and np.array_equal(trace["mesh.te"], traces[0]["mesh.te"])
         )
     assert scene(tmp_path, "").hash == load_scene("pair_loaded").hash
-
-
-def test_what_is_no_effect_or_no_switch_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SpecError) as refused:
-        scene(tmp_path, "bearing = false\nhertz = 0")
-    assert {problem.field for problem in refused.value.problems} == {"stage.effects.bearing", "stage.effects.hertz"}
-    off = scene(tmp_path, "residual = false")
-    with pytest.raises(ModelError, match=r"effect\.residual"):
-        run_once(off, Source(stage_model(off)))
 
 
 def test_the_summary_says_what_was_off(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from scipy.linalg import expm
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Plan, Result, run_coupled
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.masters import master
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
@@ -212,11 +211,6 @@ def test_work_of_the_loads_is_the_kinetic_energy_gained() -> None:
     assert result.trace["drive.shaft.tau"][0] == 3.0
 
 
-def test_the_masters_of_loads_have_the_names_of_the_others() -> None:
-    cut = Loaded(Rotor(1.0), ShaftLoads({"shaft": ShaftLoad(constant=1.0)}), {"shaft": 1.0})
-    assert master("gs_mean", cut).order == 2 and master("jacobi", cut).order == 1
-
-
 @pytest.fixture(scope="module")
 def planetary() -> StageModel:
     spec = load_stage("planetary54")
@@ -245,11 +239,6 @@ def check(result: Result, ripple: float) -> None:
 
 def test_the_set_runs_under_its_torques_with_rigid_bodies(planetary: StageModel) -> None:
     check(run_once(short("rigid", 2e-3), Source(planetary)), ripple=4.0)  # the ring is oval at this level too
-
-
-@pytest.mark.full
-def test_the_set_runs_under_its_torques_at_level_fast(planetary: StageModel) -> None:
-    check(run_once(short("fast", 4e-3), Source(planetary)), ripple=4.0)
 
 
 def test_the_scene_of_the_page_loads_and_balances(tmp_path: Path) -> None:

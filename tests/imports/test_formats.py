@@ -157,19 +157,15 @@ def op4(path: Path, values: np.ndarray, sparse: bool, big: bool = False) -> Path
     return path
 
 
-def dmig(path: Path, values: np.ndarray, wide: bool) -> Path:
-    """Lower triangle by columns, as Nastran punches a symmetric DMIG."""
+def dmig(path: Path, values: np.ndarray, rows: np.ndarray, wide: bool = True) -> Path:
+    """Lower triangle by columns, as Nastran punches a symmetric DMIG; rows: node and component, from 1."""
     star, width = ("*", 16) if wide else ("", 8)
-    lines = [
-        f"{'DMIG' + star:<8}" + "".join(f"{v:<{width}}" for v in ("KAAX", "0", "6", "2"))
-        if not wide
-        else "DMIG    KAAX    0       6       2       0"
-    ]
-    for k, (node, component) in enumerate(NODES):
-        lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component + 1:<{width}}")
-        for j in range(k, 6):
-            value = f"{values[j, k]:.9E}".replace("E", "D") if wide else f"{values[j, k]:.4f}"
-            lines.append(f"{star or '+':<8}{NODES[j, 0]:<{width}}{NODES[j, 1] + 1:<{width}}{value:<{width}}")
+    lines = ["".join(f"{word:<8}" for word in ("DMIG", "KAAX", 0, 6, 2, *[0] * wide))]
+    for k, (node, component) in enumerate(rows):
+        lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component:<{width}}")
+        for (row, of), value in zip(rows[k:], values[k:, k], strict=True):
+            text = f"{value:.9E}".replace("E", "D") if wide else f"{value:.4f}"
+            lines += [f"{star or '+':<8}{row:<{width}}{of:<{width}}{text:<{width}}"] if value else []
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
     return path
 
@@ -206,7 +202,7 @@ def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None
 
 @pytest.mark.parametrize("wide", [True, False])
 def test_dmig_names_its_own_rows(tmp_path: Path, matrix: np.ndarray, wide: bool) -> None:
-    path = dmig(tmp_path / "k.pch", matrix, wide)
+    path = dmig(tmp_path / "k.pch", matrix, NODES + [0, 1], wide)
     assert np.allclose(
         read_matrix(path, None, LABELS).toarray(), in_mesh_order(matrix), rtol=0, atol=2e-8 if wide else 1e-4
     )

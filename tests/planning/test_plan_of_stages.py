@@ -91,14 +91,6 @@ def test_a_planetary_set_is_planned(tmp_path: Path) -> None:
     assert {line.effect: line for line in plan.segments[0].lines}["tip_contact"].verdict == "on"
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("scene, changes", [("planetary_paper", {"deformation.times": ["20 ms"]}), ("train_runup", {})])
-def test_a_shipped_scene_is_planned_in_python(scene: str, changes: dict[str, list[str]]) -> None:
-    short = load_scene(scene, {"duration": "40 ms", "settle": "10 ms"} | changes)
-    found = gf.plan(short, ["te"], ("1 kHz", "5 kHz"), "1 dB", fresh=True)
-    assert all(segment.kept for segment in found.segments)
-
-
 def test_a_plan_keeps_a_housing_and_says_why() -> None:
     """On a stage that has one; a train without one has no such choice."""
     scene = load_scene("clutch_closure_housed")

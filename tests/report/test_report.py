@@ -128,14 +128,6 @@ def test_every_plot_has_its_data(folder: Path) -> None:
     assert [float(r[1]) for r in rows[1:]] == coupled_run()["mesh.force"].tolist()
 
 
-def test_spectrum_data_hold_the_mesh_order(folder: Path) -> None:
-    data = np.genfromtxt(folder / "data" / "spectrum.csv", delimiter=",", names=True, deletechars="")
-    names = data.dtype.names
-    peak = np.argmax(data[names[-2]])
-    assert names[-2].startswith("mesh.force") and data[names[0]][peak] == pytest.approx(16 * 200 / (2 * np.pi), abs=10)
-    assert data[names[-2]][peak] == pytest.approx(200 / np.sqrt(2), rel=0.16)
-
-
 def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing_where_not(
     folder: Path, tmp_path: Path
 ) -> None:
@@ -144,13 +136,6 @@ def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing
     steady = (folder / "report.html").read_text(encoding="utf-8")
     assert "Dotted: mesh orders" in steady and "Mesh orders are not marked" not in steady
     assert "Mesh orders are not marked" in unsteady and "Dotted: mesh orders" not in unsteady
-
-
-def test_order_data_are_the_amplitudes(folder: Path) -> None:
-    data = np.genfromtxt(folder / "data" / "orders.csv", delimiter=",", names=True, deletechars="")
-    late = data["time_[s]"] > 0.15
-    assert np.allclose(data["mesh.force_order_1_rms_[N]"][late], 200 / np.sqrt(2), rtol=2e-3)
-    assert np.allclose(data["mesh.force_order_2_rms_[N]"][late], 50 / np.sqrt(2), rtol=2e-2)
 
 
 def test_summary_is_strict_json_with_results(folder: Path) -> None:
@@ -282,12 +267,6 @@ def test_coarse_sampling_warns_where_spectra_are_read(tmp_path: Path) -> None:
     coarse = report.write(force_at(1e-4), {}, tmp_path / "a").read_text(encoding="utf-8")
     fine = report.write(force_at(2e-5), {}, tmp_path / "b").read_text(encoding="utf-8")
     assert '<p class="warning">Sampled every 100 µs' in coarse and '<p class="warning">' not in fine
-
-
-def test_step_means_stand_for_samples_in_spectra(tmp_path: Path) -> None:
-    report.write(force_at(2e-5), {}, tmp_path)
-    header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
-    assert "mesh.force_mean_rms_[N]" in header and "mesh.force_rms_[N]" not in header
 
 
 def test_a_signal_seen_twice_is_drawn_once() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -15,7 +14,6 @@ from evidence.study import cuts
 from evidence.study.limits import limit_rows
 from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu import cli
-from gearfmu.errors import SpecError
 from gearfmu.kernel import Kernel
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import SceneSpec, load_scene
@@ -144,16 +142,6 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
 
 
-def test_rows_read_back_and_other_files_are_refused(tmp_path: Path) -> None:
-    nan = Row("s", "full", "dg4", 1e-5, 400, 5, *([float("nan")] * 6))
-    write_rows(tmp_path / "t.csv", Row, [ROW, nan])
-    read = read_rows(tmp_path / "t.csv", Row)
-    assert read[0] == ROW and np.isnan(read[1].te_error) and read_rows(tmp_path / "none.csv", Row) == []
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(SpecError, match="remove it"):
-        read_rows(tmp_path / "other.csv", Row)
-
-
 def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
     rows = [
         Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
@@ -217,11 +205,3 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
     assert lowered == sorted(lowered) and not lowered[0] and lowered[-1]
     gammas, errors = [row.gamma for row in rows[:4]], [row.te_error for row in rows[:4]]
     assert gammas == sorted(gammas, reverse=True) and errors == sorted(errors)
-
-
-def test_committed_tables_have_the_columns(tmp_path: Path) -> None:
-    """evidence/study holds what the documentation shows."""
-    folder = Path(__file__).parents[2] / "evidence" / "study"
-    with (folder / "study.csv").open(encoding="utf-8", newline="") as file:
-        assert ",".join(next(csv.reader(file))) == COLUMNS
-    assert {row.scene for row in read_rows(folder / "study.csv", Row)} >= {"pair_loaded"}
