@@ -63,6 +63,38 @@ slices = 5 => slices = 0
 [ports.wheel] => [ports.wheels]
 fast_cut = "80 kHz" => fast_cut = "130 kHz"
 teeth = 16 => topography = "none.csv"\nteeth = 16
+teeth = 16 => #
+teeth = 16 => teeth = "16"
+tip_diameter = "82.46 mm" => tip_diametre = "82.46 mm"
+name = "fzg_c" => zzz = 1\nname = "fzg_c"
+face_width = "14 mm" => face_width = "14 kg"
+profile_shift = 0.1715 => profile_shift = "0.17"
+poisson_ratio = 0.3 => poisson_ratio = 0.5
+slices = 5 => slices = 5\nlaw = "nodal"
+k = "40e3 N*m/rad" => #
+kind = "spring" => kind = "torque"\nchain = { inertia = "1 kg*m^2" }
+center_distance = "91.5 mm" => center_distance = "91.5 mm"\nmisalignment = { in_plane = "10 um" }
+center_distance = "91.5 mm" => center_distance = "91 mm"
+center_distance = "91.5 mm" => center_distance = "92.3 mm"
+profile_shift = 0.1817 => profile_shift = -0.3
+tip_diameter = "82.46 mm" => tip_diameter = "84 mm"
+tip_diameter = "82.46 mm" => tip_diameter = "60 mm"
+tip_diameter = "82.46 mm" => tip_diameter = "92 mm" ;; addendum = 1.0 => addendum = 3.0
+tip_diameter = "82.46 mm" => tip_diameter = "76 mm" ;; tip_diameter = "118.36 mm" => tip_diameter = "110 mm"
+tip_diameter = "118.36 mm" => tip_diameter = "122 mm" ;; # assumed\naddendum = 1.0 => # assumed\naddendum = 2.0
+tip_edge_radius = "0.2 mm" => tip_edge_radius = "2.8 mm"
+strip_half_width = "0.55 mm" => strip_half_width = "9 mm"
+[gears.pinion.rack] => [gears.pinion.index_deviation]\n3 = "1 mm"\n2 = "10 um"\n[gears.pinion.rack]
+[gears.wheel.rack] => [gears.wheel.index_deviation]\n-1 = "5 um"\ntwo = "5 um"\n3 = 5e-6\n[gears.wheel.rack]
+teeth = 16 => pitch_deviation = ["1 um", "2 um"]\nteeth = 16
+[gears.pinion.rack] => [gears.pinion.profile]\ncrowning = "1 mm"\n[gears.pinion.rack]
+[gears.pinion.rack] => [gears.pinion.eccentricity]\namount = "2 mm"\n[gears.pinion.rack]
+[gears.pinion.rack] => [gears.pinion.deviations]\nclass = 12\n[gears.pinion.rack]
+[gears.wheel.rack] => [gears.wheel.lead.end_relief]\namount = "5 um"\nlength = "8 mm"\n[gears.wheel.rack]
+[gears.wheel.rack] => [gears.wheel.root_relief]\namount = "10 um"\nstart_roll = "1 mm"\n[gears.wheel.rack]
+[gears.wheel.rack] => [gears.wheel.tip_relief]\namount = "9 um"\nkind = "cubic"\n[gears.wheel.rack]
+torque_max => torque_maximum ;; "30 mm" => "60 mm" ;; 0.1715 => -0.9 ;; kind = "spring" => kind = "belt" ;; 210e3 => 5
+"600 N*m" => 600 ;; speed_max => speed_maximum ;; "30 mm" => "60 mm" ;; "3e8 N/m" => "3e8 N/m"\naxial = "1e8 N/m"
 teeth = 16 => teeth = 15.5 ;; distance = "91.5 mm" => distance = "70 mm" ;; [ports.wheel] => [ports.wheels]
 """,
     "planetary54": r"""
@@ -92,6 +124,19 @@ speed_max = "300 rad/s" => # none
 [ports.sun] => [ports.moon]
 axial = "1e8 N/m" => # none ;; [ports.sun] => [ports.ring] ;; speed_max = "300 rad/s" => # none
 teeth = 18  => topography = "none.csv"\nteeth = 18 
+"131 mm" => "138 mm"
+dedendum = 1.25               # => dedendum = 1.02 #
+planets = 4 => planets = 4\npositions = [0, 18, 54, 36]
+planets = 4 => planets = 4\npositions = [0, 18, 36, 72]
+planets = 4 => planets = 4\npositions = [0, 10, 36, 54]
+planets = 4 => planet = 4
+outer_diameter = "120 mm" => outer_diameter = "100 mm"
+bolt3 = "rigid" => #
+bolt3 = "rigid" => bolt3 = "stiff"
+strip_half_width = "0.45 mm" => strip_half_width = "0.2 mm"
+bore_diameter = "18 mm" => bore_diameter = "38 mm"
+"131 mm" => "130 mm" ;; planets = 4 => planets = 5 ;; points = 6 => points = 60 ;; "16 mm" => "24 mm"
+planets = 4 => planets = 5 ;; "16 mm" => "24 mm" ;; torque_max => torque_maximum ;; "50 mm" => 0.06
 [planet.rack] => [planet.import]\nfile = "none.inp"\n[planet.rack]
 """,
     "two_stage": r"""
@@ -117,7 +162,47 @@ axis = ["0 mm", "0 mm"] => axis = ["0 mm", "0 mm"]\ncarried_by = "output"
 radial = "2.5e8 N/m"\naxial = "2e8 N/m"\ntilt = "1e4 N*m/rad" => #
 start_roll = "outer_single_contact" => start_roll = "outer"
 teeth = 25 => topography = "none.csv"\nteeth = 25
+body = "output_shaft"\nat = "170 mm" => body = "output_shaft"
+radial = "2.5e8 N/m" => radial = "2.5e8 N*m"
+"30 mm", bore_diameter = "0 mm" } => "30 mm", bore = "0 mm" }
+modal_damping = 0.005 => modal_dampin = 0.005
+teeth = 25 => teeth = 4
+"wheel1"] => "wheel9"] ;; body = "output_shaft"\nat = "170 mm" => body = "shaft" ;; slices = => slicess =
+"wheel1"] => "wheel9"] ;; body = "output_shaft"\nat = "170 mm" => body = "output_shaft"\nat = "970 mm"
 [bodies.wheel2.material] => [bodies.wheel2.import]\nfile = "none.inp"\n[bodies.wheel2.material]
+""",
+    "two_stage/stage_bearings": r"""
+bearing = "6306" => bearing = "6307x"
+bearing = "6306" => bearing = "6306"\nradial = "1e8 N/m"
+bearing = "6306" => bearing = "6306"\ncarries = "+z"
+bearing = "6306" => axial = "1e8 N/m"\nspan = "2 mm"
+[operating]\ntorque = "100 N*m" => #
+outside = "72 mm" => outside = "72 mm"\ncontact_angle = "9°"
+outside = "72 mm" => outside = "72 mm"\npreload = "300 N"
+outside = "72 mm" => outside = "28 mm"
+outside = "72 mm" => outside = "72 mm"\nballs = 14
+outside = "72 mm" => outside = "72 mm"\nball_diameter = "25 mm"
+outside = "72 mm" => outside = "72 mm"\nclearence = "1 um"
+clearance = "10 um" => clearance = "10 mm"
+kind = "ball" => kind = "bal"
+width = "16 mm" => width = "16 mm"\npreload = "9 N"
+width = "16 mm" => #
+""",
+    "helical_demo/stage_bearings": r"""
+rolling = "7305" => rolling = "7306"
+rolling = "7305" => rolling = "7305"\nspann = "1 mm"
+span = "70 mm" => #
+contact_angle = "30 deg" => contact_angle = "70 deg"
+""",
+    "two_stage/stage_housed": r"""
+node = "input_left" => node = "input_lef"
+to = "housing"\nnode = "input_left" => to = "housing"
+body = "housing"\nnode = "foot0" => body = "housing"\nnode = "input_left"
+body = "housing"\nnode = "foot0" => body = "housing"\nnode = "foot0"\nat = "10 mm"
+body = "housing"\nnode = "foot0" => body = "housing"\nnode = "foot0"\nto = "input_shaft"
+seats = { => seats = { foot0 = "FOOT0",
+top = "SENSOR_TOP" => a_name_that_is_too_long = "SENSOR_TOP"
+file = "housing.inp" => file = "house.inp"
 """,
 }
 SCENES = {
@@ -134,10 +219,22 @@ torque = "302 N*m" => torqe = "302 N*m"
 [test_rig] => [rig]
 [test_rig] => [passenger_car]\n[test_rig]
 [test_rig] => [deformation]\ngears = ["moon"]\n[test_rig]
+[test_rig] => [deformation]\ngears = ["wheel"]\n[test_rig]
+[test_rig] => [deformation]\ngears = ["wheel"]\ntimes = ["1 ms", "9 s"]\nevery = "1 us"\n[test_rig]
+[test_rig] => [stage.effects]\nbearing = false\nhertz = 0\n[test_rig]
+name = "pair_loaded" => name = "Pair Loaded"
+duration = "0.15 s" => duration = "0.15"
+master = "gs_mean" => mastr = "gs_mean"
+step = "20 us" => step = "20 us"\nmicro_step = "50 us"
+pinion_speed = "2000 rpm" => pinion_speed = 100
+pinion_speed = "2000 rpm" => pinion_speed = "2000 rpm"\nslip = "1 rad/s"
 """,
     "clutch_closure": r"""
 capacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]] => capacity = [["50 ms", "0 N*m"], ["0 s", "250 N*m"]]
 slip = "52 rad/s" => wheel_speed = "52 rad/s"
+capacity = [["0 s", "0 N*m"] => capacity = [["0 s", "-5 N*m"]
+[clutch]\ncapacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]] => #
+[clutch] => [clutch]\npeak = 1.2
 """,
     "planetary_paper": r"""
 [shaft_loads.sun] => [shaft_loads.moon]
@@ -147,6 +244,19 @@ name = "planetary54" => name = "two_stage"
 gears = ["ring"] => gears = []
 times = ["33 ms", "66 ms", "0.1 s"] => times = ["33 ms", "0.2 s"]
 constant = "600 N*m" => constants = "600 N*m"
+constant = "600 N*m" => #
+constant = "600 N*m" => constant = "5 N"\nalternating = { amplitude = "-1 N*m" }
+constant = "600 N*m" => over_time = [["2 ms", "1 N*m"], ["1 ms", "1 N*m"]]
+speed = "340 rad/s" => speed = "0 rad/s"
+[shaft_loads.sun] => [test_rig]\ntorque = "1 N*m"\n[shaft_loads.sun]
+""",
+    "planetary_shift": r"""
+on = "turbine" => on = "turbin"
+["output", "vehicle"] => ["output", "output"]
+["drum", "ground"] => ["drums", "ground"]
+["35 ms", "0 N*m"] => ["25 ms", "0 N*m"]
+drive = { on = "turbine" => drum = { on = "ground"
+[drivetrain.torques] => [clutch]\ncapacity = [["0 s", "1 N*m"]]\n[test_rig]\ntorque = "1 N*m"\n[drivetrain.torques]
 """,
     "train_runup": r"""
 [drivetrain.ports.input] => [drivetrain.ports.entry]
@@ -172,8 +282,11 @@ def _changed(text: str, changes: list[Change]) -> str:
 
 
 def _stage(name: str, changes: list[Change], folder: Path) -> None:
-    path = folder / "stage.toml"
-    path.write_text(_changed(find_stage(name).read_text(encoding="utf-8"), changes), encoding="utf-8")
+    path, shipped = folder / "stage.toml", find_stage(name)
+    text = shipped.read_text(encoding="utf-8").replace('base = "', f'base = "{shipped.parent.as_posix()}/')
+    for deck in shipped.parent.glob("*.inp"):
+        (folder / deck.name).symlink_to(deck)
+    path.write_text(_changed(text, changes), encoding="utf-8")
     stage = load_stage(path)
     assemble(stage, load_bodies(load_stage(name)))
 

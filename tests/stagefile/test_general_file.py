@@ -23,15 +23,6 @@ def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
     return {problem.field: problem.remedy for problem in refused(folder, TEXT, *changes)}
 
 
-def test_the_two_stage_train_is_read():
-    stage = load_stage("two_stage")
-    assert stage.kind == "general" and not stage.planar
-    assert [gear.teeth for gear in stage.gears] == [25, 61, 19, 73]
-    assert stage.rotor_of("pinion2") == "intermediate" and stage.place("pinion2", None) == pytest.approx(0.09)
-    assert isinstance(stage.bodies["wheel2"].tip_relief.start_roll, float)
-    assert sum(support.to is None for support in stage.supports) == 6
-
-
 def test_a_body_that_another_carries_is_not_planar():
     """Held in the plane alone a spur set still turns with its carrier."""
     stage = load_stage("planetary54")
@@ -44,54 +35,13 @@ def test_a_body_that_another_carries_is_not_planar():
     assert stage.model_copy(update=alone | {"supports": held}).planar and not stage.model_copy(update=alone).planar
 
 
-@pytest.mark.parametrize(
-    ("change", "field", "says"),
-    [
-        (
-            ('gears = ["pinion1", "wheel1"]', 'gears = ["pinion1", "whel1"]'),
-            "engagements.stage1.gears",
-            "one of pinion1",
-        ),
-        (('gears = ["pinion2", "wheel2"]', 'gears = ["pinion2", "wheel1"]'), "engagements.stage2.gears", "one rotor"),
-        (
-            ('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"\nat = "190 mm"'),
-            "ports.output.at",
-            "to 170 mm",
-        ),
-        (('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"'), "ports.output.at", "say where"),
-        (('torsion = "rigid"', ""), "rotors.input.bodies.input_shaft", "with torsion"),
-        (('pinion2 = "90 mm", ', ""), "bodies.pinion2", "one [rotors.…]"),
-        (('pinion2 = "90 mm", ', 'pinion2 = "80 mm", '), "engagements.stage2.gears", "10 mm apart"),
-        (('axis = ["103 mm", "0 mm"]', 'axis = ["98 mm", "0 mm"]'), "rotors.intermediate.axis", ""),
-        (('torque_max = "300 N*m"', 'torque_max = "3000 N*m"'), "bodies.pinion1.body.strip_half_width", "1.5 Hertz"),
-        (('name = "input_left"', 'name = "input_right"'), "supports.input_right.name", "used twice"),
-        (
-            ('normal_module = "3.0 mm"', 'normal_module = "2.75 mm"'),
-            "bodies.wheel2.normal_module",
-            "share the basic rack",
-        ),
-        (('helix_angle = "-20 deg"', 'helix_angle = "20 deg"'), "bodies.wheel1.helix_angle", "opposite hands"),
-        (('to = "input_shaft"', 'to = "output_shaft"'), "supports.pinion1.to", "two rotors"),
-        (('kind = "gear"', 'kind = "gera"'), "bodies.pinion1", "gear"),
-        (('radial = "2.5e8 N/m"', 'radial = "2.5e8 N*m"'), "supports.input_left.radial", "N/m"),
-        (
-            ('"30 mm", bore_diameter = "0 mm" }', '"30 mm", bore = "0 mm" }'),
-            "bodies.input_shaft.sections[0].bore",
-            "bore_diameter",
-        ),
-        (("modal_damping = 0.005", "modal_dampin = 0.005"), "bodies.input_shaft.modal_dampin", '"modal_damping"'),
-        (("teeth = 25", "teeth = 4"), "bodies.pinion1.teeth", "6"),
-    ],
-)
-def test_what_is_wrong_is_named_with_a_remedy(tmp_path, change, field, says):
-    found = problems(tmp_path, change)
-    near = {key: text for key, text in found.items() if key.startswith(field)}
-    assert near and any(says in text for text in near.values()), found
+AXES = (('axis = ["103 mm", "0 mm"]', 'axis = ["98 mm", "0 mm"]'), "rotors.intermediate.axis")
 
 
-def test_all_problems_come_at_once(tmp_path):
-    found = problems(tmp_path, ('"wheel1"]', '"wheel9"]'), ('body = "output_shaft"\nat = "170 mm"', 'body = "shaft"'))
-    assert {"engagements.stage1.gears", "ports.output.body"} <= set(found)
+@pytest.mark.parametrize(("change", "field"), [pytest.param(*AXES, id="change7-rotors.intermediate.axis-")])
+def test_what_is_wrong_is_named_with_a_remedy(tmp_path, change, field):
+    """Of axes too near for the teeth; all other messages: broken.json."""
+    assert any(name.startswith(field) for name in problems(tmp_path, change))
 
 
 @pytest.mark.parametrize("name", ["fzg_c", "fzg_c/stage_relief"])
@@ -117,23 +67,6 @@ def test_a_gear_that_cannot_be_meshed_is_named_by_its_table(monkeypatch):
     for stage, gear, table in ((train, "wheel1", "bodies.wheel1"), (load_stage("fzg_c"), "pinion", "gears.pinion")):
         with pytest.raises(MeshError, match=f": {table}: the rim"):
             reduce_body(stage, gear)
-
-
-def test_a_gear_that_is_held_elsewhere_has_no_bearing(tmp_path):
-    table = '[bodies.pinion1.bearing]\nstiffness = "1e8 N/m"\n\n[bodies.pinion1.material]'
-    found = problems(tmp_path, ("[bodies.pinion1.material]", table))
-    assert any("[[supports]]" in text for text in found.values())
-
-
-def test_no_layer_of_problems_hides_the_next(tmp_path):
-    """An engagement of a gear that there is not does not keep the other one, and what cannot be read, from being
-    judged."""
-    found = problems(
-        tmp_path,
-        ('"wheel1"]', '"wheel9"]'), ('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"\nat = "970 mm"'),
-        ("slices = ", "slicess = "),
-    )  # fmt: skip
-    assert {"engagements.stage1.gears", "ports.output.at"} <= set(found), found
 
 
 @pytest.mark.parametrize("kind", ["gear", "ring", "shaft", "carrier", "housing"])
