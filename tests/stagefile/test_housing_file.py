@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from refused import refused
 
 from gearfmu.errors import SpecError
 from gearfmu.stagefile.reading.files import find_stage
@@ -46,44 +45,3 @@ def test_what_is_dynamic_does_not_make_a_body_stale() -> None:
     assert expected_hash(load_stage(HOUSED, same), "housing") == wanted
     for other in ({"bodies.housing.modes": 150}, {"bodies.housing.import.skin": "FOOT0"}):
         assert expected_hash(load_stage(HOUSED, other), "housing") != wanted
-
-
-IN_SET = """
-[bodies.housing]
-kind = "housing"
-reduced = { file = "box.inp", length = "1 m", stiffness = "box.inp", mass = "box.inp", seats = { ring = 1 }, feet = { left = 2 } }
-
-[[supports]]
-name = "left"
-body = "housing"
-node = "left"
-radial = "1e8 N/m"
-"""  # noqa: E501
-
-
-MESH = 'import = { file = "box.inp", length = "1 m", seats = { a = "A" } }'
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "field", "words"),
-    [
-        ('to = "housing"', 'to = "house"', "ring.mounts.to", "no housing of this set: housing"),
-        ('node = "ring"', 'node = "rim"', "supports.ring_seat.node", "its seats are ring"),
-        ('name = "left"\nbody = "housing"', 'name = "left"\nbody = "sun"', "supports.left.body", "feet of a housing"),
-        ('mass = "box.inp", ', "", "bodies.housing.reduced", "stiffness and mass come together"),
-        (
-            "seats = { ring = 1 }, ",
-            'seats = { ring = 1 }, recovery = "box.inp", ',
-            "bodies.housing.reduced",
-            "recovered",
-        ),
-        ('kind = "housing"\nreduced', 'kind = "housing"\nmethod = "rubin"\nreduced', "bodies.housing", "leave method"),
-        ("\nreduced = {", f"\n{MESH}\nreduced = {{", "bodies.housing", "give the table import, or the table reduced"),
-    ],
-)
-def test_a_set_on_a_superelement_that_cannot_be(tmp_path: Path, old: str, new: str, field: str, words: str) -> None:
-    (tmp_path / "box.inp").write_text("", encoding="utf-8")
-    text = find_stage("planetary54").read_text(encoding="utf-8") + IN_SET
-    mounts = ("[ring.mounts]", '[ring.mounts]\nto = "housing"\nnode = "ring"')
-    found = {problem.field: problem.remedy for problem in refused(tmp_path, text, mounts, (old, new))}
-    assert words in found.get(field, ""), found

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.stagefile.forms.expand import motion_problems, rewritten
 from gearfmu.stagefile.reading.base import read_toml
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.schema import set_schema
@@ -33,27 +32,6 @@ def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
     with pytest.raises(SpecError) as error:
         load_stage(written(folder, *changes))
     return {problem.field: problem.remedy for problem in error.value.problems}
-
-
-def test_what_a_set_needs_to_move_is_told_all_at_once(tmp_path):
-    spec = load_stage("planetary54")
-    bare = rewritten(
-        spec,
-        speed_max=None,
-        contact=None,
-        ports={"carrier": spec.ports["carrier"]},
-        sun=spec.written.sun.model_copy(update={"bearing": None}),
-        planet=spec.written.planet.model_copy(
-            update={"bearing": spec.written.planet.bearing.model_copy(update={"tilt": None})}
-        ),
-        ring=spec.written.ring.model_copy(update={"mounts": None}),
-    )
-    with pytest.raises(SpecError) as error:
-        bare.require_motion()
-    found = {problem.field: problem.remedy for problem in error.value.problems}
-    assert set(found) == {"speed_max", "contact", "ports", "sun.bearing", "planet.bearing.tilt", "ring.mounts"}
-    assert 'write speed_max = "300 rad/s"' in found["speed_max"] and "[ports.sun]" in found["ports"]
-    assert motion_problems(spec.written) == []
 
 
 def test_pin_errors_move_the_axes_of_planets(tmp_path):
