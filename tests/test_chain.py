@@ -141,16 +141,11 @@ def test_the_wheel_runs_the_demo_in_an_empty_environment(wheel: Path, tmp_path: 
 
 @pytest.mark.full
 @pytest.mark.needs("ziglang", "build")
-def test_the_wheel_is_small(wheel: Path) -> None:
-    assert wheel.stat().st_size <= LARGEST_WHEEL
-
-
-@pytest.mark.full
-@pytest.mark.needs("ziglang", "build")
-def test_the_wheel_is_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
+def test_the_wheel_is_small_and_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
     """Both kernels are in it and export the same names; the Windows one is not loaded here."""
     from evidence.fmu_probes.symbols import exported_symbols
 
+    assert wheel.stat().st_size <= LARGEST_WHEEL
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path)

@@ -13,7 +13,6 @@ import pytest
 from evidence.study import cuts
 from evidence.study.limits import limit_rows
 from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
-from gearfmu import cli
 from gearfmu.kernel import Kernel
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import SceneSpec, load_scene
@@ -155,21 +154,6 @@ def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
     text = first[0].decode()
     assert first == again and first[1][:4] == b"\x89PNG"
     assert "full, rk45" in text and "rigid" in text and "5 µs" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["pair_loaded"], cli.USAGE_ERROR, "--out"),
-        (["--out", "x"], cli.USAGE_ERROR, "SCENE"),
-        (["pair_loadet", "--out", "x"], 1, "pair_loaded"),
-    ],
-)
-def test_wrong_usage_names_what_there_is(
-    arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.outcome(["study", *arguments]) == code and words in capsys.readouterr().err
-    assert not Path("x").exists()
 
 
 def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
