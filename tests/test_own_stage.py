@@ -1,5 +1,5 @@
-"""The walk of docs/howto-own-stage.md: its fast commands run as they stand there, the slow ones on tiny gears; the pair of the
-tutorial carries the load of its scene."""
+"""The walk of docs/howto-own-stage.md: its fast commands run as they stand, the slow ones on tiny gears; the
+tutorial's pair carries the load of its scene."""
 
 from __future__ import annotations
 

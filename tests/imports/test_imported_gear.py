@@ -97,20 +97,6 @@ def test_tetrahedra_of_one_sector(tmp_path: Path, native: Body) -> None:
     assert body.flank.static[middle] == pytest.approx(native.flank.static[middle], rel=0.02)
 
 
-@pytest.mark.full
-def test_a_rigid_bore_moves_as_one_and_is_stiffer(tmp_path: Path, native: Body) -> None:
-    """RBE2 in the bore: the whole gear by the mean tooth; a turn of the bore needs no strain, teeth give way less."""
-    hex20_deck(tmp_path / "pinion.inp")
-    body = imported(tmp_path, SECTION + 'bore = "BORE"\nbore_coupling = "rigid"')
-    assert body.how.mesh["method"] == "mean tooth" and body.how.mesh["teeth_deviation"] < 1e-9
-    assert body.total_mass == pytest.approx(native.total_mass, rel=1e-9)
-    assert body.inertia == pytest.approx(native.inertia, rel=1e-6, abs=1e-9 * native.inertia[2, 2])
-    middle = (0, 0, 0, 4, 4, 0, 0)
-    assert 0.8 < body.flank.static[middle] / native.flank.static[middle] < 1.0
-    assert body.frequency[0] > native.frequency[0]
-    assert body.error.max_error < 0.01
-
-
 @lru_cache(maxsize=1)
 def keyway_cells() -> np.ndarray:
     """The whole pinion without the elements of a keyway: on the bore, one pitch wide."""
