@@ -18,21 +18,13 @@ from gearfmu.scenefile.scene import load_scene
 pytestmark = pytest.mark.full
 H, WHOLE = 5e-6, Window(0.0, steady=False)
 ALL = Wiring()
-LOCKED = {True: "pinion.clutch.locked", False: "drive.clutch.locked"}
 
 
 @lru_cache(maxsize=64)
 def run(master: str, step: float, wiring: Wiring = ALL, chain: bool = True) -> Result:
     """The scene at level fast and an internal step of 5 µs, which every communication step here is a multiple of."""
-    scene = load_scene("clutch_closure")
-    car = scene.passenger_car.model_copy(update={"chain_in_fmu": chain})
-    changed = {
-        "record": (torque(chain), LOCKED[chain]),
-        "passenger_car": car,
-        "stage": scene.stage.model_copy(update={"level": "fast", "h": H}),
-        "coupling": scene.coupling.model_copy(update={"master": master, "step": step}),
-    }
-    scene = scene.model_copy(update=changed)
+    changes = {"stage.level": "fast", "stage.h": H, "coupling.master": master, "coupling.step": step}
+    scene = load_scene("clutch_closure", changes | {"record": [torque(chain)], "passenger_car.chain_in_fmu": chain})
     result = run_once(scene, source(chain), wiring=wiring)
     assert result.outcome == OK
     return result
@@ -40,9 +32,7 @@ def run(master: str, step: float, wiring: Wiring = ALL, chain: bool = True) -> R
 
 @lru_cache(maxsize=2)
 def source(chain: bool) -> Source:
-    scene = load_scene("clutch_closure")
-    car = scene.passenger_car.model_copy(update={"chain_in_fmu": chain})
-    return Source(stage_model(scene.model_copy(update={"passenger_car": car})))
+    return Source(stage_model(load_scene("clutch_closure", {"passenger_car.chain_in_fmu": chain})))
 
 
 def torque(chain: bool) -> str:

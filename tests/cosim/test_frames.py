@@ -19,14 +19,8 @@ from gearfmu.stage.run.deformation import Deformation
 
 def closure(**deformation: object) -> SceneSpec:
     """The first 2 ms of a clutch closure."""
-    shipped = load_scene("clutch_closure")
-    changed = {
-        "duration": 2e-3,
-        "settle": 0.0,
-        "stage": shipped.stage.model_copy(update={"level": "fast"}),
-        "deformation": DeformationChoice(**deformation) if deformation else None,
-    }
-    return shipped.model_copy(update=changed)
+    short = load_scene("clutch_closure", {"duration": 2e-3, "settle": 0.0, "stage.level": "fast"})
+    return short.model_copy(update={"deformation": DeformationChoice(**deformation) if deformation else None})
 
 
 def test_the_papers_scene_asks_for_the_papers_times() -> None:

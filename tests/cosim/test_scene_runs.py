@@ -20,9 +20,7 @@ from gearfmu.stage.run.trace import Trace
 
 def scene(name: str, duration: float, **stage) -> SceneSpec:
     """A shipped scene, cut to `duration`, without settling, its stage changed."""
-    shipped = load_scene(name)
-    changed = {"duration": duration, "settle": 0.0, "stage": shipped.stage.model_copy(update=stage)}
-    return shipped.model_copy(update=changed)
+    return load_scene(name, {"duration": duration, "settle": 0.0} | {f"stage.{key}": v for key, v in stage.items()})
 
 
 def with_step(given: SceneSpec, step: float) -> SceneSpec:

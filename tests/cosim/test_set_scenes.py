@@ -11,7 +11,6 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.scenefile.scene import SceneSpec, load_scene
-from gearfmu.scenefile.shaft_loads import SpeedControl
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.trace import Trace
 
@@ -19,16 +18,9 @@ R_B_SUN, PIN_CIRCLE = 21.143e-3, 45e-3  # m
 BACKLASH = 0.06e-3  # m, of each of the two meshes in series
 
 
-def sliced_once(name: str) -> SceneSpec:
+def changed(name: str, changes: dict[str, object]) -> SceneSpec:
     """A shipped scene with one slice: its teeth are spur, and preparing takes a third."""
-    scene = load_scene(name)
-    return scene.model_copy(update={"stage": scene.stage.model_copy(update={"slices": 1})})
-
-
-def with_capacity(scene: SceneSpec, duration: float, *points: tuple[float, float]) -> SceneSpec:
-    brake = scene.drivetrain.clutches["brake"].model_copy(update={"capacity": points})
-    parts = scene.drivetrain.model_copy(update={"clutches": {"brake": brake}})
-    return scene.model_copy(update={"duration": duration, "drivetrain": parts})
+    return load_scene(name, {"stage.slices": 1} | changes)
 
 
 def willis(trace: Trace) -> np.ndarray:
@@ -54,7 +46,8 @@ def impulse(trace: Trace, channel: str, step: float) -> np.ndarray:
 # -- the ring's brake lets go and catches again ------------------------------------------------------------------------
 def short_shift() -> SceneSpec:
     points = ((0.0, 400.0), (1e-3, 400.0), (1.5e-3, 0.0), (3e-3, 0.0), (4e-3, 250.0), (6e-3, 400.0))
-    return with_capacity(sliced_once("planetary_shift"), 0.01, *points)
+    capacity = [[f"{time} s", f"{torque} N*m"] for time, torque in points]
+    return changed("planetary_shift", {"duration": 0.01, "drivetrain.clutches.brake.capacity": capacity})
 
 
 @pytest.fixture(scope="module")
@@ -121,13 +114,8 @@ def test_energy_at_the_cut(shift: Result) -> None:
 @pytest.fixture(scope="module")
 def closure() -> Result:
     """Slip 3 rad/s, gone within 4 ms."""
-    scene = sliced_once("planetary_closure")
-    changed = {
-        "duration": 0.012,
-        "start": scene.start.model_copy(update={"slip": 3.0}),
-        "clutch": scene.clutch.model_copy(update={"capacity": ((2e-3, 0.0), (6e-3, 300.0))}),
-    }
-    scene = scene.model_copy(update=changed)
+    capacity = [["2 ms", "0 N*m"], ["6 ms", "300 N*m"]]
+    scene = changed("planetary_closure", {"duration": 0.012, "start.slip": 3.0, "clutch.capacity": capacity})
     return run_once(scene, Source(stage_model(scene)))
 
 
@@ -148,12 +136,9 @@ def test_the_sun_drives_the_vehicle_as_the_teeth_say(closure: Result) -> None:
 @pytest.fixture(scope="module")
 def runup() -> Result:
     """From 40 rad/s in 10 ms at 104 rad/s², as the scene has it, from 2 ms on."""
-    scene = sliced_once("planetary_runup")
-    control = scene.drivetrain.torques["control"]
-    wanted = SpeedControl(damping=20.0, over_time=((2e-3, 40.0), (1.2e-2, 40.0 + 1.04)))
-    torques = scene.drivetrain.torques | {"control": control.model_copy(update={"speed_control": wanted})}
-    parts = scene.drivetrain.model_copy(update={"torques": torques})
-    scene = scene.model_copy(update={"duration": 0.012, "settle": 0.0, "drivetrain": parts, "record": ("*",)})
+    control, short = "drivetrain.torques.control.speed_control", {"duration": 0.012, "settle": 0.0, "record": ["*"]}
+    wanted = [["2 ms", "40 rad/s"], ["12 ms", "41.04 rad/s"]]
+    scene = changed("planetary_runup", short | {f"{control}.damping": 20.0, f"{control}.over_time": wanted})
     return run_once(scene, Source(stage_model(scene)))
 
 
