@@ -17,27 +17,11 @@ import numpy as np
 import pytest
 from verbs import call
 
+from gearfmu.scenefile.scene import SHIPPED
 from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_WHEEL = 20e6  # bytes, with both kernels
-SHORT = """
-name = "short"
-description = "the first milliseconds of a clutch closure"
-duration = "6 ms"
-[stage]
-name = "fzg_c/stage_relief"
-level = "fast"
-[coupling]
-step = "100 us"
-[start]
-pinion_speed = "150 rad/s"
-slip = "52 rad/s"
-[clutch]
-capacity = [["0 s", "0 N*m"], ["5 ms", "100 N*m"]]
-[passenger_car]
-chain_in_fmu = true
-"""
 
 
 def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
@@ -85,7 +69,8 @@ def test_export_and_validate(tmp_path: Path) -> None:
 
 
 def test_run_through_the_fmu_equals_the_kernel_bit_for_bit(tmp_path: Path) -> None:
-    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
+    text = (SHIPPED / "clutch_closure.toml").read_text(encoding="utf-8").replace('"0.4 s"', '"6 ms"')
+    (tmp_path / "short.toml").write_text(text, encoding="utf-8")
     for unit, more in (("fmu", ()), ("kernel", ("--verify",))):
         gearfmu("run", "short.toml", "--unit", unit, *more, "--out", unit, cwd=tmp_path)
         assert {"trace.h5", "summary.json", "report.html", "data"} <= {

@@ -15,6 +15,8 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.femesh.imported import read_mesh
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
 
 MM = 1e-3
 KINDS = ("hexahedron20", "tetra10", "hexahedron")
@@ -236,3 +238,44 @@ def test_rows_must_be_the_displacements_of_all_nodes(tmp_path: Path, matrix: np.
         read_matrix(tmp_path / "k.npy", NODES, np.array([7, 11, 12]))
     with pytest.raises(MeshError, match="6 rows, but `unknowns` names 5"):
         read_matrix(tmp_path / "k.npy", NODES[:5], LABELS)
+
+
+# ---- sets of nodes as interfaces -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "hexahedron"])
+def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) -> None:
+    """A bar pulled at averaging and rigid ends: the static stretch is F L / (E A), in between for the rigid ends."""
+    nodes, cells = brick(kind, (8, 2, 2))
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {kind: cells}, ends), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    stretch = {}
+    for coupling in ("averaging", "rigid"):
+        body = full_order(mesh, matrices, [SetInterface("LEFT", coupling), SetInterface("RIGHT", coupling)])
+        assert np.abs(body.stiffness @ body.rigid).max() < 1e-8 * np.abs(body.stiffness).max()
+        pull = body.rows("RIGHT")[[0]] - body.rows("LEFT")[[0]]
+        stretch[coupling] = float((pull @ Elastic(body.held(body.rows("LEFT"))).flexibility(pull.T.toarray()))[0, 0])
+    exact = 0.04 / (206e9 * 8e-5)
+    assert stretch["averaging"] == pytest.approx(exact, rel=1e-2)
+    assert 0.95 * exact < stretch["rigid"] < stretch["averaging"]
+
+
+def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+    nodes, cells = brick("hexahedron20")
+    edge = {"EDGE": np.flatnonzero((nodes[:, 1] == 0) & (nodes[:, 2] == 0))}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": cells}, edge), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    with pytest.raises(MeshError, match="'edge' lie in one line"):
+        full_order(mesh, matrices, [SetInterface("edge")])
+    with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
+        full_order(mesh, matrices, [SetInterface("edge", "welded")])
+
+
+def test_a_byte_order_mark_and_line_ends_change_no_deck(tmp_path: Path) -> None:
+    nodes, hexes = brick("hexahedron20")
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0)}
+    plain = write_deck(tmp_path / "a.inp", nodes, {"hexahedron20": hexes}, ends)
+    marked = tmp_path / "b.inp"
+    marked.write_bytes(plain.read_text(encoding="utf-8").replace("\n", "\r\n").encode("utf-8-sig"))
+    one, other = read_mesh(plain, MM), read_mesh(marked, MM)
+    assert np.array_equal(one.nodes, other.nodes) and np.array_equal(one.sets["LEFT"], other.sets["LEFT"])
+    assert all(np.array_equal(cells, other.elements[kind]) for kind, cells in one.elements.items())

@@ -15,16 +15,13 @@ from decks import write_deck
 
 from gearfmu import cli
 from gearfmu.body import reduce_body
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
-from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.reading.files import find_stage
@@ -136,24 +133,6 @@ def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> 
         assert np.abs(one - other).max() < 1e-7 * np.abs(other).max(), name
     grams = [b.sensors.rows @ b.sensors.rows.T for b in (body, native)]  # the members of a pair may turn
     assert np.abs(grams[0] - grams[1]).max() < 1e-6 * np.abs(grams[1]).max()
-
-
-@pytest.mark.full
-def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
-    """Before reduction, for every method: K with the springs, M and the inputs of our own; and its modes."""
-    own = stage(tmp_path / "own")
-    ring_deck(tmp_path, body_sector(own, "ring"))
-    spec = stage(tmp_path, RING)
-    body = imported_full_order(spec.by_file["ring"], spec.mounts)
-    native = ring_full_order(own.by_file["ring"], own.mounts, 1.0)
-    assert body.rigid.size == 0 and body.ground == () and body.length == native.length
-    assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
-    for name in ("stiffness", "mass"):
-        one, other = getattr(body, name), getattr(native, name)
-        assert np.abs(one - other).max() < 1e-6 * np.abs(other).max(), name
-    assert np.abs(body.rows() - native.rows()).max() < 1e-9
-    modes = [mounted_ring_modes(one, 6, scale=1.0).modes for one in (spec, own)]
-    assert np.allclose([m.frequency for m in modes[0]], [m.frequency for m in modes[1]], rtol=1e-7)
 
 
 def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> None:

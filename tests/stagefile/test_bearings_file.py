@@ -52,13 +52,6 @@ def test_a_copy_and_a_stored_stage_say_the_same(tmp_path: Path, like: str) -> No
     assert not differences(own, restored(stored(own.written), own.source))
 
 
-@pytest.mark.parametrize("name", ["fzg_c", "two_stage"])
-def test_a_file_without_them_is_stored_as_ever(name: str) -> None:
-    tables = stored(load_stage(name).written)
-    assert not {"bearings", "operating"} & set(tables)
-    assert not any({"bearing", "span", "carries"} & set(support) for support in tables.get("supports", []))
-
-
 def test_directions_of_rolling_bearings_count(tmp_path: Path) -> None:
     """Balls hold five directions and rollers four; the kernel has room for 256."""
     supports = "\n".join(

@@ -14,7 +14,6 @@ from evidence.study import cuts
 from evidence.study.limits import limit_rows
 from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu.kernel import Kernel
-from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.teeth import ROLLS
 from gearfmu.study import Job, ReferenceRow, Row, bench, study
@@ -139,21 +138,6 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert all(20e-6 / p.h == pytest.approx(round(20e-6 / p.h)) for p in found if p.h)
     assert min(p.h for p in found if p.h) == pytest.approx(min(STEPS))
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
-
-
-def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
-    rows = [
-        Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
-        for level in ("rigid", "fast")
-        for h in (1e-5, 5e-6)
-        for n in (1, 5)
-    ]
-    rows += [Row("s", "full", "rk45", 1e-6, 400, 5, 1e-3, 0.0, 0.02, 0.01, 90.0, 70.0)]
-    first = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "a", "title")]
-    again = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "b", "title")]
-    text = first[0].decode()
-    assert first == again and first[1][:4] == b"\x89PNG"
-    assert "full, rk45" in text and "rigid" in text and "5 µs" in text
 
 
 def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
