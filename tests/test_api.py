@@ -107,19 +107,6 @@ def test_simulate_is_that_of_the_command_line(tmp_path: Path) -> None:
     assert np.array_equal(wound["mesh.force"], trace["mesh.force"])
 
 
-def test_run_takes_other_stages_and_units(tmp_path: Path) -> None:
-    """Kernel and FMU give the same bits; a changed stage gives others."""
-    scene = gf.load_scene("pair_loaded", {"duration": "2 ms", "settle": 0.0, "stage.level": "rigid"})
-    by_fmu, by_kernel = gf.run(scene, tmp_path), gf.run(scene, unit="kernel")
-    again = gf.run(scene, unit=tmp_path / "fzg_c_relief.fmu")
-    assert np.array_equal(by_fmu["mesh.force"], by_kernel["mesh.force"])
-    assert np.array_equal(by_fmu["mesh.force"], again["mesh.force"]) and again.meta["unit"] == "fmu"
-    plain = gf.run(scene, stage="fzg_c", unit="kernel")
-    assert plain.meta["stage"] == "fzg_c" and not np.array_equal(plain["mesh.te"], by_fmu["mesh.te"])
-    changed = gf.load("fzg_c", {"gears.pinion.bearing.stiffness": "1e8 N/m"})
-    assert not np.array_equal(gf.run(scene, stage=changed, unit="kernel")["mesh.te"], plain["mesh.te"])
-
-
 def test_ports_and_bores_of_a_model() -> None:
     model = gf.assemble("fzg_c", ports={"pinion": "torque", "wheel": "fixed"})
     assert [port.kind for port in model.stage.ports.values()] == ["torque", "fixed"]

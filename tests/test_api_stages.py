@@ -1,7 +1,8 @@
-"""The verbs new, effects, efficiency, modes, validate as functions, and options that mean the same on every verb."""
+"""The verbs new, efficiency, modes, bearings as functions, and options that mean the same on every verb."""
 
 from __future__ import annotations
 
+import csv
 import importlib
 import math
 from pathlib import Path
@@ -71,13 +72,6 @@ def test_efficiency_is_that_of_the_verb() -> None:
     assert found.coefficient == pytest.approx(0.05) and found.lost == pytest.approx(found.closed, rel=0.1)
 
 
-def test_validate_and_effects_are_there(tmp_path: Path) -> None:
-    (tmp_path / "no.fmu").write_bytes(b"nothing")
-    with pytest.raises(gf.GearfmuError, match="no.fmu"):
-        gf.validate(tmp_path / "no.fmu")
-    assert "friction" in {effect.name for effect in gf.effects()}
-
-
 def test_a_notebook_carries_the_whole_report(tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text('<p class="a">"&"</p>', encoding="utf-8")
     shown = Page(tmp_path / "report.html")._repr_html_()
@@ -111,3 +105,37 @@ def test_names_of_stages_and_scenes_are_completed() -> None:
     assert "planetary54" in [item.value for item in stage_names(context, param, "plan")]
     assert [item.value for item in scene_names(context, param, "pair_lo")] == ["pair_loaded"]
     assert stage_names(context, param, "./mine")[0].type == "file"
+
+
+BEARINGS = "helical_demo/stage_bearings"
+
+
+def test_bearings_prints_the_table_of_the_function(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "bearings.csv"
+    assert cli.outcome(["bearings", BEARINGS, "--torque", "80 N*m", "--csv", str(table)]) == 0
+    printed, found = capsys.readouterr().out, gf.bearings(BEARINGS, "80 N*m")
+    for state in found.states:
+        assert (
+            f"{state.support}: bearing {state.bearing}" in printed and f"{state.loaded} of {state.elements}" in printed
+        )
+    assert "proposed      balls 10, ball_diameter 11.10 mm" in printed
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    assert [row["support"] for row in rows] == ["pinion", "wheel"]
+    for row, state in zip(rows, found.states, strict=True):
+        assert float(row["load_z"]) == pytest.approx(state.load[2], rel=1e-5)
+        assert float(row["pressure_MPa"]) == pytest.approx(1e-6 * state.pressure, rel=1e-5)
+
+
+def test_the_torque_of_a_file_of_bearings_is_the_default() -> None:
+    assert gf.bearings(BEARINGS).torque == 100.0
+
+
+@pytest.mark.parametrize(("arguments", "says"), [
+    (["bearings", "fzg_c"], "has no rolling bearings"),
+    (["bearings", BEARINGS, "--torque", "80"], "N*m"),
+])  # fmt: skip
+def test_bearings_that_there_are_not_are_refused(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.outcome(arguments) in (1, cli.USAGE_ERROR)
+    assert says in capsys.readouterr().err

@@ -11,6 +11,8 @@ from pathlib import Path
 import prose
 import pytest
 
+from evidence.pages import variables
+from evidence.pages.effects import effects_page
 from gearfmu import cli
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -254,3 +256,15 @@ def test_the_way_of_a_number_names_what_there_is() -> None:
     every = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "gearfmu").rglob("*.py"))
     missing += [name for name in values if not re.search(rf"^class {name}\b", every, flags=re.MULTILINE)]
     assert len(places) > 15 and len(values) > 10 and not missing
+
+
+def test_pages_are_those_of_the_tables() -> None:
+    for name, text in (("variables", variables.variables_page()), ("effects", effects_page())):
+        assert (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") == text, "run: make docs"
+
+
+def test_every_row_of_the_kernels_table_is_read() -> None:
+    source = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_variables.inc").read_text(encoding="utf-8")
+    found = variables.rows()
+    assert len(found) == len(re.findall(r"GK_(?:REAL|INTEGER|BOOLEAN|ENUM), GK_", source))
+    assert all(row.description and row.exists in variables.WHEN for row in found)

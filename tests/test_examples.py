@@ -23,17 +23,10 @@ def numbers(text: str) -> list[float]:
     return [float(word) for word in re.findall(r"(?<![\w.])-?\d+\.?\d*(?![\w.])", text)]
 
 
-def test_drive_with_fmpy(tmp_path: Path) -> None:
-    """At rest the mesh force is torque over base radius, and the held wheel carries 24/16 of the torque."""
-    te, force, torque = numbers(example("drive_with_fmpy.py", cwd=tmp_path).splitlines()[-1])
-    assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
-    assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
-    assert 50 < te < 200
-
-
-def test_stage_in_ssp(tmp_path: Path) -> None:
-    """As the FMU alone: torque over base radius, and 24/16 of the torque at the held wheel."""
-    te, force, torque = numbers(example("stage_in_ssp.py", tmp_path, cwd=tmp_path).splitlines()[-1])
+@pytest.mark.parametrize("arguments", [("drive_with_fmpy.py",), ("stage_in_ssp.py", ".")], ids=["fmpy", "ssp"])
+def test_a_pair_at_rest(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    """Mesh force is torque over base radius, and the held wheel carries 24/16 of the torque."""
+    te, force, torque = numbers(example(*arguments, cwd=tmp_path).splitlines()[-1])
     assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
     assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
     assert 50 < te < 200
@@ -129,7 +122,7 @@ def recorded(folder: Path) -> Path:
 
 
 def test_every_example_has_its_test() -> None:
-    tested = set(re.findall(r'example\("([\w.]+)"', Path(__file__).read_text(encoding="utf-8")))
+    tested = set(re.findall(r'"(\w+\.py)"', Path(__file__).read_text(encoding="utf-8")))
     assert tested == {path.name for path in (ROOT / "examples").glob("*.py")}
 
 

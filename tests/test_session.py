@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import matplotlib
@@ -17,7 +14,6 @@ from gearfmu.stage.assembly.shown import LINES, WIDTH
 from gearfmu.stage.run.trace import TraceError
 
 matplotlib.use("Agg")
-ROOT = Path(__file__).resolve().parents[1]
 SCREEN = 24  # lines of a terminal
 
 
@@ -97,19 +93,3 @@ def test_typed_settings_are_the_kernels_parameters() -> None:
         assert items == tuple(variable.items) if items else hints[name] is types[variable.type], name
     assert get_args(Level) == tuple(known["level"].items) and get_args(Integrator) == tuple(known["integrator"].items)
     assert set(get_type_hints(RunSettings)) == set(hints) | {"profile"}
-
-
-@pytest.mark.full
-def test_mypy_refuses_levels_and_settings_that_there_are_not(tmp_path: Path) -> None:
-    file = tmp_path / "own.py"
-    file.write_text(
-        "import gearfmu as gf\n"
-        'own: gf.Settings = {"level": "fast", "slices": 3, "effect.hertz": False}\n'
-        'gf.simulate("fzg_c", 1, 1, profile="speeds.csv", **own)\n'
-        'gf.simulate("fzg_c", 1, 1, level="fasst")\n'
-        'gf.te("fzg_c", 1, slice=3)\n',
-        encoding="utf-8",
-    )
-    done = subprocess.run([sys.executable, "-m", "mypy", str(file)], capture_output=True, text=True, cwd=ROOT)
-    errors = [line for line in done.stdout.splitlines() if f"{file.name}:" in line and "error" in line]
-    assert [int(line.split(":")[1]) for line in errors] == [4, 5], done.stdout + done.stderr

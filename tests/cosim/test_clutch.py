@@ -80,12 +80,6 @@ def test_sticks_through_a_reversal_of_torque_and_slips_both_ways():
     assert loose[0] == pytest.approx(math.asin(30.0 * (J1 + J2) / J2 / 60.0) / (2 * math.pi), abs=1e-6)
 
 
-def test_without_capacity_the_sides_do_not_feel_each_other():
-    unit = two_inertias(Constant(0.0), lambda t, phi, w: 10.0 * math.cos(40 * t), w2=1.0)
-    advance(unit, 1e-3, 1000)
-    assert unit.get(unit.resolve(["b.w"]))[0] == 1.0
-
-
 def test_a_jump_of_capacity_between_steps_is_exact():
     """Nothing before the jump, the closed form after it."""
     unit = two_inertias(Ramp(((0.1, 0.0), (0.1, 20.0))), w1=10.0)

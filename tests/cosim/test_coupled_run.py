@@ -49,11 +49,6 @@ def test_patterns_choose_what_is_recorded_and_must_fit_something():
         run_coupled(cut(), plan(record=("mesh.tau", "mash.te")))
 
 
-def test_two_runs_give_the_same_bits():
-    first, second = run_coupled(cut(), plan()).trace, run_coupled(cut(), plan()).trace
-    assert all(np.array_equal(first[name], second[name]) for name in first.channels)
-
-
 @pytest.mark.parametrize(("name", "low", "high"), [("gs_mean", 0.8, 1.3), ("jacobi", 0.8, 1.3)])
 def test_richardson_predicts_the_true_coupling_error(name, low, high):
     """Estimated over true error of the shaft's torque, against the uncut equations; prototypes: 0.8–1.1."""
@@ -67,12 +62,6 @@ def test_richardson_predicts_the_true_coupling_error(name, low, high):
         unit.step(n * 2e-4, 2e-4)
     true = rms(coarse.trace["input.tau"] - rows) / rms(alternating(np.array(rows), 2e-4, steady=False))
     assert low < estimate / true < high, (estimate, true)
-
-
-def test_energy_residual_of_the_cut():
-    """Relative to the exchanged work: gs_mean below 1e-6, jacobi below 1e-3."""
-    assert abs(run_coupled(cut(), plan()).energy_residual) < 1e-6
-    assert 1e-5 < abs(run_coupled(cut(), plan("jacobi")).energy_residual) < 1e-3
 
 
 class Failing(PyUnit):

@@ -3,7 +3,9 @@ costs."""
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from functools import lru_cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,7 +14,6 @@ from analytic_stage import Plant
 from gearfmu.cosim.masters import Cut, Jacobi, master
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Ramp
-from gearfmu.errors import CouplingError
 
 DURATION = 0.1
 VIBRATION = Plant(ripple=80.0)
@@ -93,11 +94,6 @@ def test_gs_mean_is_stable_near_its_limit_and_unstable_beyond():
     assert calm < 100.0 and wild > 1e3 * calm
 
 
-def test_unknown_master():
-    with pytest.raises(CouplingError, match="no master 'strong'; choose one of gs_mean, jacobi"):
-        master("strong", Cut(PyUnit(VIBRATION.stage()), PyUnit(VIBRATION.drive()), ("pinion", "wheel")))
-
-
 def test_jacobi_holds_the_torque_of_the_communication_point():
     """The drivetrain sees the torque from before the step."""
     stage, drive = PyUnit(VIBRATION.stage(), 2e-5), PyUnit(VIBRATION.drive())
@@ -111,34 +107,13 @@ def test_jacobi_holds_the_torque_of_the_communication_point():
     assert gained == pytest.approx((held[1] + VIBRATION.load_torque) * 1e-3 / VIBRATION.vehicle_inertia, rel=1e-9)
 
 
-class Counted(PyUnit):
-    """A stage that counts how often it is called."""
-
-    calls: dict[str, int]
-
-    def __init__(self, plant: Plant) -> None:
-        super().__init__(plant.stage(), plant.micro_step)
-        self.calls = dict.fromkeys(("set", "step", "get"), 0)
-
-    def set(self, handle, values) -> None:
-        self.calls["set"] += 1
-        super().set(handle, values)
-
-    def step(self, time, h) -> None:
-        self.calls["step"] += 1
-        super().step(time, h)
-
-    def get(self, handle) -> np.ndarray:
-        self.calls["get"] += 1
-        return super().get(handle)
-
-
 @pytest.mark.parametrize("name", ["gs_mean", "jacobi"])
 def test_a_communication_step_is_one_set_one_step_one_get(name):
-    """What a call costs, about 1 µs through ctypes, is paid three times."""
-    stage = Counted(VIBRATION)
+    """A call through ctypes costs about 1 µs."""
+    stage = PyUnit(VIBRATION.stage(), VIBRATION.micro_step)
     chosen = master(name, Cut(stage, PyUnit(VIBRATION.drive()), ("pinion", "wheel")))
     chosen.begin(0.0)
-    stage.calls = dict.fromkeys(stage.calls, 0)
-    chosen.step(0.0, 1e-4)
-    assert stage.calls == {"set": 1, "step": 1, "get": 1}
+    with ExitStack() as stack:
+        calls = [stack.enter_context(patch.object(stage, c, wraps=getattr(stage, c))) for c in ("set", "step", "get")]
+        chosen.step(0.0, 1e-4)
+    assert [call.call_count for call in calls] == [1, 1, 1]

@@ -68,33 +68,6 @@ def scene_of(folder: Path, text: str) -> SceneSpec:
     return load_scene(folder / "scene.toml")
 
 
-def problems_of(folder: Path, text: str) -> dict[str, str]:
-    with pytest.raises(SpecError) as told:
-        scene_of(folder, text)
-    return {problem.field: problem.remedy for problem in told.value.problems}
-
-
-def test_what_no_single_field_shows_is_told_at_once(tmp_path: Path) -> None:
-    text = (SHIPPED / f"{SHIFT}.toml").read_text(encoding="utf-8")
-    text = text.replace('on = "turbine"', 'on = "turbin"', 1).replace('["output", "vehicle"]', '["output", "output"]')
-    text = text.replace('["drum", "ground"]', '["drums", "ground"]').replace(
-        'drive = { on = "turbine"', "drum = { on =" + '"ground"'
-    )
-    text = text.replace('["35 ms", "0 N*m"]', '["25 ms", "0 N*m"]')
-    found = problems_of(tmp_path, text)
-    assert "there are turbine, drum, output, vehicle, ground" in found["drivetrain.ports.carrier.on"]
-    assert found["drivetrain.shafts.output_shaft.between"] == "name two different ends"
-    assert "there is no such part" in found["drivetrain.clutches.brake.between"]
-    assert "times must not decrease" in found["drivetrain.clutches.brake.capacity"]
-    assert "that of drivetrain.inertias.drum" in found["drivetrain.torques.drum"]
-    assert "ground" not in found["drivetrain.torques.drum.on"]
-
-
-def test_a_drivetrain_is_one_of_four_and_brings_its_own_clutches(tmp_path: Path) -> None:
-    found = problems_of(tmp_path, PAIR + '[clutch]\ncapacity = [["0 s", "1 N*m"]]\n[test_rig]\ntorque = "1 N*m"\n')
-    assert "found test_rig and drivetrain" in found[""] and "[drivetrain.clutches.…]" in found["clutch"]
-
-
 def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path: Path, pair: Stage) -> None:
     scene = scene_of(tmp_path, PAIR.replace("ports.wheel", "ports.whel").replace('damping = "0.2 N*m*s/rad"\n', ""))
     with pytest.raises(SpecError) as told:

@@ -1,41 +1,13 @@
-"""Scene files: the shipped ones are what the field expects of them; bad ones are told everything at once."""
+"""Scene files, and what their drives ask of a stage. Messages: tests/stagefile/broken.json."""
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
+from gearfmu.cosim.scene_run import drive_of, in_drivetrain
 from gearfmu.errors import SpecError
 from gearfmu.scenefile.scene import SHIPPED, load_scene, shipped_scenes
-
-
-def test_shipped_scenes():
-    pairs = [
-        "clutch_closure",
-        "clutch_closure_housed",
-        "clutch_closure_train",
-        "clutch_dump",
-        "pair_light",
-        "pair_loaded",
-        "pair_runup",
-        "train_runup",
-        "train_runup_housed",
-    ]
-    sets = {name: "planetary54" for name in ("planetary_backfire", "planetary_paper", "planetary_closure")}
-    sets |= {"planetary_runup": "planetary54/stage_pin_error", "planetary_shift": "planetary54/stage_ring_port"}
-    assert shipped_scenes() == sorted([*pairs, *sets])
-    for name, stage in sets.items():
-        scene = load_scene(name)
-        assert (scene.name, scene.stage.name, scene.stage.level) == (name, stage, "fast")
-    for name in pairs:
-        scene, housed = load_scene(name), "housed" in name
-        train = "train" in name or housed
-        assert scene.name == name
-        own = "two_stage/stage_housed" if housed else "two_stage" if train else "fzg_c/stage_relief"
-        assert scene.stage.name == own
-        level = "fast" if "runup" in name or train else "standard"
-        assert (scene.stage.level, scene.stage.slices) == (level, 7 if train else 5)
+from gearfmu.stagefile.stage import load_stage
 
 
 @pytest.mark.parametrize("stage", ["fzg_c", "reduced_models/planetary54", "reduced_models/fzg_c/stage_relief.toml"])
@@ -44,119 +16,21 @@ def test_a_stage_is_no_scene_and_says_so(stage):
         load_scene(stage)
 
 
-def test_a_misspelt_scene_is_asked_about():
-    with pytest.raises(SpecError, match='did you mean "pair_loaded"'):
-        load_scene("pair_loded")
-
-
-def test_clutch_closure_is_the_demo():
-    scene = load_scene("clutch_closure")
-    assert (scene.start.slip, scene.duration, scene.coupling.step, scene.coupling.master) == (
-        52.0,
-        0.4,
-        1e-4,
-        "gs_mean",
-    )
-    assert (
-        scene.clutch.capacity == ((0.0, 0.0), (0.05, 250.0))
-        and scene.passenger_car.chain_in_fmu
-        and scene.steps == 4000
-    )
-
-
-@pytest.mark.parametrize(("name", "torque", "rpm"), [("pair_loaded", 302.0, 2000.0), ("pair_light", 80.0, 6000.0)])
-def test_pairs_run_at_least_20_mesh_periods_after_settling(name, torque, rpm):
-    scene = load_scene(name)
-    assert scene.test_rig.torque == torque and scene.start.pinion_speed == pytest.approx(rpm * 2 * math.pi / 60)
-    assert scene.settle == 0.05 and (scene.duration - scene.settle) * rpm / 60 * 16 >= 20
-
-
-def test_hash_follows_values_not_text(tmp_path):
-    text = (SHIPPED / "pair_light.toml").read_text(encoding="utf-8")
-    (tmp_path / "a.toml").write_text(
-        text.replace('"80 N*m"', '"0.08 kN*m"').replace("# Light", "# Very light"), encoding="utf-8"
-    )
-    (tmp_path / "b.toml").write_text(text.replace('"80 N*m"', '"81 N*m"'), encoding="utf-8")
-    assert load_scene(tmp_path / "a.toml").hash == load_scene("pair_light").hash != load_scene(tmp_path / "b.toml").hash
-
-
-BAD = """
-name = "Bad Scene"
-description = "everything wrong"
-duration = "0.1"
-[stage]
-name = "fzg_c"
-level = "superb"
-slices = 21
-[coupling]
-step = "100 N"
-mastr = "jacobi"
-[start]
-pinion_speed = 100
-[clutch]
-capacity = [["0 s", "-5 N*m"]]
-"""
-
-
-def test_every_problem_of_a_file_at_once(tmp_path):
-    (tmp_path / "bad.toml").write_text(BAD, encoding="utf-8")
-    with pytest.raises(SpecError) as told:
-        load_scene(tmp_path / "bad.toml")
-    fields = {problem.field for problem in told.value.problems}
-    assert {
-        "name",
-        "duration",
-        "stage.level",
-        "stage.slices",
-        "coupling.step",
-        "coupling.mastr",
-        "start.pinion_speed",
-    } <= fields
-    assert any(field.startswith("clutch.capacity") for field in fields)
-    assert 'did you mean "master"?' in str(told.value) and all(
-        problem.file.endswith("bad.toml") for problem in told.value.problems
-    )
-
-
 @pytest.mark.parametrize(
-    ("old", "new", "field", "remedy"),
+    ("name", "words"),
     [
-        ('[test_rig]\ntorque = "80 N*m"', "", "", "exactly one of"),
-        ('settle = "0.05 s"', 'settle = "0.2 s"', "settle", "shorter than the duration"),
-        ('step = "20 us"', 'step = "30 us"', "coupling.step", "whole number of steps"),
-        (
-            'step = "20 us"',
-            'step = "20 us"\nmicro_step = "50 us"',
-            "coupling.micro_step",
-            "not exceed the communication step",
-        ),
-        ('pinion_speed = "6000 rpm"', 'pinion_speed = "6000 rpm"\nslip = "1 rad/s"', "start.slip", "remove it"),
-        (
-            "[test_rig]",
-            '[clutch]\ncapacity = [["1 s", "1 N*m"], ["0 s", "2 N*m"]]\n[test_rig]',
-            "clutch.capacity",
-            "must not decrease",
-        ),
+        ("pair_loded", 'did you mean "pair_loaded"'),
+        ("nothing", "clutch_closure_housed, clutch_closure_train, clutch_dump"),
     ],
 )
-def test_what_no_single_field_shows(tmp_path, old, new, field, remedy):
-    text = (SHIPPED / "pair_light.toml").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / "scene.toml").write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(SpecError) as told:
-        load_scene(tmp_path / "scene.toml")
-    assert any(problem.field == field and remedy in problem.remedy for problem in told.value.problems), told.value
+def test_an_unknown_scene_is_asked_about(name, words):
+    with pytest.raises(SpecError, match=words):
+        load_scene(name)
 
 
-def test_a_car_without_clutch_and_a_peak_inside_the_fmu(tmp_path):
-    text = (SHIPPED / "clutch_closure.toml").read_text(encoding="utf-8")
-    (tmp_path / "a.toml").write_text(
-        text.replace('[clutch]\ncapacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]]', ""), encoding="utf-8"
-    )
-    (tmp_path / "b.toml").write_text(text.replace("[clutch]", "[clutch]\npeak = 1.2"), encoding="utf-8")
-    for name, words in (("a", "the passenger car has a clutch"), ("b", "has no peak")):
-        with pytest.raises(SpecError, match=words):
-            load_scene(tmp_path / f"{name}.toml")
+def test_hash_follows_values_not_text():
+    one, other = (load_scene("pair_light", {"test_rig.torque": torque}).hash for torque in ("0.08 kN*m", "81 N*m"))
+    assert one == load_scene("pair_light").hash != other
 
 
 VALUES = ["1", "-1", "0.0", "nan", "inf", "1e400", "99999999999999999999", "true", '""', '"1"', '"1 s"', '"-5 N*m"',
@@ -188,6 +62,26 @@ def test_whatever_stands_in_a_field_it_loads_or_lists_problems(tmp_path):
     assert tried > 1500 and 0.7 * tried < refused < tried
 
 
-def test_unknown_scene_names_the_shipped_ones():
-    with pytest.raises(SpecError, match="clutch_closure_housed, clutch_closure_train, clutch_dump"):
-        load_scene("nothing")
+@pytest.mark.parametrize("name", shipped_scenes())
+def test_a_stage_with_the_ports_that_a_drive_needs_has_the_same_drive(name):
+    """Scenes are run on the stage that has their ports already, an FMU brings its own."""
+    scene = load_scene(name)
+    bare = load_stage(scene.stage.name)
+    ready = in_drivetrain(scene, load_stage(scene.stage.name))
+    first, second = drive_of(scene, bare), drive_of(scene, ready)
+    assert first.ports == second.ports and first.ports
+    assert first.start() == second.start() and first.silent == second.silent
+    for port, wanted in first.ports.items():
+        assert (ready.ports[port].kind, ready.ports[port].chain) == (wanted.kind, wanted.chain)
+    if second.with_shafts is not None:
+        own = {name: port.model_copy(update={"k": 2 * port.k}) for name, port in ready.ports.items() if port.k}
+        other = drive_of(second.with_shafts({**ready.ports, **own}), ready)
+        assert {name: port.k for name, port in other.ports.items()} == {name: own[name].k for name in other.ports}
+
+
+def test_alternating_torques_and_clutches_of_a_drive_are_known():
+    known = {name: load_scene(name) for name in ("planetary_backfire", "clutch_closure", "planetary_shift")}
+    drives = {name: drive_of(s, load_stage(s.stage.name)) for name, s in known.items()}
+    assert drives["planetary_backfire"].frequencies == (300.0,) and not drives["planetary_backfire"].watched
+    assert drives["clutch_closure"].watched == () and drives["clutch_closure"].signals  # its clutch is in the stage
+    assert set(drives["planetary_shift"].watched) == set(known["planetary_shift"].drivetrain.clutches)

@@ -13,12 +13,11 @@ from scipy.linalg import expm
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Plan, Result, run_coupled
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.masters import master
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
-from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.stage import load_stage
@@ -35,41 +34,6 @@ def test_the_scene_of_the_paper_is_in_balance_at_the_start() -> None:
     assert scene.duration == 0.1 and scene.start.pinion_speed == SPEED and speeds == {"carrier": 85.0, "sun": 340.0}
     power = {name: Law(load).at(0.0, speeds[name]) * speeds[name] for name, load in scene.shaft_loads.items()}
     assert power["carrier"] == 600.0 * SPEED and sum(power.values()) == pytest.approx(0.0, abs=1e-9)
-
-
-BAD = """
-[shaft_loads.carrier]
-[shaft_loads.sun]
-constant = "5 N"
-proportionl = 3
-over_time = [["2 ms", "1 N*m"], ["1 ms", "1 N*m"]]
-proportional = { torque = "1 N*m", speed = "0 rad/s" }
-alternating = { amplitude = "-1 N*m" }
-"""
-HEAD = (SHIPPED / f"{PAPER}.toml").read_text(encoding="utf-8").partition("[shaft_loads")[0]
-
-
-def problems_of(tmp_path: Path, text: str) -> dict[str, str]:
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SpecError) as told:
-        load_scene(tmp_path / "scene.toml")
-    return {problem.field: problem.remedy for problem in told.value.problems}
-
-
-def test_every_bad_field_of_the_loads_at_once(tmp_path: Path) -> None:
-    found = problems_of(tmp_path, HEAD + BAD)
-    sun = "shaft_loads.sun"
-    assert {f"{sun}.constant", f"{sun}.alternating.amplitude", f"{sun}.alternating.frequency"} <= set(found)
-    assert 'did you mean "proportional"' in found[f"{sun}.proportionl"]
-
-
-def test_what_no_single_field_of_the_loads_shows_at_once(tmp_path: Path) -> None:
-    lines = [line for line in BAD.splitlines() if not line.startswith(("constant", "proportionl", "alternating"))]
-    found = problems_of(tmp_path, HEAD + "\n".join(lines) + '\n[test_rig]\ntorque = "1 N*m"\n')
-    assert "give one or more of" in found["shaft_loads.carrier"]
-    assert "must not decrease" in found["shaft_loads.sun.over_time"]
-    assert "write it as constant" in found["shaft_loads.sun.proportional.speed"]
-    assert "found test_rig and shaft_loads" in found[""]
 
 
 def test_a_load_without_a_port_and_a_port_without_a_load_are_told_together() -> None:
@@ -212,11 +176,6 @@ def test_work_of_the_loads_is_the_kinetic_energy_gained() -> None:
     assert result.trace["drive.shaft.tau"][0] == 3.0
 
 
-def test_the_masters_of_loads_have_the_names_of_the_others() -> None:
-    cut = Loaded(Rotor(1.0), ShaftLoads({"shaft": ShaftLoad(constant=1.0)}), {"shaft": 1.0})
-    assert master("gs_mean", cut).order == 2 and master("jacobi", cut).order == 1
-
-
 @pytest.fixture(scope="module")
 def planetary() -> StageModel:
     spec = load_stage("planetary54")
@@ -245,11 +204,6 @@ def check(result: Result, ripple: float) -> None:
 
 def test_the_set_runs_under_its_torques_with_rigid_bodies(planetary: StageModel) -> None:
     check(run_once(short("rigid", 2e-3), Source(planetary)), ripple=4.0)  # the ring is oval at this level too
-
-
-@pytest.mark.full
-def test_the_set_runs_under_its_torques_at_level_fast(planetary: StageModel) -> None:
-    check(run_once(short("fast", 4e-3), Source(planetary)), ripple=4.0)
 
 
 def test_the_scene_of_the_page_loads_and_balances(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
-import fmpy
 import numpy as np
 import pytest
 
@@ -101,15 +100,6 @@ def test_angles_may_be_wrapped(unpacked, outputs):
     size = np.abs(straight).max(axis=0)
     print(dict(zip(outputs, np.abs(wrapped - straight).max(axis=0) / np.where(size > 0, size, 1), strict=True)))
     assert np.all(np.abs(wrapped - straight)[:, names] <= 1e-6 * size[names])
-
-
-def test_two_runtimes_agree_under_fmpys_own_master(native, python):
-    starts = {"pinion.phi": 2e-3, "pinion.w": 1.0}
-    runs = [
-        fmpy.simulate_fmu(str(fmu), stop_time=0.02, step_size=H, output_interval=H, start_values=starts)
-        for fmu in (native, python)
-    ]
-    assert runs[0].dtype == runs[1].dtype and runs[0].tobytes() == runs[1].tobytes()
 
 
 @pytest.mark.parametrize("order", [(0, 1), pytest.param((1, 0), marks=pytest.mark.full)])

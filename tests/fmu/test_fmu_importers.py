@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import read_model_description, simulate_fmu
+from test_fmu_equal import STEPS, H, fmu_run, inputs_at
 
 import gearfmu as gf
 from evidence.fmu_probes.probes import Subject
 
-STEPS, H = 200, 1e-4
 NAMES = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
-SPEED, RATIO = 200.0, 16 / 24  # rad/s; the wheel turns the other way
+HELD = {"pinion.phi": 2e-3, "pinion.w": 1.0}  # inputs
 
 
 @pytest.mark.needs("libcosimpy")
@@ -34,35 +34,33 @@ def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
     from libcosimpy.CosimSlave import CosimLocalSlave
 
     variables = {v.name: v.valueReference for v in read_model_description(unpacked).modelVariables}
-    names = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
     execution = CosimExecution.from_step_size(int(H * 1e9))
     slave = execution.add_local_slave(CosimLocalSlave(fmu_path=str(native), instance_name="stage"))
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     execution.add_observer(observer)
     execution.add_manipulator(manipulator)
-    values = [2e-3, 1.0]
-    manipulator.slave_real_values(slave, [variables["pinion.phi"], variables["pinion.w"]], values)
+    manipulator.slave_real_values(slave, [variables[name] for name in HELD], list(HELD.values()))
     rows = []
     for _ in range(STEPS):
         execution.step()
-        rows.append(observer.last_real_values(slave, [variables[name] for name in names]))
-    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values, strict=True)), names)
+        rows.append(observer.last_real_values(slave, [variables[name] for name in NAMES]))
+    expected = held_run(unpacked)
     scale = np.abs(expected).max(axis=0)
     assert (np.abs(np.array(rows) - expected) / scale).max() <= 1e-12
 
 
-def held_run(folder: str, inputs: dict[str, float], outputs: list[str]) -> np.ndarray:
-    """Outputs after each of STEPS steps with inputs that are set after the initialisation and then held."""
+def held_run(folder: str) -> np.ndarray:
+    """NAMES after each of STEPS steps with HELD, set after the initialisation."""
     subject = Subject(folder)
     by_name = {v.name: v.valueReference for v in subject.variables}
     subject.fmu.setupExperiment(startTime=0.0)
     subject.fmu.enterInitializationMode()
     subject.fmu.exitInitializationMode()
-    subject.fmu.setReal([by_name[name] for name in inputs], list(inputs.values()))
+    subject.fmu.setReal([by_name[name] for name in HELD], list(HELD.values()))
     rows = []
     for k in range(STEPS):
         subject.fmu.doStep(k * H, H)
-        rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
+        rows.append(subject.fmu.getReal([by_name[name] for name in NAMES]))
     subject.close()
     return np.array(rows)
 
@@ -88,13 +86,12 @@ print(json.dumps(rows))
 
 @pytest.mark.needs("ecospy")
 def test_ecos_gives_the_numbers_of_fmpy(native, unpacked):
-    inputs, names = {"pinion.phi": 2e-3, "pinion.w": 1.0}, ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
-    setting = json.dumps([str(native), STEPS, H, inputs, names])
+    setting = json.dumps([str(native), STEPS, H, HELD, NAMES])
     done = subprocess.run([sys.executable, "-c", ECOS, setting], capture_output=True, text=True)
     if "libtbb" in done.stderr:
         pytest.skip("needs the library libtbb: apt-get install libtbb12")
     assert done.returncode == 0, done.stderr[-2000:]
-    expected = held_run(unpacked, inputs, names)
+    expected = held_run(unpacked)
     rows = np.array(json.loads(done.stdout.splitlines()[-1]))
     assert (np.abs(rows - expected) / np.abs(expected).max(axis=0)).max() <= 1e-12
 
@@ -117,32 +114,6 @@ def test_a_container_makes_an_fmi_3_unit_with_the_same_bits(tmp_path):
         for f in ("pair.fmu", "pair3.fmu")
     )
     assert two["mesh.force"][-1] > 1000 and two.tobytes() == container.tobytes()
-
-
-def inputs_at(time: float) -> dict[str, float]:
-    """A loaded pair that turns."""
-    return {
-        "pinion.phi": 1e-3 + SPEED * time, "pinion.w": SPEED,
-        "wheel.phi": -SPEED * RATIO * time, "wheel.w": -SPEED * RATIO,
-    }  # fmt: skip
-
-
-def turning_run(folder: str) -> np.ndarray:
-    """Outputs NAMES at the times k H, k = 0 … STEPS, by calls of fmpy's binding alone."""
-    subject = Subject(folder)
-    by_name = {v.name: v.valueReference for v in subject.variables}
-    references = [by_name[name] for name in inputs_at(0)]
-    subject.fmu.setupExperiment(startTime=0.0)
-    subject.fmu.enterInitializationMode()
-    subject.fmu.setReal(references, list(inputs_at(0).values()))
-    subject.fmu.exitInitializationMode()
-    rows = [subject.fmu.getReal([by_name[name] for name in NAMES])]
-    for k in range(STEPS):
-        subject.fmu.setReal(references, list(inputs_at(k * H).values()))
-        subject.fmu.doStep(k * H, H)
-        rows.append(subject.fmu.getReal([by_name[name] for name in NAMES]))
-    subject.close()
-    return np.array(rows)
 
 
 def fmpy_command(_: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
@@ -196,12 +167,12 @@ def test_programs_give_the_numbers_of_fmpy(name, native, unpacked, tmp_path):
     with inputs.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["time", *inputs_at(0)])
-        writer.writerows([t, *inputs_at(t).values()] for t in (k * H for k in range(STEPS + 1)))
+        writer.writerows([k * H, *inputs_at(k).values()] for k in range(STEPS + 1))
     done = subprocess.run(command(program, native, inputs, out), capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="", dtype=float)
     columns = [next(c for c in table.dtype.names if c.strip('"').endswith(n)) for n in NAMES]
     found = np.array([np.interp(np.arange(STEPS + 1) * H, table[table.dtype.names[0]], table[c]) for c in columns]).T
-    expected = turning_run(unpacked)
+    expected = fmu_run(unpacked, NAMES)
     assert np.ptp(expected[:, 0]) > 100, "the run loads the teeth"
-    assert (np.abs(found - expected)[1:] / np.abs(expected).max(axis=0)).max() <= 1e-9
+    assert (np.abs(found[1:] - expected) / np.abs(expected).max(axis=0)).max() <= 1e-9

@@ -15,6 +15,8 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.femesh.imported import read_mesh
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
 
 MM = 1e-3
 KINDS = ("hexahedron20", "tetra10", "hexahedron")
@@ -157,19 +159,15 @@ def op4(path: Path, values: np.ndarray, sparse: bool, big: bool = False) -> Path
     return path
 
 
-def dmig(path: Path, values: np.ndarray, wide: bool) -> Path:
-    """Lower triangle by columns, as Nastran punches a symmetric DMIG."""
+def dmig(path: Path, values: np.ndarray, rows: np.ndarray, wide: bool = True) -> Path:
+    """Lower triangle by columns, as Nastran punches a symmetric DMIG; rows: node and component, from 1."""
     star, width = ("*", 16) if wide else ("", 8)
-    lines = [
-        f"{'DMIG' + star:<8}" + "".join(f"{v:<{width}}" for v in ("KAAX", "0", "6", "2"))
-        if not wide
-        else "DMIG    KAAX    0       6       2       0"
-    ]
-    for k, (node, component) in enumerate(NODES):
-        lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component + 1:<{width}}")
-        for j in range(k, 6):
-            value = f"{values[j, k]:.9E}".replace("E", "D") if wide else f"{values[j, k]:.4f}"
-            lines.append(f"{star or '+':<8}{NODES[j, 0]:<{width}}{NODES[j, 1] + 1:<{width}}{value:<{width}}")
+    lines = ["".join(f"{word:<8}" for word in ("DMIG", "KAAX", 0, 6, 2, *[0] * wide))]
+    for k, (node, component) in enumerate(rows):
+        lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component:<{width}}")
+        for (row, of), value in zip(rows[k:], values[k:, k], strict=True):
+            text = f"{value:.9E}".replace("E", "D") if wide else f"{value:.4f}"
+            lines += [f"{star or '+':<8}{row:<{width}}{of:<{width}}{text:<{width}}"] if value else []
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
     return path
 
@@ -206,7 +204,7 @@ def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None
 
 @pytest.mark.parametrize("wide", [True, False])
 def test_dmig_names_its_own_rows(tmp_path: Path, matrix: np.ndarray, wide: bool) -> None:
-    path = dmig(tmp_path / "k.pch", matrix, wide)
+    path = dmig(tmp_path / "k.pch", matrix, NODES + [0, 1], wide)
     assert np.allclose(
         read_matrix(path, None, LABELS).toarray(), in_mesh_order(matrix), rtol=0, atol=2e-8 if wide else 1e-4
     )
@@ -240,3 +238,44 @@ def test_rows_must_be_the_displacements_of_all_nodes(tmp_path: Path, matrix: np.
         read_matrix(tmp_path / "k.npy", NODES, np.array([7, 11, 12]))
     with pytest.raises(MeshError, match="6 rows, but `unknowns` names 5"):
         read_matrix(tmp_path / "k.npy", NODES[:5], LABELS)
+
+
+# ---- sets of nodes as interfaces -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "hexahedron"])
+def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) -> None:
+    """A bar pulled at averaging and rigid ends: the static stretch is F L / (E A), in between for the rigid ends."""
+    nodes, cells = brick(kind, (8, 2, 2))
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {kind: cells}, ends), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    stretch = {}
+    for coupling in ("averaging", "rigid"):
+        body = full_order(mesh, matrices, [SetInterface("LEFT", coupling), SetInterface("RIGHT", coupling)])
+        assert np.abs(body.stiffness @ body.rigid).max() < 1e-8 * np.abs(body.stiffness).max()
+        pull = body.rows("RIGHT")[[0]] - body.rows("LEFT")[[0]]
+        stretch[coupling] = float((pull @ Elastic(body.held(body.rows("LEFT"))).flexibility(pull.T.toarray()))[0, 0])
+    exact = 0.04 / (206e9 * 8e-5)
+    assert stretch["averaging"] == pytest.approx(exact, rel=1e-2)
+    assert 0.95 * exact < stretch["rigid"] < stretch["averaging"]
+
+
+def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+    nodes, cells = brick("hexahedron20")
+    edge = {"EDGE": np.flatnonzero((nodes[:, 1] == 0) & (nodes[:, 2] == 0))}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": cells}, edge), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    with pytest.raises(MeshError, match="'edge' lie in one line"):
+        full_order(mesh, matrices, [SetInterface("edge")])
+    with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
+        full_order(mesh, matrices, [SetInterface("edge", "welded")])
+
+
+def test_a_byte_order_mark_and_line_ends_change_no_deck(tmp_path: Path) -> None:
+    nodes, hexes = brick("hexahedron20")
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0)}
+    plain = write_deck(tmp_path / "a.inp", nodes, {"hexahedron20": hexes}, ends)
+    marked = tmp_path / "b.inp"
+    marked.write_bytes(plain.read_text(encoding="utf-8").replace("\n", "\r\n").encode("utf-8-sig"))
+    one, other = read_mesh(plain, MM), read_mesh(marked, MM)
+    assert np.array_equal(one.nodes, other.nodes) and np.array_equal(one.sets["LEFT"], other.sets["LEFT"])
+    assert all(np.array_equal(cells, other.elements[kind]) for kind, cells in one.elements.items())

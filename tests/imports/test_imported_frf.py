@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import scipy.sparse as sp
 from gears import hex20_deck, pinion, stage
 from scipy.spatial import cKDTree
 
-from gearfmu import cli
 from gearfmu.body.imported import imported_full_order
 from gearfmu.fem import solids
 from gearfmu.reduction.full_order import FullOrder
@@ -65,26 +63,3 @@ def test_the_same_full_model_whatever_the_road(tmp_path: Path, native: FullOrder
         own, other = getattr(body, name)[dofs][:, dofs], getattr(native, name)
         assert np.abs(own - other).max() < 1e-6 * np.abs(other).max(), name
     assert np.abs(body.rows()[:, dofs] - native.rows()).max() < 1e-6 * np.abs(native.rows("bore")).max()
-
-
-@pytest.mark.full
-def test_the_verb_takes_imported_bodies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    hex20_deck(tmp_path / "pinion.inp", whole=False)
-    stage(tmp_path, SECTION)
-    options = ["--methods", "rubin:120,modal:60", "--lines", "8", "--out", str(tmp_path / "out")]
-    code = cli.outcome(["frf", str(tmp_path), "pinion", *options])
-    said = capsys.readouterr()
-    assert code == 0, said.err
-    assert "48 inputs, held at its ground" in said.out
-    with open(tmp_path / "out" / "pinion_frf.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    worst = {m: max(float(row["error"]) for row in rows if row["method"] == m) for m in ("rubin", "modal")}
-    assert worst["rubin"] < 1e-4 < worst["modal"]
-
-
-def test_your_mesh_is_not_scaled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    hex20_deck(tmp_path / "pinion.inp", whole=False)
-    stage(tmp_path, SECTION)
-    code = cli.outcome(["frf", str(tmp_path), "pinion", "--scale", "0.5", "--out", str(tmp_path / "out")])
-    assert code == 1 and not (tmp_path / "out").exists()
-    assert "coarsen your mesh" in " ".join(capsys.readouterr().err.split())

@@ -11,11 +11,10 @@ import scipy.sparse as sp
 from decks import write_deck
 from gears import hex20_deck, pinion, stage, tetrahedra
 
-from gearfmu.body import Body, reduce_bodies, reduce_body
+from gearfmu.body import Body, reduce_body
 from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
-from gearfmu.stage import Steady, assemble, loaded_te, simulate
 from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
@@ -98,35 +97,6 @@ def test_tetrahedra_of_one_sector(tmp_path: Path, native: Body) -> None:
     assert body.flank.static[middle] == pytest.approx(native.flank.static[middle], rel=0.02)
 
 
-def test_hex8_is_raised_and_not_stiff(tmp_path: Path, native: Body) -> None:
-    """The corner nodes alone, as hex8: mid nodes come back on straight edges."""
-    corners = np.unique(pinion(whole=False).elements[:, :8])
-    new = np.full(len(pinion(whole=False).nodes), -1)
-    new[corners] = np.arange(len(corners))
-    write_deck(
-        tmp_path / "pinion.inp",
-        1e3 * pinion(whole=False).nodes[corners],
-        {"hexahedron": new[pinion(whole=False).elements[:, :8]]},
-    )
-    body = imported(tmp_path)
-    assert body.how.mesh["raised_to_quadratic"] == len(pinion(whole=False).elements)
-    assert np.abs(body.frequency[:30] / native.frequency[:30] - 1).max() < 0.02
-
-
-@pytest.mark.full
-def test_a_rigid_bore_moves_as_one_and_is_stiffer(tmp_path: Path, native: Body) -> None:
-    """RBE2 in the bore: the whole gear by the mean tooth; a turn of the bore needs no strain, teeth give way less."""
-    hex20_deck(tmp_path / "pinion.inp")
-    body = imported(tmp_path, SECTION + 'bore = "BORE"\nbore_coupling = "rigid"')
-    assert body.how.mesh["method"] == "mean tooth" and body.how.mesh["teeth_deviation"] < 1e-9
-    assert body.total_mass == pytest.approx(native.total_mass, rel=1e-9)
-    assert body.inertia == pytest.approx(native.inertia, rel=1e-6, abs=1e-9 * native.inertia[2, 2])
-    middle = (0, 0, 0, 4, 4, 0, 0)
-    assert 0.8 < body.flank.static[middle] / native.flank.static[middle] < 1.0
-    assert body.frequency[0] > native.frequency[0]
-    assert body.error.max_error < 0.01
-
-
 @lru_cache(maxsize=1)
 def keyway_cells() -> np.ndarray:
     """The whole pinion without the elements of a keyway: on the bore, one pitch wide."""
@@ -171,21 +141,3 @@ def test_the_hash_covers_the_contents_of_the_file(tmp_path: Path) -> None:
     assert expected_hash(spec, "pinion") != before
     moved = deck.rename(tmp_path / "other.inp")
     assert expected_hash(stage(tmp_path, SECTION.replace("pinion.inp", moved.name)), "pinion") != before
-
-
-def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path, native: Body) -> None:
-    """Transmission error, a few mesh periods in time, and nodal contact: as with the native body."""
-    hex20_deck(tmp_path / "pinion.inp")
-    spec, own = stage(tmp_path, SECTION), stage(tmp_path / "native")
-    bodies = reduce_bodies(spec)
-    models = [assemble(spec, bodies), assemble(own, [native, bodies[1]])]
-    results = [loaded_te(model, [302.0], 6, **{"effect.bearings": 0.0}).te for model in models]
-    assert np.abs(results[0] / results[1] - 1).max() < 1e-6
-    settings = {"level": 1, "effect.gyroscopic": 0}  # patterns of the imported body do not know how they whirl
-    runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, settings) for model in models]
-    assert np.abs(runs[0]["mesh.te"] - runs[1]["mesh.te"]).max() < 1e-6 * np.abs(runs[1]["mesh.te"]).max()
-    assert runs[0]["mesh.force"].mean() == pytest.approx(302.0 / 0.033829, rel=0.05)
-    settings |= {"level": 4, "contact": 2}
-    nodal = [simulate(model, Steady(model, 100.0, 302.0), 2e-4, 1e-5, settings) for model in models]
-    assert np.abs(nodal[0]["mesh.te"] - nodal[1]["mesh.te"]).max() < 1e-5 * np.abs(nodal[1]["mesh.te"]).max()
-    assert nodal[0]["mesh.pairs"].min() >= 1

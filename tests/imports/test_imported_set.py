@@ -15,16 +15,13 @@ from decks import write_deck
 
 from gearfmu import cli
 from gearfmu.body import reduce_body
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
-from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.reading.files import find_stage
@@ -87,33 +84,13 @@ def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready
     assert np.abs(body.rows() - native.rows()).max() < 1e-9
 
 
-def test_a_carrier_with_a_node_that_flies_away_is_refused(tmp_path: Path) -> None:
-    """Matrices without the stiffness of the elements at one corner: rigid motion needs no force, and more than that."""
-    carrier_deck(tmp_path)
-    mesh, _ = carrier_parts()
-    material = stage(tmp_path / "own").written.carrier.material
-    _, mass = hex20.assemble(mesh.nodes, mesh.elements, material)
-    lone = mesh.elements[np.bincount(mesh.elements.ravel())[mesh.elements] == 1][0]
-    solid = mesh.elements[~np.any(mesh.elements == lone, axis=1)]
-    assert len(solid) < len(mesh.elements)
-    for name, matrix in (("k", hex20.assemble(mesh.nodes, solid, material)[0]), ("m", mass)):
-        sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
-    section = CARRIER + 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
-    with pytest.raises(MeshError, match="singular beyond the six rigid motions|not of one free solid body"):
-        reduce_body(stage(tmp_path, section), "carrier")
-
-
-def test_an_imported_carrier_is_reduced_and_its_hash_covers_the_file(tmp_path: Path) -> None:
-    deck = carrier_deck(tmp_path)
-    spec, own = stage(tmp_path, CARRIER), stage(tmp_path / "own")
-    body, native = reduce_body(spec, "carrier"), reduce_body(own, "carrier")
-    assert body.how.hash == expected_hash(spec, "carrier") != native.how.hash
-    assert body.total_mass == pytest.approx(native.total_mass, rel=1e-9) and body.modes == native.modes
-    assert np.allclose(body.frequency[:30], native.frequency[:30], rtol=1e-7)
-    assert np.allclose(body.static, native.static, atol=1e-7 * np.abs(native.static).max())
-    assert body.how.mesh["elements"] == {"hexahedron20": len(carrier_parts()[0].elements)}
+def test_the_hash_of_an_imported_carrier_covers_the_file(tmp_path: Path) -> None:
+    deck, own = carrier_deck(tmp_path), stage(tmp_path / "own")
+    spec = stage(tmp_path, CARRIER)
+    hashes = [expected_hash(spec, "carrier"), expected_hash(own, "carrier")]
     deck.write_text(deck.read_text(encoding="utf-8") + "** edited\n", encoding="utf-8")
-    assert expected_hash(spec, "carrier") != body.how.hash and expected_hash(spec, "sun") == expected_hash(own, "sun")
+    assert len({*hashes, expected_hash(spec, "carrier")}) == 3
+    assert expected_hash(spec, "sun") == expected_hash(own, "sun")
 
 
 def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
@@ -156,24 +133,6 @@ def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> 
         assert np.abs(one - other).max() < 1e-7 * np.abs(other).max(), name
     grams = [b.sensors.rows @ b.sensors.rows.T for b in (body, native)]  # the members of a pair may turn
     assert np.abs(grams[0] - grams[1]).max() < 1e-6 * np.abs(grams[1]).max()
-
-
-@pytest.mark.full
-def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
-    """Before reduction, for every method: K with the springs, M and the inputs of our own; and its modes."""
-    own = stage(tmp_path / "own")
-    ring_deck(tmp_path, body_sector(own, "ring"))
-    spec = stage(tmp_path, RING)
-    body = imported_full_order(spec.by_file["ring"], spec.mounts)
-    native = ring_full_order(own.by_file["ring"], own.mounts, 1.0)
-    assert body.rigid.size == 0 and body.ground == () and body.length == native.length
-    assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
-    for name in ("stiffness", "mass"):
-        one, other = getattr(body, name), getattr(native, name)
-        assert np.abs(one - other).max() < 1e-6 * np.abs(other).max(), name
-    assert np.abs(body.rows() - native.rows()).max() < 1e-9
-    modes = [mounted_ring_modes(one, 6, scale=1.0).modes for one in (spec, own)]
-    assert np.allclose([m.frequency for m in modes[0]], [m.frequency for m in modes[1]], rtol=1e-7)
 
 
 def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> None:

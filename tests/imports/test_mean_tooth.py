@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from small_gear import GEAR, STEEL, coarse, flank
+from turned_rows import on_tooth
 
 from gearfmu.fem import patches, solids
 from gearfmu.fem.coupling import rigid_modes
@@ -99,15 +100,8 @@ def test_of_an_unequal_body_it_is_the_mean_of_the_transfer_matrices() -> None:
                 [(rows[j] * (s / squared / (squared - s))) @ rows[(j + offset) % GEAR.z].T for j in range(GEAR.z)],
                 axis=0,
             )
-            ours = static + (modes.flank_rows * (s / own / (own - s))) @ _on_tooth(modes, offset).T
+            ours = (
+                static
+                + (modes.flank_rows * (s / own / (own - s))) @ on_tooth(modes, modes.flank_rows, offset, GEAR.z).T
+            )
             assert np.abs(ours - exact).max() < 5e-3 * np.abs(statics.static_ff[:, :, 0]).max()
-
-
-def _on_tooth(modes, tooth: int) -> np.ndarray:
-    theta = 2 * np.pi * modes.nodal_diameter * tooth / GEAR.z
-    rows = modes.flank_rows.copy()
-    first, second = np.flatnonzero(modes.part == 1), np.flatnonzero(modes.part == 2)
-    a, b, c, s = modes.flank_rows[:, first], modes.flank_rows[:, second], np.cos(theta[first]), np.sin(theta[first])
-    rows[:, first], rows[:, second] = a * c - b * s, a * s + b * c
-    rows[:, modes.part == 0] *= np.cos(theta[modes.part == 0])
-    return rows

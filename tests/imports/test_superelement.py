@@ -16,12 +16,14 @@ import scipy.io
 import scipy.linalg as sl
 import scipy.sparse as sp
 from decks import brick, write_deck
-from test_formats import op4
+from test_formats import dmig, op4
 
-from gearfmu.body import Body
+from gearfmu.body import Body, reduce_body
 from gearfmu.body.whole import housing_order, reduced_housing
 from gearfmu.errors import MeshError
 from gearfmu.reduction.imported.housing import ImportedHousing
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.housing import HousingBody
 
 SIZE = (20.0, 16.0, 40.0)
@@ -74,19 +76,6 @@ def condensed() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     scale = np.concatenate([MM, MM, np.ones(len(own))])
     k, m = (1e-3 * np.outer(scale, scale) * (basis.T @ matrix @ basis) for matrix in (k, m))
     return k, m, sp.vstack([sensor.rows, skin]) @ basis * scale, np.array(rows)
-
-
-def dmig(path: Path, matrix: np.ndarray, rows: np.ndarray) -> None:
-    """One triangle in large fields, as Nastran punches it."""
-    lines = ["DMIG    KAAX    0       6       2       0"]
-    for k, (label, component) in enumerate(rows):
-        lines.append(f"{'DMIG*':<8}{'KAAX':<16}{label:<16}{component:<16}")
-        lines += [
-            f"{'*':<8}{rows[j][0]:<16}{rows[j][1]:<16}{matrix[j, k]:<16.9E}".replace("E", "D")
-            for j in range(k, len(rows))
-            if matrix[j, k]
-        ]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 def superelement(folder: Path, form: str = "mtx", **more: Any) -> HousingBody:
@@ -154,6 +143,42 @@ def test_it_is_the_body_of_its_finite_elements(tmp_path: Path, exact: Body, form
         size = np.sqrt(np.abs(np.diag(wanted)))
         assert np.abs((found - wanted)[:12] / np.outer(size, size)).max() < 1e-6, frequency
         assert np.abs((found - wanted)[12:] / size).max() < 1e-6 * np.abs(wanted[12:] / size).max(), frequency
+
+
+STAGE = """
+[bodies.housing]
+kind = "housing"
+
+[bodies.housing.reduced]
+file = "points.bdf"
+length = "1 mm"
+mass_unit = "1 t"
+unknowns = "rows.txt"
+stiffness = "k.mtx"
+mass = "m.mtx"
+recovery = "r.mtx"
+recovered = "seen.txt"
+seats = { a = 9001 }
+feet = { b = 9003 }
+sensors = { s = 4200 }
+
+[[supports]]
+name = "b"
+body = "housing"
+node = "b"
+radial = "1e8 N/m"
+"""
+
+
+def test_a_stage_file_names_it(tmp_path: Path, exact: Body) -> None:
+    """Read, expanded and reduced like any body of a stage."""
+    superelement(tmp_path)
+    text = find_stage("planetary54").read_text(encoding="utf-8")
+    text = text.replace("[ring.mounts]", '[ring.mounts]\nto = "housing"\nnode = "a"')
+    (tmp_path / "stage.toml").write_text(text + STAGE, encoding="utf-8")
+    body = reduce_body(load_stage(tmp_path), "housing")
+    assert body.frequency == pytest.approx(exact.frequency[: len(body.frequency)], rel=1e-6)
+    assert body.mass == pytest.approx(exact.mass, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -63,17 +63,6 @@ def test_quasi_static_mesh_cycle_of_a_set_is_that_of_a_run() -> None:
         assert run[f"{mesh}.te"][150:].mean() == pytest.approx(still.te.mean(), rel=0.01)
 
 
-def test_coast_flanks_are_named() -> None:
-    spec = load_stage("fzg_c")
-    model = assemble(spec, load_bodies(spec))
-    drive, coast = (flank_loads(model, torque, "mesh", positions=6) for torque in (100.0, -100.0))
-    assert (drive.side, coast.side) == (1, -1)
-    wanted = 100.0 / mesh_shape(model.stage, model.stage.engagements[0]).gears[0].r_b
-    for own in (drive, coast):
-        total = [own.force[own.at == i].sum() for i in range(6)]
-        assert total == pytest.approx([wanted] * 6, rel=6e-3)
-
-
 def test_line_load_over_the_path_adds_up_to_the_mesh_force() -> None:
     """Over a whole engagement every roll is passed once: the mean of the sum over pairs is the integral of the line
     load over roll and width, divided by the base pitch."""

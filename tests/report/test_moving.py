@@ -79,16 +79,6 @@ def test_loaded_teeth_stand_where_the_flanks_of_both_gears_meet(view: View) -> N
         assert abs(spots[0] - spots[1]) < 2e-6
 
 
-def test_a_pair_at_rest_has_the_contacts_of_the_picture() -> None:
-    trace, stage, bodies = turning_pair(-1.0)
-    found = moving_view(trace, stage, bodies, (0.0, 0.02))
-    assert found is not None and np.all(found.bodies[0].contacts["mesh"][2] <= 0)
-    pair = mesh_shape(stage, stage.engagements[0])
-    assert isinstance(pair, PairGeometry)
-    angles = meshing_angles(pair, 0.1, 1)
-    assert [c.teeth for c in contacts_at(pair, angles, 1)] == [c.teeth for c in contacts_at(pair, list(angles), 1)]
-
-
 def test_without_angles_or_load_there_is_no_view() -> None:
     trace, stage, bodies = turning_pair()
     still = Trace(TIME, {"mesh.force": trace.channels["mesh.force"]}, {})

@@ -12,10 +12,14 @@ import numpy as np
 import pytest
 
 from gearfmu import report
+from gearfmu.body import load_bodies
+from gearfmu.commands.runs import finish
+from gearfmu.report import levels
 from gearfmu.report.plots import distinct
 from gearfmu.report.results import key_results, strict
 from gearfmu.report.signals import lock_time, spans, window_of_interest
-from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace, write_columns
+from gearfmu.stagefile.stage import load_stage
 
 STEP, SAMPLES = 1e-4, 3000
 AXIAL = {"fz": "N", "mx": "N.m", "my": "N.m"}
@@ -128,14 +132,6 @@ def test_every_plot_has_its_data(folder: Path) -> None:
     assert [float(r[1]) for r in rows[1:]] == coupled_run()["mesh.force"].tolist()
 
 
-def test_spectrum_data_hold_the_mesh_order(folder: Path) -> None:
-    data = np.genfromtxt(folder / "data" / "spectrum.csv", delimiter=",", names=True, deletechars="")
-    names = data.dtype.names
-    peak = np.argmax(data[names[-2]])
-    assert names[-2].startswith("mesh.force") and data[names[0]][peak] == pytest.approx(16 * 200 / (2 * np.pi), abs=10)
-    assert data[names[-2]][peak] == pytest.approx(200 / np.sqrt(2), rel=0.16)
-
-
 def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing_where_not(
     folder: Path, tmp_path: Path
 ) -> None:
@@ -144,13 +140,6 @@ def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing
     steady = (folder / "report.html").read_text(encoding="utf-8")
     assert "Dotted: mesh orders" in steady and "Mesh orders are not marked" not in steady
     assert "Mesh orders are not marked" in unsteady and "Dotted: mesh orders" not in unsteady
-
-
-def test_order_data_are_the_amplitudes(folder: Path) -> None:
-    data = np.genfromtxt(folder / "data" / "orders.csv", delimiter=",", names=True, deletechars="")
-    late = data["time_[s]"] > 0.15
-    assert np.allclose(data["mesh.force_order_1_rms_[N]"][late], 200 / np.sqrt(2), rtol=2e-3)
-    assert np.allclose(data["mesh.force_order_2_rms_[N]"][late], 50 / np.sqrt(2), rtol=2e-2)
 
 
 def test_summary_is_strict_json_with_results(folder: Path) -> None:
@@ -284,12 +273,6 @@ def test_coarse_sampling_warns_where_spectra_are_read(tmp_path: Path) -> None:
     assert '<p class="warning">Sampled every 100 µs' in coarse and '<p class="warning">' not in fine
 
 
-def test_step_means_stand_for_samples_in_spectra(tmp_path: Path) -> None:
-    report.write(force_at(2e-5), {}, tmp_path)
-    header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
-    assert "mesh.force_mean_rms_[N]" in header and "mesh.force_rms_[N]" not in header
-
-
 def test_a_signal_seen_twice_is_drawn_once() -> None:
     t = np.arange(4.0)
     trace = Trace(t, {"a.w": Channel(t, "rad/s"), "b.w": Channel(t.copy(), "rad/s"), "c.w": Channel(-t, "rad/s")}, {})
@@ -305,3 +288,39 @@ def test_a_mesh_frequency_above_the_sampling_limit_is_said_instead_of_drawn(tmp_
     assert "its mesh frequency, 3733 Hz and more, lies above 0.45 of the sampling rate, 2250 Hz" in page
     assert "communication step of 24 µs" in page and "Mesh orders are not marked" in page
     assert not (tmp_path / "data" / "orders.csv").exists()
+
+
+def test_a_run_says_where_its_time_went(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    meta = {"scene": "a", "outcome": "ok", "simulated_s": 0.1, "cpu_s": 2.0, "realtime_factor": 20.0}
+    trace = Trace(np.arange(3.0), {"x.w": Channel(np.ones(3), "rad/s")}, meta)
+    assert finish(trace, tmp_path, None, prepared=1.5) == 0
+    assert "CPU time: model, FMU and start 1.5 s, simulation 2 s, report " in capsys.readouterr().out
+
+
+# ---- the price list: read back as written, shown only with the bodies it was measured with ---------------------------
+ROW = ("pair_loaded", "fast", 28, 5, 6.7, 0.0123, 0.04, 0.05, -0.001, 0.15)
+
+
+def write_list(path: Path, bodies: str) -> None:
+    write_columns(path, {name: np.array([value]) for name, value in zip(levels.COLUMNS, (*ROW, bodies), strict=True)})
+
+
+def test_list_reads_back(tmp_path: Path) -> None:
+    write_list(tmp_path / "l.csv", "ab+cd")
+    assert levels.read_levels(tmp_path / "l.csv") == [dict(zip(levels.COLUMNS, (*ROW, "ab+cd"), strict=True))]
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    assert levels.read_levels(tmp_path / "other.csv") == [] == levels.read_levels(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_shown_only_with_its_bodies(tmp_path: Path, fresh: bool) -> None:
+    shipped = load_stage("fzg_c/stage_relief")
+    bodies = load_bodies(shipped)
+    spec = shipped.model_copy(update={"source": tmp_path / "stage.toml"})
+    made_with = levels.fingerprint(body.how.hash for body in bodies) if fresh else "0+0"
+    write_list(levels.levels_path(spec), made_with)
+    t = np.arange(50) * 1e-4
+    trace = Trace(t, {"mesh.force": Channel(np.sin(t), "N")}, {})
+    page = report.write(trace, {"level": "fast"}, tmp_path / "out", spec, bodies).read_text(encoding="utf-8")
+    assert ("pair_loaded, fast ←" in page and "1.2 %" in page) == fresh
+    assert ("has not been measured" in page) != fresh

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,7 @@ from gearfmu import report
 from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart
 from gearfmu.report.heading import of_set, phasing, planet_phases
-from gearfmu.report.metrics import Spectrum, band_rms
-from gearfmu.report.planets import LEAST_SPAN, planets, shares, sharing
+from gearfmu.report.planets import LEAST_SPAN, planets, sharing
 from gearfmu.report.run import Run
 from gearfmu.report.signals import Window, known_meshings, planet_set
 from gearfmu.stage.run.trace import Channel, Trace
@@ -23,9 +21,6 @@ from gearfmu.stagefile.stage import load_stage
 STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
 MESH = 54 * CARRIER / (2 * np.pi)  # Hz
 SHARES = (1.1, 0.9, 1.05, 0.95)
-FIGURES = (
-    "set_speed", "torque", "set_force", "set_force_detail", "planets", "sharing", "pin", "bearing", "energy", "spectrum"
-)  # fmt: skip
 
 
 def set_run() -> Trace:
@@ -56,36 +51,6 @@ def set_run() -> Trace:
     return Trace(t, channels, {"scene": "set", "stage": "set", "outcome": "ok", "settle": 0.02, "meshes": meshes})
 
 
-def test_a_set_shows_its_planets_side_by_side(tmp_path: Path) -> None:
-    trace = set_run()
-    report.write(trace, trace.meta, tmp_path)
-    assert sorted(p.stem for p in (tmp_path / "data").glob("*.csv")) == sorted(FIGURES)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    table = text[text.index("<h2>Planets") :]
-    cells = dict(re.findall(r"<tr><td>([\w –]+)</td>(.*?)</tr>", table))
-    rows = {mesh: re.findall(r">([^<]+)</td>", numbers) for mesh, numbers in cells.items() if " – planet" in mesh}
-    assert len(rows) == 8
-    for mesh, share in (("ring – planet 3", 1.05), ("sun – planet 2", -0.9)):
-        wanted = [1e3 * share, 35.355, abs(share), 10 * share, 0.35355, 1e3 * abs(share)]
-        assert [float(cell) for cell in rows[mesh]] == pytest.approx(wanted, rel=1e-3), mesh
-    assert "Deformed" not in text and "planet4.gear.w" in text
-
-
-def test_a_set_begins_with_its_operating_point_and_key_numbers(tmp_path: Path) -> None:
-    trace = set_run()
-    report.write(trace, trace.meta, tmp_path)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert re.search(r"<h1>set, 600 N·m, 812 rpm<", text), "stage, torque and speed of the input"
-    table = text[text.index("<h2>Key numbers") : text.index("<h2>Planets")]
-    found = dict(re.findall(r"<tr><td>([^<]+)</td><td>([^<]+)</td></tr>", table))
-    assert found["Torques, mean"] == "sun −150 N·m, carrier 600 N·m"
-    assert found["Speeds, mean"] == "sun 3247 rpm, carrier 811.7 rpm"
-    assert found["Ratio, speed of the sun over that of the carrier"] == "4"
-    assert float(found["Mesh frequency"].split()[0]) == pytest.approx(MESH, rel=1e-3)
-    assert found["K_γ at the sun, largest mean share"] == "1.100 (sun – planet 1)"
-    assert float(found["Dynamic factor, largest"].split()[0]) == pytest.approx(1 + 0.05 / 0.9, rel=1e-2)
-
-
 def test_forces_that_cancel_are_no_result(tmp_path: Path) -> None:
     """A ring whose forces cancel to 1e-6 of the mesh force has no chart, no level and no tile."""
     trace = set_run()
@@ -96,18 +61,6 @@ def test_forces_that_cancel_are_no_result(tmp_path: Path) -> None:
     assert "alternating bearing force" not in text and not (tmp_path / "data" / "bearing.csv").exists()
     header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
     assert "bearing.ring" not in header and "sun_planet1" in header
-
-
-def test_shares_are_means_over_a_mesh_period_and_of_the_window() -> None:
-    trace = set_run()
-    own = planet_set(trace, known_meshings(trace))
-    assert own is not None and own.planets == ["planet1", "planet2", "planet3", "planet4"] and own.carrier == "carrier"
-    over_time, means = shares(trace, own, Window(0.02, 0.2, "here"))
-    for k, share in enumerate(SHARES):
-        assert means[f"sun_planet{k + 1}"] == pytest.approx(share, rel=1e-3)
-        inner = over_time[f"ring_planet{k + 1}"]
-        assert np.isnan(inner[0]) and np.isnan(inner[-1])
-        assert np.nanmax(np.abs(inner - share)) < 2e-3, "the ripple of ±5 % is averaged out"
 
 
 def test_shares_that_differ_by_rounding_are_a_line() -> None:
@@ -121,18 +74,6 @@ def test_shares_that_differ_by_rounding_are_a_line() -> None:
         assert isinstance(plot.picture, Chart)
         limits = [panel.limits or (0.0, 0.0) for panel in plot.picture.panels if "share" in panel.label]
         assert limits and all(high - low == pytest.approx(LEAST_SPAN) for low, high in limits)
-
-
-def test_spectrum_of_the_ring_is_that_of_its_force_as_recorded() -> None:
-    """The kernel gives forces on the ground along fixed axes: a force at f_m is one at f_m, and stays it."""
-    trace = set_run()
-    own = planet_set(trace, known_meshings(trace))
-    assert own is not None
-    plot = plots_nvh.spectra_by_central(trace, own, Window(0.0, 0.2, "here"))
-    assert f"f_m = {MESH:.1f} Hz" in plot.caption and f"f_c = {CARRIER / 2 / np.pi:.2f} Hz" in plot.caption
-    lines = Spectrum(plot.columns["frequency_[Hz]"], plot.columns["bearing.ring.fx_rms_[N]"], 1)
-    middle, low, high = (band_rms(lines, MESH + side * 13.53 - 6.0, MESH + side * 13.53 + 6.0) for side in (0, -1, 1))
-    assert middle == pytest.approx(100 / np.sqrt(2), rel=0.1) and low < 0.3 * middle and high < 0.3 * middle
 
 
 def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:

@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 import gearfmu as gf
-from gearfmu.report.te import peak_to_peak, write_plot
+from gearfmu.report.te import peak_to_peak, write_flanks, write_plot
 from gearfmu.stage import loaded_te
+from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stage.run.te import TeResult
+from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.bodies import LeadSpec, ProfileSpec
 
 POSITION = np.arange(16) / 16
 TORQUE = np.array([50.0, 200.0])
@@ -59,3 +64,26 @@ def test_a_torque_without_equilibrium_is_a_row_with_its_reason() -> None:
     alike, sharing = np.ones((2, 16)), np.ones((2, 16, 2, 3))
     rows = of_set(alike, sharing, ("", "no static equilibrium")).rows
     assert rows[-1] == ("200.0 N·m", "no static equilibrium") and len(rows) == 1 + 2 + 1
+
+
+# ---- flanks: drawn where they are not nominal, and of what was said --------------------------------------------------
+def test_only_flanks_that_are_not_nominal_are_drawn(tmp_path: Path) -> None:
+    for name, drawn in (("fzg_c", False), ("fzg_c/stage_relief", True)):
+        path = tmp_path / f"{drawn}.png"
+        assert write_flanks(load_stage(name), path) is drawn and path.exists() is drawn
+
+
+def test_what_is_drawn_is_everything_that_is_said() -> None:
+    """Tip relief of 15 µm to the tip circle, profile slope 4 µm and lead crowning 5 µm at the corners of a flank."""
+    spec = load_stage("fzg_c/stage_relief")
+    more = {"profile": ProfileSpec(slope=4e-6), "lead": LeadSpec(crowning=5e-6)}
+    pinion = spec.written.gears[0].model_copy(update=more)
+    stage = rewritten(spec, gears=(pinion, spec.written.gears[1]))
+    gear = stage.gears[0]
+    field = FlankField(gear, shape := gear_shape(gear))
+    material = field.whole(np.array([-0.5, 0.0, 0.5]) * gear.face_width)
+    start = float(pinion.tip_relief.start_roll)
+    relief = 15e-6 * ((shape.s_tip - start) / (shape.s_a - start)) ** 2
+    assert material.shape == (1, 2, 3, field.rolls.size)
+    assert material[0, 0, :, 0] == pytest.approx([-7e-6, -2e-6, -7e-6])
+    assert material[0, 1, :, -1] == pytest.approx([-3e-6 - relief, 2e-6 - relief, -3e-6 - relief])

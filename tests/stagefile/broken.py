@@ -1,7 +1,8 @@
-"""Stage, scene and body files with a fault each, and the messages that they were refused with.
+"""Stage, scene and body files with a fault each, and the messages that they were refused with: broken.json.
 
-`PYTHONPATH=.:tests/stagefile python tests/stagefile/broken.py` writes the messages anew into broken.json: for
-a message that was changed on purpose.
+A case is the name of a shipped file and what is changed in it: "what stands there => what is written instead", several
+changes apart by ";;". `PYTHONPATH=.:tests/stagefile python tests/stagefile/broken.py` writes the messages anew: for a
+case that was added with an empty list, or a message that was changed on purpose.
 """
 
 from __future__ import annotations
@@ -19,144 +20,13 @@ from gearfmu.body import load_bodies
 from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.errors import GearfmuError
 from gearfmu.files import seal
-from gearfmu.scenefile.scene import load_scene
-from gearfmu.scenes import __file__ as scenes
+from gearfmu.scenefile.scene import SHIPPED, load_scene, shipped_scenes
 from gearfmu.stage import assemble
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
 STORED = Path(__file__).with_suffix(".json")
 Change = tuple[str, str]  # what stands there, what is written instead
-
-# Changes of one stage file, separated by ";;"; "=>" between what stands there and what is written instead.
-STAGES = {
-    "fzg_c": r"""
-kind = "external_pair" => kind = "bevel_pair"
-kind = "external_pair" => kind = 3
-name = "fzg_c" => name = "fzg c"
-name = "fzg_c" => source = "here"\nname = "fzg_c"
-torque_max = "600 N*m" => torque_max = "600 Nm m"
-torque_max = "600 N*m" => torque_max = 600
-torque_max = "600 N*m" => torque_max = "9000 N*m"
-speed_max = "6000 rpm" => speed_mx = "6000 rpm"
-center_distance = "91.5 mm" => center_distance = "70 mm"
-center_distance = "91.5 mm" => center_distance = "96 mm"
-center_distance = "91.5 mm" => center_distance = "91.5 mm"\nhelix_angle = "50 deg"
-center_distance = "91.5 mm" => center_distance = "91.5 mm"\nhelix_angle = "15 deg"
-backlash = "0.10 mm" => backlash = "-0.10 mm"
-teeth = 16 => teeth = 16.5
-teeth = 16 => teeth = 4
-profile_shift = 0.1817 => profile_shift = -0.9
-tip_diameter = "82.46 mm" => tip_diameter = "95 mm"
-tip_diameter = "82.46 mm" => tip_diameter = "66 mm"
-bore_diameter = "30 mm" => bore_diameter = "58 mm"
-fillet_radius = 0.38 => fillet_radius = 0.9
-strip_half_width = "0.55 mm" => strip_half_width = "0.1 mm"
-stiffness = "3e8 N/m" => stiffness = "soft"
-[gears.pinion.rack] => [gears.pinion.tip_relief]\namount = "20 um"\nstart_roll = "90 mm"\n[gears.pinion.rack]
-[gears.pinion.rack] => [gears.pinion.tip_relief]\namount = "900 um"\nstart_roll = "9 mm"\n[gears.pinion.rack]
-[gears.pinion.rack] => [gears.pinion.index_deviation]\n16 = "3 um"\n[gears.pinion.rack]
-[gears.pinion.rack] => [gears.pinion.import]\nfile = "none.inp"\n[gears.pinion.rack]
-[gears.wheel] => [gears.third]
-[gears.wheel.material] => [gears.wheel.materials]
-slices = 5 => slices = 0
-[ports.wheel] => [ports.wheels]
-fast_cut = "80 kHz" => fast_cut = "130 kHz"
-teeth = 16 => topography = "none.csv"\nteeth = 16
-teeth = 16 => teeth = 15.5 ;; distance = "91.5 mm" => distance = "70 mm" ;; [ports.wheel] => [ports.wheels]
-""",
-    "planetary54": r"""
-planets = 4 => planets = 5
-planets = 4 => planets = 6
-planets = 4 => planets = 4\npositions = [0, 18, 36]
-planets = 4 => planets = 4\nhelix_angle = "36 deg"
-# pin_errors = { 0 = => pin_errors = { 4 =
-center_distance = "45 mm" => center_distance = "30 mm"
-center_distance = "45 mm" => center_distance = "44.6 mm"
-load_sharing = 1.35 => load_sharing = 0.5
-"131 mm" => "130 mm"
-"131 mm" => "124 mm"
-"160 mm" => "143 mm"
-fillet_radius = 0.3  => fillet_radius = 0.5 
-points = 6  => points = 55 
-bolt_diameter = "16 mm" => bolt_diameter = "22 mm"
-bolt3 = "rigid" => bolt4 = "rigid"
-method = "krylov" => method = "lanczos"
-bore_diameter = "40 mm" => bore_diameter = "80 mm"
-start_roll = "9.1 mm" => start_roll = "29.1 mm"
-torque_max = "600 N*m" => torque_max = "60000 N*m"
-[sun.bearing] => [sun.bearings]
-speed_max = "300 rad/s" => # none
-[ring.mounts] => [ring.other]
-[carrier.bearing] => [carrier.other]
-[ports.sun] => [ports.moon]
-axial = "1e8 N/m" => # none ;; [ports.sun] => [ports.ring] ;; speed_max = "300 rad/s" => # none
-teeth = 18  => topography = "none.csv"\nteeth = 18 
-[planet.rack] => [planet.import]\nfile = "none.inp"\n[planet.rack]
-""",
-    "two_stage": r"""
-gears = ["pinion1", "wheel1"] => gears = ["pinion1", "whel1"]
-gears = ["pinion2", "wheel2"] => gears = ["pinion2", "wheel1"]
-at = "170 mm" => at = "190 mm"
-torsion = "rigid" => #
-pinion2 = "90 mm",  => 
-pinion2 = "90 mm",  => pinion2 = "80 mm", 
-axis = ["103 mm", "0 mm"] => axis = ["98 mm", "0 mm"]
-axis = ["103 mm", "0 mm"] => axis = ["60 mm", "0 mm"]
-torque_max = "300 N*m" => torque_max = "3000 N*m"
-name = "input_left" => name = "input_right"
-normal_module = "3.0 mm" => normal_module = "2.75 mm"
-helix_angle = "-20 deg" => helix_angle = "20 deg"
-to = "input_shaft" => to = "output_shaft"
-kind = "gear" => kind = "gera"
-kind = "shaft" => kind = "carrier"
-bore_diameter = "12 mm" => bore_diameter = "35 mm"
-[bodies.pinion1.material] => [bodies.pinion1.bearing]\nstiffness = "1e8 N/m"\n\n[bodies.pinion1.material]
-[ports.input] => [ports.input]\nnode = 3
-axis = ["0 mm", "0 mm"] => axis = ["0 mm", "0 mm"]\ncarried_by = "output"
-radial = "2.5e8 N/m"\naxial = "2e8 N/m"\ntilt = "1e4 N*m/rad" => #
-start_roll = "outer_single_contact" => start_roll = "outer"
-teeth = 25 => topography = "none.csv"\nteeth = 25
-[bodies.wheel2.material] => [bodies.wheel2.import]\nfile = "none.inp"\n[bodies.wheel2.material]
-""",
-}
-SCENES = {
-    "pair_loaded": r"""
-duration = "0.15 s" => duration = "0.15 m"
-settle = "0.05 s" => settle = "0.5 s"
-level = "standard" => level = "best"
-slices = 5 => slices = 50
-name = "fzg_c/stage_relief" => name = "fzg"
-master = "gs_mean" => master = "gauss"
-step = "20 us" => step = "7 us"
-pinion_speed = "2000 rpm" => slip = "20 rad/s"
-torque = "302 N*m" => torqe = "302 N*m"
-[test_rig] => [rig]
-[test_rig] => [passenger_car]\n[test_rig]
-[test_rig] => [deformation]\ngears = ["moon"]\n[test_rig]
-""",
-    "clutch_closure": r"""
-capacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]] => capacity = [["50 ms", "0 N*m"], ["0 s", "250 N*m"]]
-slip = "52 rad/s" => wheel_speed = "52 rad/s"
-""",
-    "planetary_paper": r"""
-[shaft_loads.sun] => [shaft_loads.moon]
-[shaft_loads.carrier] => [shaft_loads.planet]
-name = "planetary54" => name = "fzg_c"
-name = "planetary54" => name = "two_stage"
-gears = ["ring"] => gears = []
-times = ["33 ms", "66 ms", "0.1 s"] => times = ["33 ms", "0.2 s"]
-constant = "600 N*m" => constants = "600 N*m"
-""",
-    "train_runup": r"""
-[drivetrain.ports.input] => [drivetrain.ports.entry]
-on = "machine" => on = "engine"
-name = "two_stage" => name = "fzg_c"
-name = "two_stage" => name = "planetary54"
-inertia = "0.5 kg*m^2" => inertia = "0 kg*m^2"
-input_speed = "1800 rpm" => clutch_speed = "1800 rpm"
-""",
-}
 
 
 def _read(change: str) -> list[Change]:
@@ -172,15 +42,18 @@ def _changed(text: str, changes: list[Change]) -> str:
 
 
 def _stage(name: str, changes: list[Change], folder: Path) -> None:
-    path = folder / "stage.toml"
-    path.write_text(_changed(find_stage(name).read_text(encoding="utf-8"), changes), encoding="utf-8")
+    path, shipped = folder / "stage.toml", find_stage(name)
+    text = shipped.read_text(encoding="utf-8").replace('base = "', f'base = "{shipped.parent.as_posix()}/')
+    for deck in shipped.parent.glob("*.inp"):
+        (folder / deck.name).symlink_to(deck)
+    path.write_text(_changed(text, changes), encoding="utf-8")
     stage = load_stage(path)
     assemble(stage, load_bodies(load_stage(name)))
 
 
 def _scene(name: str, changes: list[Change], folder: Path) -> None:
     path = folder / "scene.toml"
-    text = (Path(scenes).parent / f"{name}.toml").read_text(encoding="utf-8")
+    text = (SHIPPED / f"{name}.toml").read_text(encoding="utf-8")
     path.write_text(_changed(text, changes), encoding="utf-8")
     scene = load_scene(path)
     in_drivetrain(scene, load_stage(scene.stage.name))
@@ -230,24 +103,26 @@ SPOILT: dict[str, Callable[[Path], None]] = {
     "lost dataset": _edited(lambda file: file.__delitem__(_first_dataset(file))),
     "other numbers": _replaced('density = "7850 kg/m^3"', 'density = "7800 kg/m^3"'),
 }
-BODIES = {"fzg_c": "pinion.h5", "planetary54": "carrier.h5", "two_stage": "wheel2.h5"}
 
 
-def cases() -> dict[str, Callable[[Path], None]]:
-    """What is done in an empty folder and refused, by its name."""
-    found: dict[str, Callable[[Path], None]] = {}
-    for read, texts in ((_stage, STAGES), (_scene, SCENES)):
-        for name, text in texts.items():
-            found |= {f"{name}: {line}": partial(read, name, _read(line)) for line in text.strip("\n").splitlines()}
-    for name, file in BODIES.items():
-        found |= {f"{name}/{file}: {how}": partial(_spoilt, file, spoil, name) for how, spoil in SPOILT.items()}
-    return found
+def stored() -> dict[str, list[str]]:
+    """Lines of the message by the name of the case."""
+    return json.loads(STORED.read_text(encoding="utf-8"))
 
 
-def message(case: Callable[[Path], None], folder: Path) -> list[str]:
+def case(name: str) -> Callable[[Path], None]:
+    """What is done in an empty folder and refused."""
+    file, _, change = name.partition(": ")
+    if file.endswith(".h5"):
+        stage, _, body = file.partition("/")
+        return partial(_spoilt, body, SPOILT[change], stage)
+    return partial(_scene if file in shipped_scenes() else _stage, file, _read(change))
+
+
+def message(name: str, folder: Path) -> list[str]:
     """The lines that it is refused with, the folder left away; none where it is not refused."""
     try:
-        case(folder)
+        case(name)(folder)
     except GearfmuError as error:
         said = f"{type(error).__name__}: {error}".replace(str(folder), "…")
         shipped = str(find_stage("fzg_c").parents[1])
@@ -256,8 +131,8 @@ def message(case: Callable[[Path], None], folder: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    stored = {}
-    for case_name, todo in cases().items():
+    messages = {}
+    for case_name in stored():
         with tempfile.TemporaryDirectory() as temporary:
-            stored[case_name] = message(todo, Path(temporary))
-    STORED.write_text(json.dumps(stored, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            messages[case_name] = message(case_name, Path(temporary))
+    STORED.write_text(json.dumps(messages, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

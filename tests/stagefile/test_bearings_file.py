@@ -25,35 +25,6 @@ def problems(folder: Path, like: str, *changes: tuple[str, str]) -> dict[str, st
     return {problem.field: problem.remedy for problem in refused(folder, text, *changes)}
 
 
-@pytest.mark.parametrize(
-    ("like", "change", "field", "says"),
-    [
-        (TRAIN, ('bearing = "6306"', 'bearing = "6307x"'), "supports.input_left.bearing", "there are 6210, 6306"),
-        (TRAIN, ('bearing = "6306"', 'bearing = "6306"\nradial = "1e8 N/m"'), "supports.input_left.radial", "away"),
-        (TRAIN, ('bearing = "6306"', 'bearing = "6306"\ncarries = "+z"'), "supports.input_left.carries", "away"),
-        (TRAIN, ('[operating]\ntorque = "100 N*m"', ""), "operating.torque", 'write torque = "100 N*m"'),
-        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\ncontact_angle = "9°"'), "supports.input_left.carries", "z"),
-        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\npreload = "300 N"'), "supports.input_left.carries", "pre"),
-        (TRAIN, ('outside = "72 mm"', 'outside = "28 mm"'), "bearings.6306", "larger than the bore"),
-        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nballs = 14'), "bearings.6306", "fewer"),
-        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nball_diameter = "25 mm"'), "bearings.6306", "smaller"),
-        (TRAIN, ('outside = "72 mm"', 'outside = "72 mm"\nclearence = "1 um"'), "bearings.6306.clearence", "clearance"),
-        (TRAIN, ('clearance = "10 um"', 'clearance = "10 mm"'), "bearings.6306.clearance", "out of range"),
-        (TRAIN, ('kind = "ball"', 'kind = "bal"'), "bearings.6306", "ball"),
-        (TRAIN, ('width = "16 mm"', 'width = "16 mm"\npreload = "9 N"'), "bearings.NU206", "negative clearance"),
-        (TRAIN, ('width = "16 mm"\n', ""), "bearings.NU206", 'width = "20 mm"'),
-        (TRAIN, ('bearing = "6306"', 'axial = "1e8 N/m"\nspan = "2 mm"'), "supports.input_left.span", "name one"),
-        (PAIR, ('rolling = "7305"', 'rolling = "7306"'), "gears.pinion.bearing.rolling", "write [bearings.7306]"),
-        (PAIR, ('span = "70 mm"', ""), "gears.pinion.bearing.carries", "has a contact angle"),
-        (PAIR, ('rolling = "7305"', 'rolling = "7305"\nspann = "1 mm"'), "gears.pinion.bearing.spann", "span"),
-        (PAIR, ('contact_angle = "30 deg"', 'contact_angle = "70 deg"'), "bearings.7305.contact_angle", "60 deg"),
-    ],
-)  # fmt: skip
-def test_what_is_wrong_is_refused(tmp_path: Path, like: str, change: tuple[str, str], field: str, says: str) -> None:
-    found = problems(tmp_path, like, change)
-    assert field in found and says in found[field], found
-
-
 def test_all_is_said_at_once(tmp_path: Path) -> None:
     found = problems(
         tmp_path,
@@ -79,13 +50,6 @@ def test_a_copy_and_a_stored_stage_say_the_same(tmp_path: Path, like: str) -> No
     own = load_stage(like)
     assert {field for field, *_ in differences(own, load_stage(new_stage("mine", like, tmp_path)))} == {"name"}
     assert not differences(own, restored(stored(own.written), own.source))
-
-
-@pytest.mark.parametrize("name", ["fzg_c", "two_stage"])
-def test_a_file_without_them_is_stored_as_ever(name: str) -> None:
-    tables = stored(load_stage(name).written)
-    assert not {"bearings", "operating"} & set(tables)
-    assert not any({"bearing", "span", "carries"} & set(support) for support in tables.get("supports", []))
 
 
 def test_directions_of_rolling_bearings_count(tmp_path: Path) -> None:

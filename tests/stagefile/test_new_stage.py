@@ -17,7 +17,7 @@ from gearfmu.stagefile.schema import general_schema, stage_schema
 from gearfmu.stagefile.stage import load_stage
 
 
-@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief", "two_stage"])
+@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief", "two_stage", "planetary54"])
 def test_a_new_stage_is_the_old_one_under_its_name(tmp_path: Path, like: str) -> None:
     path = new_stage("mine", like, tmp_path)
     assert path == tmp_path / "mine" / "stage.toml"

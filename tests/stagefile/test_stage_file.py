@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import math
 import re
-from collections.abc import Callable
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearfmu.errors import SpecError
+from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.checks.gears import at_most
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.shapes import largest_half_width
@@ -23,72 +22,15 @@ from gearfmu.stagefile.reading.files import find_stage, model_folder, shipped_st
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import Bearing
 
-RAW = read_toml(find_stage("fzg_c"))
-Write = Callable[[dict[str, Any]], Path]
 
-
-@pytest.fixture
-def write(tmp_path: Path) -> Write:
-    """Write the shipped stage with some fields changed ("gears.pinion.teeth" → value; None removes)."""
-
-    def _write(changes: dict[str, Any]) -> Path:
-        raw = changed(changes)
-        path = tmp_path / "stage.toml"
-        path.write_text(toml(raw), encoding="utf-8")
-        return path
-
-    return _write
-
-
-def changed(changes: dict[str, Any]) -> dict[str, Any]:
-    raw = copy.deepcopy(RAW)
-    for field, value in changes.items():
-        *tables, key = field.split(".")
-        table = raw
-        for name in tables:
-            table = table.setdefault(name, {})
-        if value is None:
-            table.pop(key, None)
-        else:
-            table[key] = value
-    return raw
-
-
-def toml(raw: dict[str, Any]) -> str:
-    """Plain TOML of nested tables, unknown keys too."""
-    import json
-
-    def lines(table: dict[str, Any], place: str):
-        yield from (f"{key} = {json.dumps(v)}" for key, v in table.items() if not isinstance(v, dict))
-        for key, value in table.items():
-            if isinstance(value, dict):
-                yield f"[{place}{key}]"
-                yield from lines(value, f"{place}{key}.")
-
-    return "\n".join(lines(raw, ""))
-
-
-def problems(path: Path) -> dict[str, Any]:
-    with pytest.raises(SpecError) as caught:
-        load_stage(path)
-    assert str(caught.value) == "\n".join(str(problem) for problem in caught.value.problems)
-    return {problem.field: problem for problem in caught.value.problems}
-
-
-def test_shipped_stage_in_si() -> None:
-    stage = load_stage("fzg_c").written
-    pinion, wheel = stage.gears
-    assert (stage.name, stage.kind, pinion.name, wheel.name) == ("fzg_c", "external_pair", "pinion", "wheel")
-    assert (pinion.teeth, wheel.teeth, pinion.profile_shift, wheel.profile_shift) == (16, 24, 0.1817, 0.1715)
-    assert (pinion.tip_diameter, wheel.tip_diameter, pinion.face_width) == (0.08246, 0.11836, 0.014)
-    assert (stage.pair.center_distance, stage.pair.normal_module, stage.pair.backlash) == (0.0915, 0.0045, 1e-4)
-    assert (stage.torque_max, stage.contact.slices, pinion.tip_relief) == (600, 5, None)
-    assert stage.speed_max == pytest.approx(200 * math.pi)
-    assert (pinion.bearing.stiffness, pinion.bearing.damping_ratio) == (3e8, 0.03)
-    assert (stage.levels.fast_cut, stage.levels.standard_cut) == (80e3, 120e3)
-    assert {name: port.kind for name, port in stage.ports.items()} == {"pinion": "spring", "wheel": "spring"}
-    with pytest.raises(ValueError, match="frozen"):
-        stage.torque_max = 1.0
+def problems(changes: dict[str, Any], stage: Path | str = "fzg_c") -> dict[str, Problem]:
+    """What is wrong with the stage after these changes of fields, by field; none where it loads."""
+    try:
+        load_stage(stage, changes)
+    except SpecError as error:
+        assert str(error) == "\n".join(map(str, error.problems))
+        return {problem.field: problem for problem in error.problems}
+    return {}
 
 
 def test_relief_stage_differs_only_in_its_relief() -> None:
@@ -104,8 +46,8 @@ def test_relief_stage_differs_only_in_its_relief() -> None:
     assert model_folder(relieved) == model_folder(plain)
 
 
-def test_a_stage_is_found_by_path_folder_and_name(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = write({})
+def test_a_stage_is_found_by_path_folder_and_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = Path(shutil.copy(find_stage("fzg_c"), tmp_path))
     assert {find_stage(path), find_stage(str(path)), find_stage(path.parent)} == {path}
     assert {"fzg_c", "fzg_c/stage_relief"} <= set(shipped_stages())
     assert find_stage("fzg_c/stage_relief").name == find_stage("fzg_c/stage_relief.toml").name == "stage_relief.toml"
@@ -114,59 +56,6 @@ def test_a_stage_is_found_by_path_folder_and_name(write: Write, monkeypatch: pyt
         load_stage("fzg_b")
     monkeypatch.chdir(path.parent)
     assert find_stage("stage.toml").resolve() == path
-
-
-FIELD_PROBLEMS = [
-    ({"gears.pinion.teeth": None}, "gears.pinion.teeth", "missing (number of teeth z)"),
-    ({"gears.pinion.teeth": "16"}, "gears.pinion.teeth", "integer"),
-    ({"gears.pinion.teeth": 16.0}, "gears.pinion.teeth", "integer"),
-    ({"gears.pinion.teeth": 3}, "gears.pinion.teeth", "must be from 6 to 400"),
-    ({"gears.pinion.tip_diametre": "82 mm"}, "gears.pinion.tip_diametre", 'did you mean "tip_diameter"'),
-    ({"pair.centre_distance": "91.5 mm"}, "pair.centre_distance", 'did you mean "center_distance"'),
-    ({"zzz": 1}, "zzz", "unknown key: known are"),
-    ({"source": "x"}, "source", "unknown key"),
-    ({"gears.wheel.face_width": 14}, "gears.wheel.face_width", 'write "14 mm"'),
-    ({"gears.wheel.face_width": "14 kg"}, "gears.wheel.face_width", "another kind"),
-    ({"gears.wheel.face_width": "0 mm"}, "gears.wheel.face_width", "must be from 1 µm to 10000 mm"),
-    ({"pair.backlash": "-0.01 mm"}, "pair.backlash", "must be from 0 mm to 10 mm"),
-    ({"pair.helix_angle": "40 deg"}, "pair.helix_angle", "positive for a right-handed pinion"),
-    ({"pair.helix_angle": "-36 deg"}, "pair.helix_angle", "out of range: must be from -35 deg to 35 deg"),
-    ({"pair.misalignment": {"in_plane": "10 µm"}}, "pair.misalignment.span", "missing (length L"),
-    ({"gears.wheel.lead": {"crowning": "-2 µm"}}, "gears.wheel.lead.crowning", "must be from 0 mm to 2 mm"),
-    ({"gears.wheel.lead": {"end_relief": {"amount": "5 µm"}}}, "gears.wheel.lead.end_relief.length", "missing"),
-    ({"gears.wheel.profile_shift": "0.17"}, "gears.wheel.profile_shift", "plain number"),
-    ({"gears.wheel.material.poisson_ratio": 0.5}, "gears.wheel.material.poisson_ratio", "from 0 to 0.49; steel"),
-    ({"torque_max": "0 N*m"}, "torque_max", "must be from 1e-06 N*m"),
-    ({"name": "FZG C"}, "name", "small letters"),
-    ({"kind": "planetary"}, "kind", "external_pair"),
-    ({"contact.law": "nodal"}, "contact.law", "line"),
-    ({"contact.slices": 21}, "contact.slices", "must be from 1 to 20"),
-    ({"ports.wheel.k": None}, "ports.wheel", "needs k and c"),
-    ({"ports.wheel.k": "40e3 N*m"}, "ports.wheel.k", "another kind"),
-    ({"ports.wheel": None}, "", "[ports.pinion], [ports.wheel]"),
-    (
-        {"ports.wheel.kind": "torque", "ports.wheel.chain": {"inertia": "1 kg*m^2"}},
-        "ports.wheel.chain.shaft_k",
-        "missing",
-    ),
-    ({"gears.wheel": None}, "gears", "two gears"),
-    ({"gears.wheel": 3}, "gears", "two gears"),
-    ({"gears": 3}, "gears", "tuple"),
-    ({"levels.fast_cut": "150 kHz"}, "levels", "not lie above"),
-    (
-        {"gears.pinion.tip_relief": {"amount": "15 µm", "start_roll": "outer"}},
-        "gears.pinion.tip_relief.start_roll",
-        "outer_single",
-    ),
-]
-
-
-@pytest.mark.parametrize(("changes", "field", "remedy"), FIELD_PROBLEMS, ids=[str(case[1]) for case in FIELD_PROBLEMS])
-def test_a_wrong_field_is_named_with_its_remedy(write: Write, changes, field: str, remedy: str) -> None:
-    path = write(changes)
-    found = problems(path)
-    assert remedy in found[field].remedy
-    assert found[field].file == str(path)
 
 
 def zero_shift_pair(teeth: int, shift: float = 0.0) -> dict[str, Any]:
@@ -186,68 +75,20 @@ def zero_shift_pair(teeth: int, shift: float = 0.0) -> dict[str, Any]:
     }
 
 
-def test_seventeen_teeth_need_no_profile_shift(write: Write) -> None:
+def test_seventeen_teeth_need_no_profile_shift() -> None:
     """Undercut is judged at the rack's addendum, whatever its fillet: it was judged where the rack's straight flank
     ends, and 17 teeth without profile shift were refused for a fillet of 0.25."""
-    shape = load_stage(write(zero_shift_pair(17))).written.geometry.gears[0]
+    shape = load_stage("fzg_c", zero_shift_pair(17)).written.geometry.gears[0]
     assert shape.rounding.form_roll < 0 and math.hypot(shape.r_b, shape.s_form) - shape.r_b < 0.002 * shape.m
 
 
 @pytest.mark.parametrize("teeth", [10, 12, 16])
-def test_undercut_in_earnest_names_the_shift_that_cures_it(write: Write, teeth: int) -> None:
+def test_undercut_in_earnest_names_the_shift_that_cures_it(teeth: int) -> None:
     least = 1 - teeth * math.sin(math.radians(20)) ** 2 / 2
-    found = problems(write(zero_shift_pair(teeth)))["gears.pinion.profile_shift"]
+    found = problems(zero_shift_pair(teeth))["gears.pinion.profile_shift"]
     stated = float(re.search(r"at least ([\d.]+),", found.remedy).group(1))
     assert least <= stated < 1.002 * least
-    load_stage(write(zero_shift_pair(teeth, stated)))
-
-
-GEOMETRY_PROBLEMS = [
-    ({"gears.pinion.profile_shift": -0.3}, "gears.pinion.profile_shift", "undercuts the flank: at least 0.06"),
-    ({"gears.pinion.rack.fillet_radius": 0.6}, "gears.pinion.rack.fillet_radius", "at most 0.471"),
-    ({"gears.pinion.bore_diameter": "56 mm"}, "gears.pinion.bore_diameter", "half the tooth height: at most 52.3"),
-    ({"gears.pinion.tip_diameter": "84 mm"}, "gears.pinion.tip_diameter", "at most 82.63 mm"),
-    ({"gears.pinion.tip_diameter": "60 mm"}, "gears.pinion.tip_diameter", "no involute"),
-    (
-        {"gears.pinion.tip_diameter": "92 mm", "gears.pinion.rack.addendum": 3.0},
-        "gears.pinion.tip_diameter",
-        "pointed (tip thickness ≤ 0): less than",
-    ),
-    ({"gears.pinion.tip_edge_radius": "2.8 mm"}, "gears.pinion.tip_edge_radius", "overlap"),
-    ({"pair.center_distance": "80 mm"}, "pair.center_distance", "base radii"),
-    ({"pair.center_distance": "91 mm"}, "pair.center_distance", "none at 91.5001 mm"),
-    ({"pair.center_distance": "92.3 mm"}, "pair.backlash", "more than declared"),
-    (
-        {"gears.wheel.tip_diameter": "122 mm", "gears.wheel.rack.addendum": 2.0},
-        "gears.wheel.tip_diameter",
-        "touches the root circle of pinion",
-    ),
-    (
-        {"gears.wheel.tip_diameter": "110 mm", "gears.pinion.tip_diameter": "76 mm"},
-        "pair.center_distance",
-        "contact ratio is 0.",
-    ),
-    (
-        {"gears.wheel.body.strip_half_width": "0.5 mm"},
-        "gears.wheel.body.strip_half_width",
-        "1.5 Hertz half-widths, 0.53 mm",
-    ),
-    ({"gears.wheel.body.strip_half_width": "9 mm"}, "gears.wheel.body.strip_half_width", "longer than the flank"),
-    ({"gears.wheel.tip_relief": {"amount": "1.5 mm"}}, "gears.wheel.tip_relief.amount", "at most 0.45 mm"),
-    (
-        {"gears.wheel.tip_relief": {"amount": "15 µm", "start_roll": "40 mm"}},
-        "gears.wheel.tip_relief.start_roll",
-        "outside the flank: from 7.56884 mm to 30.4529 mm",
-    ),
-]
-
-
-@pytest.mark.parametrize(
-    ("changes", "field", "remedy"), GEOMETRY_PROBLEMS, ids=[case[2][:20] for case in GEOMETRY_PROBLEMS]
-)
-def test_impossible_geometry_is_named_with_its_remedy(write: Write, changes, field: str, remedy: str) -> None:
-    found = problems(write(changes))
-    assert remedy in found[field].remedy
+    assert not problems(zero_shift_pair(teeth, stated))
 
 
 def test_a_largest_length_below_zero_is_none() -> None:
@@ -255,7 +96,7 @@ def test_a_largest_length_below_zero_is_none() -> None:
     assert at_most(-1.423e-3).startswith("no value fits")
 
 
-def test_interference_below_the_form_circle(write: Write) -> None:
+def test_interference_below_the_form_circle() -> None:
     """A long wheel addendum in a small pinion; the diameter that the remedy names is accepted there."""
     changes = {
         "gears.pinion.profile_shift": 0.5,
@@ -263,99 +104,58 @@ def test_interference_below_the_form_circle(write: Write) -> None:
         "gears.wheel.rack.addendum": 1.3,
         "gears.wheel.tip_diameter": "117.4 mm",
     }
-    found = problems(write(changes))
-    remedy = found["gears.wheel.tip_diameter"].remedy
+    remedy = problems(changes)["gears.wheel.tip_diameter"].remedy
     assert "interference" in remedy
     named = remedy.split("at most ")[1]
-    assert not problems_or_none(write(changes | {"gears.wheel.tip_diameter": named}))
+    assert not problems(changes | {"gears.wheel.tip_diameter": named})
 
 
-def problems_or_none(path: Path) -> dict[str, Any]:
-    try:
-        load_stage(path)
-    except SpecError as error:
-        return {problem.field: problem for problem in error.problems}
-    return {}
-
-
-def test_all_problems_come_at_once_geometry_too(write: Write) -> None:
-    found = problems(
-        write(
-            {
-                "torque_maximum": "600 N*m",
-                "contact.damping": 5.0,
-                "ports.pinion.kind": "belt",
-                "gears.pinion.bore_diameter": "60 mm",
-                "gears.wheel.profile_shift": -0.9,
-            }
-        )
-    )
-    assert set(found) == {
-        "torque_maximum",
-        "contact.damping",
-        "ports.pinion.kind",
-        "gears.pinion.bore_diameter",
-        "gears.wheel.profile_shift",
-    }
-
-
-def test_the_named_strip_is_wide_enough_and_a_little_less_is_not(write: Write) -> None:
+def test_the_named_strip_is_wide_enough_and_a_little_less_is_not() -> None:
     stage = load_stage("fzg_c").written
     b = largest_half_width(stage.gears, stage.geometry, stage.torque_max)
     assert b == pytest.approx(0.3527e-3, abs=1e-7)  # √(4·1.2669e6·8.731e-3/(π·113.19e9)) with ρ = L/4
     for factor, fine in ((1.5001, True), (1.4999, False)):
         width = f"{factor * b * 1e3:.9f} mm"
-        fields = problems_or_none(write({f"gears.{g}.body.strip_half_width": width for g in ("pinion", "wheel")}))
+        fields = problems({f"gears.{g}.body.strip_half_width": width for g in ("pinion", "wheel")})
         assert (not fields) == fine
 
 
-def test_backlash_is_judged_after_the_allowance(write: Write) -> None:
+def test_backlash_is_judged_after_the_allowance() -> None:
     """The FZG pair has −0.07 µm as given: no problem, because the file declares 0.1 mm; with a hundredth of a module
     in hand.
     """
     assert load_stage("fzg_c").written.geometry.nominal_backlash < 0
-    assert not problems_or_none(write({"pair.backlash": "0 mm"}))
+    assert not problems({"pair.backlash": "0 mm"})
 
 
 @pytest.mark.parametrize(("share", "fine"), [(0.099, True), (0.101, False)])
-def test_teeth_are_thinned_by_a_tenth_of_the_module_at_most(write: Write, share: float, fine: bool) -> None:
+def test_teeth_are_thinned_by_a_tenth_of_the_module_at_most(share: float, fine: bool) -> None:
     stage = load_stage("fzg_c").written
     backlash = stage.geometry.nominal_backlash + share * stage.pair.normal_module
-    found = problems_or_none(write({"pair.backlash": f"{1e3 * backlash:.9f} mm"}))
+    found = problems({"pair.backlash": f"{1e3 * backlash:.9f} mm"})
     assert ("pair.center_distance" not in found) == fine
 
 
 def test_a_variant_names_the_file_that_holds_the_problem(tmp_path: Path) -> None:
-    (tmp_path / "stage.toml").write_text(toml(changed({"gears.pinion.teeth": "x"})), encoding="utf-8")
+    text = find_stage("fzg_c").read_text(encoding="utf-8").replace("teeth = 16", 'teeth = "x"')
+    (tmp_path / "stage.toml").write_text(text, encoding="utf-8")
     variant = tmp_path / "stage_b.toml"
     variant.write_text('base = "stage.toml"\nname = "B"\n[gears.wheel]\nface_width = "14"\n', encoding="utf-8")
-    found = problems(variant)
+    found = problems({}, variant)
     assert Path(found["gears.pinion.teeth"].file).name == "stage.toml"
     assert Path(found["gears.wheel.face_width"].file).name == "stage_b.toml"
     assert Path(found["name"].file).name == "stage_b.toml"
 
 
 @pytest.mark.parametrize(
-    ("text", "remedy"),
-    [
-        ('base = "stage.toml"', "ring"),
-        ('base = "nowhere.toml"', "there is no file"),
-        ("base = 3", "path of a file"),
-        ("a = ", "not valid TOML"),
-        ("a = 1\na = 2", "not valid TOML"),
-        ("a = " + "[" * 100_000, "not valid TOML"),
-    ],
+    ("content", "remedy"),
+    [(b"a = ", "not valid TOML"), (b"a = " + 100_000 * b"[", "not valid TOML"), (b"name = '\xff\xfe'", "UTF-8")],
+    ids=["cut", "deep", "no text"],
 )
-def test_files_that_cannot_be_read(tmp_path: Path, text: str, remedy: str) -> None:
+def test_files_that_cannot_be_read(tmp_path: Path, content: bytes, remedy: str) -> None:
     path = tmp_path / "stage.toml"
-    path.write_text(text, encoding="utf-8")
-    assert remedy in next(iter(problems(path).values())).remedy
-
-
-def test_a_file_that_is_not_text(tmp_path: Path) -> None:
-    path = tmp_path / "stage.toml"
-    path.write_bytes(b"name = '\xff\xfe'")
-    assert "UTF-8" in problems(path)[""].remedy
+    path.write_bytes(content)
+    assert remedy in problems({}, path)[""].remedy
 
 
 def test_python_may_build_a_spec_from_si_numbers() -> None:
@@ -380,62 +180,26 @@ FIELDS = [
 ]  # fmt: skip
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300)
 @given(st.dictionaries(st.sampled_from(FIELDS), leaves, min_size=1, max_size=3))
-def test_whatever_stands_in_the_file_it_loads_or_lists_problems(write: Write, changes: dict[str, Any]) -> None:
-    try:
-        path = write(dict(sorted(changes.items(), key=lambda item: -item[0].count("."))))
-    except TypeError:  # a table replaced by a number and a field inside it: not a file one can write
-        return
-    try:
-        assert isinstance(load_stage(path).written, StageSpec)
-    except SpecError as error:
-        for problem in error.problems:
-            assert problem.file and problem.remedy
+def test_whatever_stands_in_the_file_it_loads_or_lists_problems(changes: dict[str, Any]) -> None:
+    """Fields before the tables that hold them."""
+    found = problems(dict(sorted(changes.items(), key=lambda item: -item[0].count("."))))
+    assert all(problem.file and problem.remedy for problem in found.values())
 
 
 def test_text_of_a_stage_reads_back_as_the_same_stage(tmp_path: Path) -> None:
     path = tmp_path / "stage.toml"
-    path.write_text(stage_text(RAW, ""), encoding="utf-8")
+    path.write_text(stage_text(read_toml(find_stage("fzg_c")), ""), encoding="utf-8")
     assert load_stage(path).model_copy(update={"source": Path("x")}) == load_stage("fzg_c").model_copy(
         update={"source": Path("x")}
     )
 
 
-def test_index_deviations_by_tooth(write: Write) -> None:
+def test_index_deviations_by_tooth() -> None:
     table = {"0": "50 µm", "15": "-12 µm"}
-    path = write({"gears.pinion.index_deviation": table})
-    assert load_stage(path).gears[0].index_deviation == pytest.approx({0: 50e-6, 15: -12e-6})
-    assert load_stage(path).gears[1].index_deviation == {}
-    text = stage_text(changed({"gears.pinion.index_deviation": table}), "")
-    assert 'index_deviation = { "0" = "50 µm", "15" = "-12 µm" }' in text
-
-
-def test_index_deviations_of_no_tooth_or_beyond_every_tolerance(write: Write) -> None:
-    found = problems(write({"gears.pinion.index_deviation": {"16": "5 µm", "3": "1 mm", "2": "10 µm"}}))
-    assert set(found) == {"gears.pinion.index_deviation.16", "gears.pinion.index_deviation.3"}
-    assert "0 to 15" in found["gears.pinion.index_deviation.16"].remedy
-    assert "0.225 mm" in found["gears.pinion.index_deviation.3"].remedy
-    found = problems(write({"gears.wheel.index_deviation": {"-1": "5 µm", "two": "5 µm", "3": 5e-6}}))
-    assert len(found) == 3 and "unit" in found["gears.wheel.index_deviation.3"].remedy
-
-
-def test_no_layer_of_problems_hides_the_next(write: Write) -> None:
-    """Misspelt and bare fields do not keep the geometry, the bearings and the pair from being judged beside them."""
-    found = problems(
-        write(
-            {
-                "torque_max": 600,
-                "speed_maximum": "6000 rpm",
-                "speed_max": None,
-                "contact.slices": "five",
-                "gears.pinion.bore_diameter": "60 mm",
-                "gears.wheel.index_deviation": {"30": "1 um"},
-                "gears.pinion.bearing.axial": "1e8 N/m",
-                "gears.wheel.tip_relief": {"amount": "15 mm"},
-            }
-        )
-    )
-    read = {"torque_max", "speed_maximum", "speed_max", "contact.slices"}
-    judged = {"gears.pinion.bore_diameter", "gears.wheel.index_deviation.30", "gears.wheel.tip_relief.amount"}
-    assert read | judged | {"gears.pinion.bearing.tilt", "gears.wheel.bearing.axial"} <= set(found)
+    pinion, wheel = load_stage("fzg_c", {"gears.pinion.index_deviation": table}).gears
+    assert pinion.index_deviation == pytest.approx({0: 50e-6, 15: -12e-6}) and wheel.index_deviation == {}
+    tables = read_toml(find_stage("fzg_c"))
+    tables["gears"]["pinion"]["index_deviation"] = table
+    assert 'index_deviation = { "0" = "50 µm", "15" = "-12 µm" }' in stage_text(tables, "")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from pathlib import Path
@@ -14,10 +13,7 @@ import pytest
 from evidence.study import cuts
 from evidence.study.limits import limit_rows
 from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
-from gearfmu import cli
-from gearfmu.errors import SpecError
 from gearfmu.kernel import Kernel
-from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.teeth import ROLLS
 from gearfmu.study import Job, ReferenceRow, Row, bench, study
@@ -144,46 +140,6 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
 
 
-def test_rows_read_back_and_other_files_are_refused(tmp_path: Path) -> None:
-    nan = Row("s", "full", "dg4", 1e-5, 400, 5, *([float("nan")] * 6))
-    write_rows(tmp_path / "t.csv", Row, [ROW, nan])
-    read = read_rows(tmp_path / "t.csv", Row)
-    assert read[0] == ROW and np.isnan(read[1].te_error) and read_rows(tmp_path / "none.csv", Row) == []
-    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(SpecError, match="remove it"):
-        read_rows(tmp_path / "other.csv", Row)
-
-
-def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
-    rows = [
-        Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
-        for level in ("rigid", "fast")
-        for h in (1e-5, 5e-6)
-        for n in (1, 5)
-    ]
-    rows += [Row("s", "full", "rk45", 1e-6, 400, 5, 1e-3, 0.0, 0.02, 0.01, 90.0, 70.0)]
-    first = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "a", "title")]
-    again = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "b", "title")]
-    text = first[0].decode()
-    assert first == again and first[1][:4] == b"\x89PNG"
-    assert "full, rk45" in text and "rigid" in text and "5 µs" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["pair_loaded"], cli.USAGE_ERROR, "--out"),
-        (["--out", "x"], cli.USAGE_ERROR, "SCENE"),
-        (["pair_loadet", "--out", "x"], 1, "pair_loaded"),
-    ],
-)
-def test_wrong_usage_names_what_there_is(
-    arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.outcome(["study", *arguments]) == code and words in capsys.readouterr().err
-    assert not Path("x").exists()
-
-
 def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
     rows = [
         BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
@@ -217,11 +173,3 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
     assert lowered == sorted(lowered) and not lowered[0] and lowered[-1]
     gammas, errors = [row.gamma for row in rows[:4]], [row.te_error for row in rows[:4]]
     assert gammas == sorted(gammas, reverse=True) and errors == sorted(errors)
-
-
-def test_committed_tables_have_the_columns(tmp_path: Path) -> None:
-    """evidence/study holds what the documentation shows."""
-    folder = Path(__file__).parents[2] / "evidence" / "study"
-    with (folder / "study.csv").open(encoding="utf-8", newline="") as file:
-        assert ",".join(next(csv.reader(file))) == COLUMNS
-    assert {row.scene for row in read_rows(folder / "study.csv", Row)} >= {"pair_loaded"}
