@@ -51,7 +51,8 @@ def cyclic_modes(
             rigid,
         )
     )  # fmt: skip
-    faces, index = outer_faces(mesh), [mesh.sector_nodes(tooth) for tooth in range(mesh.teeth)]
+    faces = surface.outer_faces(mesh.elements, mesh.cut_minus, mesh.cut_plus)
+    index = [mesh.sector_nodes(tooth) for tooth in range(mesh.teeth)]
     used, local = np.unique(np.concatenate([numbers[faces] for numbers in index]), return_inverse=True)
     nodes, scalar_mass = mesh.full().nodes, mass[::3, ::3]
     modes, number = [], 1
@@ -87,11 +88,6 @@ def _turned(nodes: np.ndarray, shape: np.ndarray, component: int) -> np.ndarray:
     return shape * (np.conj(mean) / abs(mean) if mean else 1.0)
 
 
-def outer_faces(mesh: FeMesh) -> np.ndarray:
-    """Faces (F, 8) of a sector that lie on the surface of the whole body, normals outward."""
-    return surface.outer_faces(mesh.elements, mesh.cut_minus, mesh.cut_plus)
-
-
 def unfolded(shape: np.ndarray, cyclic_index: int, index: list[np.ndarray]) -> np.ndarray:
     """Displacement (1 or 2, N, 3) of all nodes of the whole body from the sector's shape (3N,); two for a complex one:
     its real and its imaginary part. index : `sector_nodes` of every sector."""
@@ -117,7 +113,8 @@ def _families(spaces: list[SectorSpace], sectors: int, count: int, progress: Pro
             if progress:
                 progress(f"nodal diameter {key[1]}", done / len(todo))
             found[key] = _solve(spaces[key[0]], key[1], wanted[key])
-        limit = _limit(list(found.values()), count)
+        squared = np.sort(np.concatenate([np.repeat(f.squared, 2 if f.pair else 1) for f in found.values()]))
+        limit = squared[min(count, len(squared)) - 1]
         todo = [key for key in keys if found[key].squared[-1] < limit and not found[key].complete]
         for key in todo:
             wanted[key] = 2 * wanted[key]
@@ -130,16 +127,9 @@ def _solve(space: SectorSpace, index: int, count: int) -> _Family:
     return _Family(space.parity, index, not harmonic.is_real, squared, shapes, len(squared) >= harmonic.elastic)
 
 
-def _limit(families: list[_Family], count: int) -> float:
-    squared = np.sort(np.concatenate([np.repeat(f.squared, 2 if f.pair else 1) for f in families]))
-    return float(squared[min(count, len(squared)) - 1])
-
-
 def _lowest(families: list[_Family], count: int) -> list[tuple[_Family, int]]:
     """Families and positions in them of the lowest `count` modes, ascending, pairs whole."""
-    entries = sorted(
-        ((f.squared[k], number, k) for number, f in enumerate(families) for k in range(len(f.squared))),
-    )
+    entries = sorted((squared, number, k) for number, f in enumerate(families) for k, squared in enumerate(f.squared))
     chosen, modes = [], 0
     for _, number, k in entries:
         if modes >= count:

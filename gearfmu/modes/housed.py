@@ -86,15 +86,11 @@ class Housed:
     mount: np.ndarray
 
 
-def seat_forces(rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
-    """(L, s): forces on seats that yield, from those on rigid ones, blocked (L, s), at ω (L,) > 0 rad/s."""
-    return _coupled(rings, housing.answers(omega), omega, blocked)[:, :, 0]
-
-
-def _coupled(rings: Rings, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
-    """(L, s, 1): forces on the seats."""
+def seat_forces(rings: Rings, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
+    """(L, s): forces on seats that yield, from those on rigid ones, blocked (L, s), at ω (L,) > 0 rad/s; answers: of
+    the housing there."""
     yielding = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ answers.seats
-    return np.linalg.solve(yielding, blocked[:, :, None])
+    return np.linalg.solve(yielding, blocked[:, :, None])[:, :, 0]
 
 
 def housed(rings: Rings, housing: Housing, forces: np.ndarray, step: float, highest: float) -> Housed:
@@ -106,29 +102,21 @@ def housed(rings: Rings, housing: Housing, forces: np.ndarray, step: float, high
     spectrum = np.fft.rfft(_faded(forces - forces.mean(axis=0)), size, axis=0)
     omega = 2 * np.pi * np.fft.rfftfreq(size, step)
     last = int(np.searchsorted(omega, 2 * np.pi * highest, side="right"))
-    found = {name: np.zeros((len(omega), width), dtype=complex) for name, width in _widths(housing).items()}
-    for begin in range(1, last, CHUNK):
-        lines = slice(begin, min(begin + CHUNK, last))
-        _solve(rings, housing, omega[lines], spectrum[lines], {name: own[lines] for name, own in found.items()})
-    return Housed(**{name: np.fft.irfft(own, size, axis=0)[:count] for name, own in found.items()})
+    chunks = [slice(begin, min(begin + CHUNK, last)) for begin in range(1, last, CHUNK)]
+    parts = [_at_lines(rings, housing, omega[lines], spectrum[lines]) for lines in chunks]
+    beside = ((1, len(omega) - last), (0, 0))  # no mean, nothing above the band
+    found = (np.pad(np.concatenate(own), beside) for own in zip(*parts, strict=True))
+    return Housed(*(np.fft.irfft(own, size, axis=0)[:count] for own in found))
 
 
-def _widths(housing: Housing) -> dict[str, int]:
-    n = 6 + len(housing.omega)
-    sizes = (len(housing.seats), n, n, len(housing.sensors), len(housing.feet))
-    return dict(zip(("force", "coordinates", "velocity", "sensor", "mount"), sizes, strict=True))
-
-
-def _solve(
-    rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray, found: dict[str, np.ndarray]
-) -> None:
-    """Fill `found` at some lines."""
+def _at_lines(rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The spectra (L, …) of `Housed`, in its order."""
     answers = housing.answers(omega)
-    force = _coupled(rings, answers, omega, blocked)
-    moved = (answers.coordinates @ force)[:, :, 0]
-    found["force"][:], found["mount"][:] = force[:, :, 0], (answers.mounts @ force)[:, :, 0]
-    found["coordinates"][:], found["velocity"][:] = moved, 1j * omega[:, None] * moved
-    found["sensor"][:] = -(omega[:, None] ** 2) * (answers.sensors @ force)[:, :, 0]
+    force = seat_forces(rings, answers, omega, blocked)
+    moved, sensor, mount = (
+        (own @ force[:, :, None])[:, :, 0] for own in (answers.coordinates, answers.sensors, answers.mounts)
+    )
+    return force, moved, 1j * omega[:, None] * moved, -(omega[:, None] ** 2) * sensor, mount
 
 
 def _faded(values: np.ndarray) -> np.ndarray:

@@ -14,8 +14,6 @@ from gearfmu.stage.assembly.assemble import layout_of
 from gearfmu.stage.assembly.groups import FORCES
 from gearfmu.stagefile.forms.general import Stage
 
-AXES = "xyz"
-
 
 @dataclass(frozen=True)
 class Placed:
@@ -38,15 +36,21 @@ def placed_housing(stage: Stage, bodies: Sequence[Body], names: Sequence[str] | 
     layout, name = layout_of(stage, bodies), stage.housings[0].name
     number = [body.name for body in layout.bodies].index(name)
     free = layout.bodies[number]
-    seats = {f"{s.name}.{FORCES[d]}": (s.second[1], d) for s in layout.supports if _on(s.second, number) and s.second
-             for d in s.directions}  # fmt: skip
+    seats = {
+        f"{s.name}.{FORCES[d]}": (s.second[1], d)
+        for s in layout.supports
+        if s.second is not None and s.second[0] == number
+        for d in s.directions
+    }
     if names is not None and set(names) != set(seats):
         strange = ", ".join(sorted(set(names) ^ set(seats)))
         raise ModelError(f"the bearings of the run and of stage {stage.name} are not the same: {strange}")
     held = [s for s in layout.supports if s.second is None and s.first[0] == number]
     feet = {f"{s.name}.{FORCES[d]}": (s.first[1], d) for s in held for d in s.directions}
     body = stage.by_name(bodies)[name]
-    sensors = _sensors(() if body.sensors is None else body.sensors.names, len(free.nodes))
+    of_sensors = () if body.sensors is None else body.sensors.names
+    first = len(free.nodes) - len(of_sensors)  # sensors are the last nodes of a body
+    sensors = {f"sensor.{own}.a{'xyz'[d]}": (first + k, d) for k, own in enumerate(of_sensors) for d in range(3)}
     order = tuple(seats if names is None else names)
     loaded = [*(seats[own] for own in order), *feet.values()]
     rows, columns = [*loaded, *sensors.values()], [6 * node + d for node, d in loaded]
@@ -66,13 +70,3 @@ def placed_housing(stage: Stage, bodies: Sequence[Body], names: Sequence[str] | 
         foot_loss=np.concatenate([own.damping for own in held]) if held else np.zeros(0),
     )
     return Placed(name, housing, order, tuple(feet), tuple(sensors))
-
-
-def _on(end: tuple[int, int] | None, body: int) -> bool:
-    return end is not None and end[0] == body
-
-
-def _sensors(names: Sequence[str], nodes: int) -> dict[str, tuple[int, int]]:
-    """Node and direction of every sensor output; sensors are the last nodes of the body."""
-    first = nodes - len(names)
-    return {f"sensor.{name}.a{AXES[d]}": (first + k, d) for k, name in enumerate(names) for d in range(3)}

@@ -25,7 +25,6 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly.assemble import stage_group
-from gearfmu.stage.assembly.groups import Group
 from gearfmu.stage.run.limits import places_of
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import rolling
@@ -64,36 +63,23 @@ def stage_modes(
     SimulationError(no_equilibrium) where the stage finds none.
     """
     position, kernel, shafts = np.arange(positions) / positions, full_kernel(model), shaft_rows(model, bodies)
-    found = [_at(model, torque, part, (kernel, shafts, count + SPARE)) for part in position]
-    orders = followed(found[0].mass, [own.shapes for own in found])
-    frequency = np.stack([own.values[0][order] for own, order in zip(found, orders, strict=True)])
+    shapes, values, turning = [], [], []
+    for part in position:
+        system = linearised(model, torque, part, kernel, shafts)
+        squared, of_modes, rigid = system.shapes(count + SPARE)
+        shapes.append(of_modes)
+        values.append(system.values(squared, of_modes))
+        turning.append(np.sqrt(np.maximum(rigid, 0.0)) / (2 * np.pi))
+    orders = followed(system.linear.mass, shapes)
+    frequency = np.stack([own[0][order] for own, order in zip(values, orders, strict=True)])
     lowest = np.argsort(frequency.mean(axis=0), kind="stable")[:count]
     frequency, damping_ratio, shares, mesh_force = (
-        np.stack([own.values[k][order[lowest]] for own, order in zip(found, orders, strict=True)]) for k in range(4)
+        np.stack([own[k][order[lowest]] for own, order in zip(values, orders, strict=True)]) for k in range(4)
     )
     meshes = tuple(mesh.name for mesh in model.stage.engagements)
-    most = max(own.rigid.size for own in found)
-    rigid = np.stack([np.pad(own.rigid, (most - own.rigid.size, 0)) for own in found])
-    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, rigid)
-
-
-@dataclass(frozen=True)
-class _Position:
-    """Modes at one position: masses, shapes, what `Linearised.modes` returns, Hz of free rotations."""
-
-    mass: np.ndarray
-    shapes: np.ndarray
-    values: tuple[np.ndarray, ...]
-    rigid: np.ndarray
-
-
-def _at(model: StageModel, torque: float, position: float, how: tuple[Kernel, np.ndarray | None, int]) -> _Position:
-    """how: kernel, `shaft_rows`, number of modes."""
-    kernel, shafts, count = how
-    system = linearised(model, torque, position, kernel, shafts)
-    squared, shapes, rigid = system.shapes(count)
-    turning = np.sqrt(np.maximum(rigid, 0.0)) / (2 * np.pi)
-    return _Position(system.linear.mass, shapes, system.values(squared, shapes), turning)
+    most = max(own.size for own in turning)
+    free = np.stack([np.pad(own, (most - own.size, 0)) for own in turning])
+    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, free)
 
 
 def linearised(
@@ -142,16 +128,12 @@ def shaft_rows(model: StageModel, bodies: Sequence[Body]) -> np.ndarray | None:
     or of the housing, beside what its ends yield beyond them; None where the stage has no shafts."""
     if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):
         return None
-    group = stage_group(model.stage, bodies)
-    own = [_elastic(group, b) for b, body in enumerate(group.layout.bodies) if body.flank is None]
-    return np.vstack(own)
-
-
-def _elastic(group: Group, body: int) -> np.ndarray:
-    """ω times the modes of a body in the oscillators."""
-    omega = group.layout.bodies[body].omega
-    shapes = group.shapes[group.at[body]]
-    return omega[:, None] * shapes[len(shapes) - omega.size :]
+    group, found = stage_group(model.stage, bodies), []
+    for number, body in enumerate(group.layout.bodies):
+        if body.flank is None:
+            shapes = group.shapes[group.at[number]]
+            found.append(body.omega[:, None] * shapes[len(shapes) - body.omega.size :])
+    return np.vstack(found)
 
 
 @dataclass(frozen=True)
@@ -187,7 +169,8 @@ class Linearised:
         omega = np.sqrt(squared)
         forces = np.linalg.solve(self.compliance, self.linear.rows @ shapes)
         ratio = self._loss(forces, shapes) / (2 * omega)
-        drive = [self._error(e) @ forces for e in range(self.linear.engagements)]
+        mesh, te = self.linear.label[:, 0], self.linear.te
+        drive = [np.where(mesh == e, te, 0.0) @ forces for e in range(self.linear.engagements)]
         mesh_force = np.stack(drive, axis=1) ** 2 / (2 * ratio * squared)[:, None]
         return omega / (2 * np.pi), ratio, self._energies(forces, shapes) / squared[:, None], mesh_force
 
@@ -201,10 +184,6 @@ class Linearised:
         shapes = scale[:, None] * shapes
         rigid = ((free.T @ (self.linear.mass[:, None] * shapes)) ** 2).sum(axis=0) > RIGID
         return squared[~rigid][:count], shapes[:, ~rigid][:, :count], squared[rigid]
-
-    def _error(self, engagement: int) -> np.ndarray:
-        """(m,): derivative of the gaps by the transmission error of one engagement."""
-        return np.where(self.linear.label[:, 0] == engagement, self.linear.te, 0.0)
 
     def _energies(self, forces: np.ndarray, shapes: np.ndarray) -> np.ndarray:
         """(modes, 4): twice the strain energy in each of `GROUPS`. What is neither in the rows nor in the springs of

@@ -14,7 +14,7 @@ from gearfmu.body import Body
 from gearfmu.errors import near_or_all
 from gearfmu.modes.housed import paths
 from gearfmu.modes.housing import placed_housing
-from gearfmu.sound import SoundError, midbands, segments, third_octaves
+from gearfmu.sound import SoundError, bands_of, midbands, segments, third_octaves
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
 
@@ -36,8 +36,7 @@ class TransferPaths:
     @property
     def bands(self) -> np.ndarray:
         """(B,) Hz: midbands of the third octaves from 63 Hz to 8 kHz, less where the record ends earlier."""
-        every = midbands(63.0, 8000.0)
-        return every[every * 10**0.05 < self.frequency[-1]]
+        return bands_of(self.frequency)
 
     def share(self, band: float | None = None) -> np.ndarray:
         """(s,): part of every path in the mean square of the sensor, sum 1, in the third octave of a nominal frequency

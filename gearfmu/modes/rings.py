@@ -28,6 +28,7 @@ from gearfmu.modes.linear import linearised
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly.blob import read_blob
 
+HIGHEST = 10e3  # Hz
 SPARE = 1.5  # modes up to this times the highest frequency are dynamic
 
 
@@ -53,15 +54,13 @@ class Rings:
         return self.stiffness + w * self.loss - pulled @ np.linalg.solve(inner, pulled.transpose(0, 2, 1))
 
 
-def stage_rings(
-    model: StageModel, torque: float, speeds: Mapping[str, float] = MappingProxyType({}), highest: float = 10e3
-) -> Rings:
-    """The stage under `torque` (N·m on the input), dynamic up to `highest` (Hz), at the outer rings of all its supports
+def stage_rings(model: StageModel, torque: float, speeds: Mapping[str, float] = MappingProxyType({})) -> Rings:
+    """The stage under `torque` (N·m on the input), dynamic up to HIGHEST, at the outer rings of all its supports
     on the ground. speeds: of rotors, rad/s, by name; 0 where absent. SimulationError where it finds no equilibrium."""
     found = linearised(model, torque, 0.0)
     linear, sections = found.linear, read_blob(model.blob)
     names = str(sections["support_names"]).split("|")
-    on_ground = np.array([_on_ground(model, name) for name in names])
+    on_ground = np.array([name.startswith("bearing.") for name in names])
     kappa = _square(sections["kappa0"])
     springs = np.diag(linear.support_compliance)
     springs = springs if found.coupling is None else springs + found.coupling
@@ -78,7 +77,7 @@ def stage_rings(
     loss = stretch.T @ (linear.dashpot[:, None] * stretch) + across.T @ (linear.damper[:, None] * across)
     loss[:n, :n] += np.diag(2 * linear.zeta * linear.omega * linear.mass) + _whirling(model, linear, sections, speeds)
     kept = tuple(name for name, own in zip(names, on_ground, strict=True) if own)
-    return rings_of(kept, full, loss, linear.mass, SPARE * 2 * math.pi * highest)
+    return rings_of(kept, full, loss, linear.mass, SPARE * 2 * math.pi * HIGHEST)
 
 
 def _whirling(
@@ -116,11 +115,6 @@ def rings_of(names: Sequence[str], stiffness: np.ndarray, loss: np.ndarray, mass
         stiffness=_even(stiffness[n:, n:]) - static,
         loss=_even(loss[n:, n:]),
     )
-
-
-def _on_ground(model: StageModel, name: str) -> bool:
-    """Whether a support direction, bearing.left.fx, is one on the ground."""
-    return name.startswith("bearing.")
 
 
 def _square(values: object) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_fields
@@ -26,7 +25,7 @@ def whole_modes(
     """
     squared, vectors = elastic(body).modes(count + 1)
     frequency = np.sqrt(squared) / (2 * np.pi)
-    mass = _scalar_mass(mesh, material)
+    mass = hex20.assemble(mesh.nodes, mesh.elements, material)[1][::3, ::3]
     faces = surface.boundary_faces(mesh.elements)
     used, local = np.unique(faces, return_inverse=True)
     modes, k = [], 0
@@ -34,7 +33,19 @@ def whole_modes(
         pair = k + 1 < len(frequency) and frequency[k + 1] / frequency[k] - 1 < TOGETHER
         numbers = (k + 1, k + 2) if pair else (k + 1,)
         shapes = np.stack([at_nodes(body, vectors[:, n - 1], mesh.nodes, slaves) for n in numbers])
-        modes.append(_mode(mesh, mass, shapes, used, float(frequency[k]), numbers))
+        shares = np.mean([harmonic_shares(mesh.nodes[used], shape[used]) for shape in shapes], axis=0)
+        modes.append(
+            Mode(
+                numbers=numbers,
+                frequency=float(frequency[k]),
+                damping_ratio=float("nan"),
+                parity=_parity(mesh.nodes, shapes[0]),
+                nodal_diameter=int(np.argmax(shares)),
+                harmonic_share=float(shares.max()),
+                energy=np.mean([energy_shares(mesh.nodes, mass, shape) for shape in shapes], axis=0),
+                shape=shapes[:, used],
+            )
+        )
         k += len(numbers)
     return BodyModes(body.name, mesh.nodes[used], local.reshape(-1, 8), tuple(modes))
 
@@ -56,23 +67,6 @@ def at_nodes(body: FullOrder, vector: np.ndarray, nodes: np.ndarray, slaves: dic
     return shape
 
 
-def _mode(
-    mesh: FeMesh, mass: sp.csr_array, shapes: np.ndarray, used: np.ndarray, frequency: float, numbers: tuple[int, ...]
-) -> Mode:
-    shares = np.mean([harmonic_shares(mesh.nodes[used], shape[used]) for shape in shapes], axis=0)
-    energy = np.mean([energy_shares(mesh.nodes, mass, shape) for shape in shapes], axis=0)
-    return Mode(
-        numbers=numbers,
-        frequency=frequency,
-        damping_ratio=float("nan"),
-        parity=_parity(mesh.nodes, shapes[0]),
-        nodal_diameter=int(np.argmax(shares)),
-        harmonic_share=float(shares.max()),
-        energy=energy,
-        shape=shapes[:, used],
-    )
-
-
 def _parity(nodes: np.ndarray, shape: np.ndarray) -> int:
     """+1 or −1 for a shape that is symmetric or antisymmetric about the middle of a body which is so, else 0."""
     mirror = mirror_nodes(nodes)
@@ -80,8 +74,3 @@ def _parity(nodes: np.ndarray, shape: np.ndarray) -> int:
         return 0
     even = float(((shape + shape[mirror] * [1, 1, -1]) ** 2).sum() / (4 * (shape**2).sum()))
     return 1 if even > 0.99 else -1 if even < 0.01 else 0
-
-
-def _scalar_mass(mesh: FeMesh, material: hex20.Material) -> sp.csr_array:
-    _, mass = hex20.assemble(mesh.nodes, mesh.elements, material)
-    return sp.csr_array(mass[::3, ::3])

@@ -18,7 +18,7 @@ from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, heat_of
 from gearfmu.report.run import Run
 from gearfmu.report.runup import RunUp
 from gearfmu.report.signals import GEAR_SPEED, Window
-from gearfmu.sound import SoundError, SoundPower, midbands, nominal, radiation, segments, third_octaves
+from gearfmu.sound import BANDS, SoundError, SoundPower, bands_of, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
 from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Trace
@@ -29,7 +29,6 @@ MOUNT = "mount."
 PATCHES = 300  # boundary elements where none are stored: seconds
 POWER = "dB re 1 pW"
 SHOWN_DB = 60
-BANDS = (63.0, 8000.0)  # Hz, nominal first and last third octave
 
 
 def figures(run: Run) -> list[Callable[[], Plot | None]]:
@@ -60,8 +59,7 @@ def accelerations(trace: Trace, window: Window) -> Plot:
         raise MetricsError(f"Accelerations in third octaves: {error}") from error
     squares = 0.5 * (np.abs(pieces.velocity) ** 2).mean(axis=0)
     squares = undo_mean(np.sqrt(squares.T), pieces.frequency, sample_step(part.time)) ** 2
-    bands = midbands(*BANDS)
-    bands = bands[bands * 10**0.05 < pieces.frequency[-1]]
+    bands = bands_of(pieces.frequency)
     levels = level(np.sqrt(third_octaves(pieces.frequency, squares, bands)), ACCELERATIONS.reference)
     panels = []
     for sensor in dict.fromkeys(name.rsplit(".", 1)[0] for name in names):

@@ -1,20 +1,21 @@
 """Radiated sound: skin of a body, boundary elements, radiation matrix, sound power, third octaves."""
 
 from gearfmu.sound.boundary import memory_needed
-from gearfmu.sound.levels import a_weighting, level, midbands, nominal, third_octaves, weighted
+from gearfmu.sound.levels import BANDS, a_weighting, bands_of, level, midbands, nominal, third_octaves, weighted
 from gearfmu.sound.power import WIDTH, Segments, SoundPower, power_of, radiated, segments
-from gearfmu.sound.radiation import Air, Radiation, radiation
+from gearfmu.sound.radiation import Radiation, radiation
 from gearfmu.sound.skin import Skin, SoundError, envelope, refined, skin_of
 
 __all__ = [
+    "BANDS",
     "WIDTH",
-    "Air",
     "Radiation",
     "Segments",
     "Skin",
     "SoundError",
     "SoundPower",
     "a_weighting",
+    "bands_of",
     "envelope",
     "level",
     "memory_needed",

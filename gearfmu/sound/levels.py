@@ -7,6 +7,7 @@ import numpy as np
 REFERENCE = 1e-12  # W
 RATIO = 10**0.3  # an octave, IEC 61260-1, 5.2.1
 SERIES = np.array([1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8])
+BANDS = (63.0, 8000.0)  # Hz, nominal first and last third octave
 NONE = -999.0  # dB, of no power at all
 
 
@@ -15,6 +16,12 @@ def midbands(low: float = 20.0, high: float = 20e3) -> np.ndarray:
     may be nominal frequencies; IEC 61260-1, 5.4."""
     first, last = (round(3 * np.log(f / 1000) / np.log(RATIO)) for f in (low, high))
     return 1000 * RATIO ** (np.arange(first, last + 1) / 3)
+
+
+def bands_of(frequency: np.ndarray) -> np.ndarray:
+    """(B,) Hz: midbands of the third octaves of BANDS, less where the lines (F,) Hz of a record end earlier."""
+    every = midbands(*BANDS)
+    return every[every * 10**0.05 < frequency[-1]]
 
 
 def nominal(bands: np.ndarray) -> np.ndarray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.sound.levels import level, midbands, third_octaves, weighted
-from gearfmu.sound.radiation import LINES, Radiation
+from gearfmu.sound.levels import bands_of, level, third_octaves, weighted
+from gearfmu.sound.radiation import Radiation
 from gearfmu.sound.skin import SoundError
 
 OVERLAP = 0.5  # of neighbouring segments
@@ -38,8 +38,7 @@ class SoundPower:
     @property
     def bands(self) -> np.ndarray:
         """(B,) Hz: midbands of the third octaves from 63 Hz to 8 kHz, less where the record ends earlier."""
-        every = midbands(*LINES)
-        return every[every * 10**0.05 < self.frequency[-1]]
+        return bands_of(self.frequency)
 
     def third_octaves(self, erp: bool = False) -> np.ndarray:
         """(S, B) W."""

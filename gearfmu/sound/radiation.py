@@ -7,25 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearfmu.sound.boundary import Surface, memory_needed, surface_of
-from gearfmu.sound.levels import midbands
+from gearfmu.sound.levels import BANDS, midbands
 from gearfmu.sound.skin import Skin, SoundError, refined
 
 PANELS = 6  # patches a wavelength at least
 COUNT = 1500  # patches
-LINES = (63.0, 8000.0)  # Hz, nominal first and last third octave
-
-
-@dataclass(frozen=True)
-class Air:
-    """density kg/m³, speed of sound m/s; 20 °C and 101.325 kPa when not given."""
-
-    density: float = 1.204
-    speed: float = 343.2
-
-    @property
-    def impedance(self) -> float:
-        """ρc, N·s/m³."""
-        return self.density * self.speed
+SPEED = 343.2  # m/s, of sound in air of 20 °C and 101.325 kPa
+IMPEDANCE = 1.204 * SPEED  # ρc of it, N·s/m³
+MEMORY = 4e9  # bytes that boundary elements may take
 
 
 @dataclass(frozen=True)
@@ -49,30 +38,27 @@ class Radiation:
         return replace(self, resistance=own[0], gram=own[1])
 
 
-def radiation(
-    skin: Skin, lines: np.ndarray | None = None, count: int = COUNT, air: Air | None = None, memory: float = 4e9
-) -> Radiation:
+def radiation(skin: Skin, lines: np.ndarray | None = None, count: int = COUNT) -> Radiation:
     """R of a skin's coordinates by boundary elements at the frequencies `lines` (Hz), third octaves from 63 Hz to 8 kHz
     when None. Above six patches a wavelength R = ρc ∫ φ_n φ_nᵀ dS, its limit for short waves.
 
     count : patches at most: coarse triangles are halved and fine ones joined until there are about so many.
-    memory : bytes it may take. Raises SoundError, before anything is allocated, when it would take more.
+    Raises SoundError, before anything is allocated, when it would take more than MEMORY.
     """
-    air = air or Air()
-    lines = midbands(*LINES) if lines is None else np.asarray(lines, dtype=float)
+    lines = midbands(*BANDS) if lines is None else np.asarray(lines, dtype=float)
     need = memory_needed(count, skin.shapes.shape[2])
-    if need > memory:
-        raise SoundError(f"{count} patches take {need / 1e9:.2f} GB, more than {memory / 1e9:.2f}: take fewer patches")
+    if need > MEMORY:
+        raise SoundError(f"{count} patches take {need / 1e9:.2f} GB, more than {MEMORY / 1e9:.2f}: take fewer patches")
     edge = np.sqrt(np.linalg.norm(skin.normals, axis=1).sum() / count)
     surface = surface_of(refined(skin, 2 * edge), count)
-    gram, reach = skin.gram, air.speed / (PANELS * surface.edge)
+    gram, reach = skin.gram, SPEED / (PANELS * surface.edge)
     found, balance = [], []
     for line in lines:
-        own, decibel = (gram, 0.0) if line > reach else _at(surface, 2 * np.pi * line / air.speed, gram)
-        found.append(air.impedance * own)
+        own, decibel = (gram, 0.0) if line > reach else _at(surface, 2 * np.pi * line / SPEED, gram)
+        found.append(IMPEDANCE * own)
         balance.append(decibel)
     resistance = np.array(found, dtype=np.float32)
-    return Radiation(lines, resistance, gram, air.impedance, reach, np.array(balance), count)
+    return Radiation(lines, resistance, gram, IMPEDANCE, reach, np.array(balance), count)
 
 
 def _at(surface: Surface, k: float, gram: np.ndarray) -> tuple[np.ndarray, float]:
