@@ -11,9 +11,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationError,
+    model_serializer,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -31,9 +39,24 @@ _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*
 
 
 class Spec(BaseModel):
-    """Base of all specs: frozen, unknown keys refused, numbers finite."""
+    """Base of all specs: frozen, unknown keys refused, numbers finite. A field whose word in a file is none in Python
+    (`import`, `class`) is also known by its name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+class LaterFields(Spec):
+    """A table whose fields named in `later` are left out of its dump where they have their defaults: a file without
+    them is what it was before they were known."""
+
+    later: ClassVar[tuple[str, ...]] = ()
+
+    @model_serializer(mode="wrap")
+    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        tables: dict[str, object] = handler(self)
+        defaults = {name: type(self).model_fields[name].get_default(call_default_factory=True) for name in self.later}
+        silent = {name for name, value in self if name in defaults and value == defaults[name]}
+        return {name: value for name, value in tables.items() if name not in silent}
 
 
 SpecType = TypeVar("SpecType", bound=Spec)
@@ -125,6 +148,12 @@ Text = Annotated[str, Strict()]
 Name = Annotated[str, Strict(), Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Count = Annotated[int, Strict()]
 Switch = Annotated[bool, Strict()]
+
+
+def entry(meaning: str, default: Any = ..., **more: Any) -> Any:
+    """A field of a table: its meaning for the reader, and its default where a file need not give it. more : as of
+    pydantic's Field."""
+    return Field(default=default, description=meaning, **more)
 
 
 def refuse(remedy: str) -> PydanticCustomError:
