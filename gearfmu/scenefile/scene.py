@@ -172,7 +172,7 @@ def full_key(tables: Mapping[str, Any], key: str, file: str) -> str:
     found = next((f"{drive}.{name}" for drive, name in TORQUES.items() if drive in tables), None)
     if found is None:
         remedy = "this scene's drive has no single torque: name the field, such as shaft_loads.<port>.constant"
-        raise SpecError([Problem(file, "torque", "", remedy)])
+        raise SpecError.of(file, "torque", "", remedy)
     return found
 
 
@@ -186,9 +186,9 @@ def scene_path(path_or_name: str | Path) -> Path:
     file = str(path_or_name)
     if given.exists() or file in shipped_stages():
         remedy = "this is a stage: name it in a scene under [stage] (docs/howto-scene.md), or use the verb simulate"
-        raise SpecError([Problem(file, "", "", remedy)])
+        raise SpecError.of(file, "", "", remedy)
     hint = near_or_all(file, shipped_scenes(), "shipped are", cutoff=0.6)
-    raise SpecError([Problem(file, "", "", f"no such file and no shipped scene: {hint}")])
+    raise SpecError.of(file, "", "", f"no such file and no shipped scene: {hint}")
 
 
 def _problems(scene: SceneSpec) -> Found:

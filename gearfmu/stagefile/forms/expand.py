@@ -67,7 +67,7 @@ def with_bores(stage: Stage, coupling: str) -> Stage:
     form = stage.written
     if isinstance(form, PlanetarySpec):
         remedy = "the gears of a planetary set keep averaging bores: leave it away"
-        raise SpecError([Problem(str(stage.source), "bore", coupling, remedy)])
+        raise SpecError.of(stage.source, "bore", coupling, remedy)
     if isinstance(form, Stage):
         gears = {gear.name: _coupled(gear, coupling) for gear in form.gears if not isinstance(gear, RingBody)}
         return rewritten(stage, bodies=form.bodies | gears)

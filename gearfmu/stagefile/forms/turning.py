@@ -26,12 +26,13 @@ def shafts_of(stage: Stage) -> Shafts:
     """Input and output of a stage: its first and its second port. SpecError where it has fewer, or where no meshes lead
     from one to the other."""
     if len(stage.ports) < 2:
-        raise _refused(stage, ", ".join(stage.ports), "a stage needs an input and an output: write a second [ports.…]")
+        remedy = "a stage needs an input and an output: write a second [ports.…]"
+        raise SpecError.of(stage.source, "ports", ", ".join(stage.ports), remedy)
     first, second = list(stage.ports)[:2]
     driven, turning = stage.rotor_of(stage.ports[second].body), turns(stage, first)
     if driven not in turning or driven == stage.rotor_of(stage.ports[first].body):
         remedy = "no meshes lead from the first port to the second: put the two that drive and load the stage first"
-        raise _refused(stage, f"{first}, {second}", remedy)
+        raise SpecError.of(stage.source, "ports", f"{first}, {second}", remedy)
     return Shafts(first, second, float(1 / turning[driven]))
 
 
@@ -143,7 +144,3 @@ def _teeth(stage: Stage, gear: str) -> int:
     body = stage.bodies[gear]
     assert isinstance(body, ToothedBody)
     return body.teeth
-
-
-def _refused(stage: Stage, value: str, remedy: str) -> SpecError:
-    return SpecError([Problem(str(stage.source), "ports", value, remedy)])

@@ -81,9 +81,7 @@ def wish_of(given: Mapping[str, Any]) -> Wish:
     pitch = numbers.pop("diametral_pitch", None)
     if pitch is not None:
         if "module" in numbers or not pitch > 0:
-            raise SpecError(
-                [Problem("", "diametral_pitch", f"{pitch:g}", "a positive number, or the module, not both")]
-            )
+            raise SpecError.of("", "diametral_pitch", f"{pitch:g}", "a positive number, or the module, not both")
         numbers["module"] = INCH / pitch
     return Wish(**numbers)
 
@@ -192,7 +190,7 @@ def distance_of(wish: Wish, usual: float) -> float:
     found = distance_of_shifts(rack.m, rack.alpha, rack.beta, teeth, total)
     if wish.center is not None and abs(wish.center - found) > _SAME * rack.m:
         remedy = f"the profile shifts, {total:g} together, belong to {millimetres(found)}: leave one of both away"
-        raise SpecError([Problem("", "center", millimetres(wish.center), remedy)])
+        raise SpecError.of("", "center", millimetres(wish.center), remedy)
     return wish.center or found
 
 
@@ -237,7 +235,7 @@ def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometr
     if least > most:
         shown = f"1.5 Hertz half-widths, {millimetres(least)}, are more than half the flank, {millimetres(most)}"
         remedy = f"{shown}: at most {100 * (most / least) ** 2:.2g} % of this torque, or a larger module or width"
-        raise SpecError([Problem("", "torque", draft.at("torque_max"), remedy)])
+        raise SpecError.of("", "torque", draft.at("torque_max"), remedy)
     wide = min(_PATCH_PER_HERTZ / STRIP_PER_HERTZ * least, most)
     why = "0.12 m_n" if usual >= wide else "2 Hertz half-widths at torque_max"
     value = usual if usual >= wide else max(least, rounded_down(wide, 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import SpecError
 from gearfmu.geometry.mesh import PairGeometry, largest_relative_radius
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
@@ -32,7 +32,7 @@ def draft_pair(wish: Wish) -> Draft:
     pair = OpenPair(rack, teeth, distance)
     shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
     if shift is None:
-        raise SpecError([Problem("", "center", millimetres(distance), out_of_reach(pair))])
+        raise SpecError.of("", "center", millimetres(distance), out_of_reach(pair))
     geometry = pair.at(shift)
     draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in NAMES))
     if wish.center is None:

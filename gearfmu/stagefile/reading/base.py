@@ -180,7 +180,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         remedy = "the file is not UTF-8 text: save it as UTF-8"
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         remedy = f"not valid TOML: {error}"
-    raise SpecError([Problem(str(path), "", "", remedy)])
+    raise SpecError.of(path, "", "", remedy)
 
 
 def validate(
@@ -202,47 +202,36 @@ def _follows(entry: Any, entries: Sequence[Any]) -> bool:
     return entry["type"] == "too_short" and any(inside)
 
 
-def _is_tag(raw: object, part: str | int) -> bool:
-    """Whether `part` of a place only names the class that a table is read as."""
-    return isinstance(raw, dict) and part not in raw and part in (raw.get("kind", "gear"), *_TAGS)
-
-
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
-    for part in loc:
-        if _is_tag(raw, part):
-            continue
-        inside, label = _step(raw, part)
+    for _, label in _steps(raw, loc):
         path += label if label.startswith("[") or not path else f".{label}"
-        raw = inside
     return path
 
 
 def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
     """Keys and positions in `raw` that lead to a place of the model."""
-    path: list[Any] = []
+    return [key for key, _ in _steps(raw, loc)]
+
+
+def _steps(raw: Any, loc: tuple[str | int, ...]) -> Iterator[tuple[Any, str]]:
+    """Key or position in `raw` of every part of a place of the model, and how it is shown. Parts that only name the
+    class that a table is read as are left out."""
     for part in loc:
-        if _is_tag(raw, part):
-            continue
+        key, label, inside = part, str(part), None
         if isinstance(raw, dict):
-            key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
-            raw = raw.get(key)
-        else:
-            key = part
-            raw = raw[part] if isinstance(raw, list) and isinstance(part, int) and part < len(raw) else None
-        path.append(key)
-    return path
-
-
-def _step(raw: Any, part: str | int) -> tuple[Any, str]:
-    if isinstance(raw, dict):
-        key = part if part in raw or isinstance(part, str) else list(raw)[part] if part < len(raw) else str(part)
-        return raw.get(key), str(key)
-    if isinstance(raw, list) and isinstance(part, int) and part < len(raw):
-        name = raw[part].get("name") if isinstance(raw[part], dict) else None
-        return raw[part], name if isinstance(name, str) else f"[{part}]"
-    return None, str(part)
+            if part not in raw and part in (raw.get("kind", "gear"), *_TAGS):
+                continue
+            if isinstance(part, int) and part not in raw and part < len(raw):
+                key = list(raw)[part]
+            label, inside = str(key), raw.get(key)
+        elif isinstance(raw, list) and isinstance(part, int) and part < len(raw):
+            inside = raw[part]
+            name = inside.get("name") if isinstance(inside, dict) else None
+            label = name if isinstance(name, str) else f"[{part}]"
+        yield key, label
+        raw = inside
 
 
 def _problem(kind: type[Spec], raw: Any, file: str, entry: Any) -> Problem:
@@ -273,7 +262,7 @@ def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, An
     choices = [kind]
     for part in loc:
         if field := fields_by_key(choices[0]).get(part):
-            choices = inner_models(field.annotation)
+            choices = _inner_models(field.annotation)
             if not choices:
                 return {}
         else:
@@ -281,9 +270,10 @@ def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, An
     return fields_by_key(choices[0])
 
 
-def model_of_table(annotation: Any, table: object) -> type[BaseModel] | None:
-    """The spec class in an annotation that a table is read as; the first where the table says nothing."""
-    choices = inner_models(annotation)
+def model_of_table(annotation: Any, table: object = None) -> type[BaseModel] | None:
+    """The spec class in an annotation such as `Spec | None` or `dict[str, Spec]` that a table is read as, the first
+    where the table says nothing; None without one."""
+    choices = _inner_models(annotation)
     named = [choice for choice in choices if isinstance(table, dict) and table.get("kind") in _kinds(choice)]
     keyed = [choice for choice in choices if isinstance(table, dict) and vars(choice).get("key") in table]
     return next(iter(named or keyed or choices), None)
@@ -314,16 +304,16 @@ def metadata_of(field: FieldInfo) -> Iterator[Any]:
         yield from getattr(part, "__metadata__", ())
 
 
-def inner_model(annotation: Any) -> type[BaseModel] | None:
-    """The first spec class in an annotation such as `Spec | None` or `dict[str, Spec]`; None without one."""
-    return next(iter(inner_models(annotation)), None)
+def quantity_of(field: FieldInfo) -> Quantity | None:
+    """The Quantity of a field; None where it is of another kind."""
+    return next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
 
 
-def inner_models(annotation: Any) -> list[type[BaseModel]]:
+def _inner_models(annotation: Any) -> list[type[BaseModel]]:
     """The spec classes in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for part in get_args(annotation) for found in inner_models(part)]
+    return [found for part in get_args(annotation) for found in _inner_models(part)]
 
 
 def _shown(value: Any) -> str:

@@ -47,7 +47,7 @@ def read_profile(path: Path) -> Profile:
         rows = read_rows(path)
     except (OSError, UnicodeDecodeError) as error:
         why = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SpecError([Problem(str(path), "", "", f"the profile cannot be read ({why}): name a CSV file")]) from None
+        raise SpecError.of(path, "", "", f"the profile cannot be read ({why}): name a CSV file") from None
     found = reader.read(rows)
     if reader.problems:
         raise SpecError(reader.shown)
