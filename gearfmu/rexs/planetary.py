@@ -203,7 +203,7 @@ def _tip_that_clears(draft: Draft, distance: float) -> float:
         return 0.0
     shapes = (gear_geometry(planet, shared, HANDS["planet"]), ring_geometry(ring, shared, HANDS["ring"]))
     try:
-        return RingMesh(*shapes, distance, 0.0).least_tip_radius
+        return RingMesh(shapes, distance, 0.0).least_tip_radius
     except ValueError:
         return 0.0
 

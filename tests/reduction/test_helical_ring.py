@@ -105,7 +105,7 @@ def test_a_planet_of_the_rings_hand_touches_it_along_a_line_with_opposite_normal
         z=10, m=ring.m, alpha=ring.alpha, x=0.0, beta=BETA, r_a=0.015, r_bore=0.004, tip_edge=1e-4,
         h_fp=1.25 * ring.m, rho_fp=0.3 * ring.m,
     )  # fmt: skip
-    mesh = RingMesh(planet, ring, ring.r - planet.r + 1e-4, 0.0)
+    mesh = RingMesh((planet, ring), ring.r - planet.r + 1e-4, 0.0)
     phase = {planet: 0.0, ring: mesh.ring_phase(0.0, 0.0)}
     for z in np.linspace(-WIDTH / 2, WIDTH / 2, 5):
         rolls, points, normals, profiles = [], [], [], []

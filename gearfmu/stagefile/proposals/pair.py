@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gearfmu.errors import SpecError
-from gearfmu.geometry.mesh import PairGeometry, largest_relative_radius
+from gearfmu.geometry.mesh import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
@@ -56,7 +56,7 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     ratio = wheel.z / pinion.z
     usual = usual_torque(2 * pinion.r, ratio, width), PITCH_SPEED / pinion.r
     torque, _ = put_load(draft, wish, *usual)
-    radius = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
+    radius = geometry.largest_relative_radius()
     for name, gear in zip(NAMES, geometry.gears, strict=True):
         put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
     put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.mesh import MOUNTS, RingMesh, largest_relative_radius, least_apart, set_ratio
+from gearfmu.geometry.mesh import MOUNTS, RingMesh, least_apart, set_ratio
 from gearfmu.geometry.shifts import (
     DEDENDUM,
     RING_FILLET,
@@ -120,7 +120,7 @@ def _ring_mesh(wish: Wish, planet: GearGeometry, distance: float) -> tuple[RingM
     difference = sum_of_shifts(planet.m, planet.alpha, planet.beta, ring - planet.z, distance)
     if ring <= planet.z or not abs(difference) < 3:
         return None, [Problem("", "teeth", wish.shown, f"sun and ring have no common centre distance: {coaxial}")]
-    mesh = RingMesh(planet, ring_of(planet, ring, distance), distance, 0.0)
+    mesh = RingMesh((planet, ring_of(planet, ring, distance)), distance, 0.0)
     if found := list(ring_shortcomings(mesh)):
         return None, [Problem("", "teeth", wish.shown, f"{', '.join(found)}; {coaxial}, the ring has {ring}")]
     return mesh, []
@@ -177,8 +177,7 @@ def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: Rin
     usual = usual_torque(2 * sun.r, planet.z / sun.z, width) * count / _SHARING[count] * ratio
     torque, _ = put_load(draft, wish, usual, PITCH_SPEED / sun.r / ratio)
     load = _SHARING[count] * torque / ratio / count / sun.r_b / width
-    outer = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
-    inner = mesh.largest_relative_radius()
+    outer, inner = geometry.largest_relative_radius(), mesh.largest_relative_radius()
     put_patch(draft, "sun", sun, load, outer)
     put_patch(draft, "planet", planet, load, max(outer, inner))
     put_patch(draft, "ring", mesh.ring, load, inner)
