@@ -108,6 +108,19 @@ def put_shafts(draft: Draft, torques: dict[str, float]) -> None:
         draft.assume(f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
 
 
+def put_limit(draft: Draft, field: str, known: tuple[float | None, str], usual: tuple[float, str]) -> float:
+    """Puts `torque_max` (N·m) or `speed_max` (rad/s), rounded up, and returns it: as known, with its origin, else the
+    usual one, with the rule behind it."""
+    unit, digits = {"torque_max": ("N*m", 3), "speed_max": ("rad/s", 4)}[field]
+    if known[0]:
+        value = rounded_up(known[0], digits)
+        draft.put(field, f"{value:g} {unit}", known[1])
+    else:
+        value = rounded_up(usual[0], 2)
+        draft.assume(field, f"{value:g} {unit}", usual[1])
+    return value
+
+
 def millimetres(value: float) -> str:
     """A length in m as text for a stage file, to a nanometre."""
     return f"{round(1e3 * value, 6):.10g} mm"
