@@ -36,14 +36,14 @@ NAMES = ("pinion", "wheel")
 
 
 def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Component]) -> Draft:
-    """The draft of a pair; what cannot be read is in its problems."""
+    """The draft of a pair; what cannot be read is in the model's problems."""
     read = [gear_of(model, component) for component in pair]
     distance = model.si(stage, "center_distance", "m")
     if not distance:
         model.refuse(stage, "center_distance", "", "this attribute is missing: add it")
     gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
     if len(gears) < 2 or not distance:
-        return Draft({}, problems=model.problems)
+        return Draft({})
     draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
     _put_pair(model, draft, stage, gears)
     places = dict(zip(("gears.pinion", "gears.wheel"), gears, strict=True))

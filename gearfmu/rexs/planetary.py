@@ -34,19 +34,19 @@ _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
 
 
 def draft_set(model: RexsModel, stage: Component) -> Draft:
-    """The draft of a planetary set; what cannot be read is in its problems."""
+    """The draft of a planetary set; what cannot be read is in the model's problems."""
     meshes = model.related(stage, "cylindrical_stage", relation="assembly")
     found = _parts(model, meshes)
     distance = _distance(model, meshes)
     if found is None or distance is None:
         remedy = "needs cylindrical_stage parts with a center_distance that join one sun, planets and one ring_gear"
         model.problems.append(Problem(str(model.path), str(stage), "", remedy))
-        return Draft({}, problems=model.problems)
+        return Draft({})
     components, planets = found
     read = [gear_of(model, component) for component in components]
     gears = [gear for gear in read if gear is not None]
     if len(gears) < 3:
-        return Draft({}, problems=model.problems)
+        return Draft({})
     _check_planets(model, planets, gears[1])
     draft = Draft.after("helical_set" if gears[0].helix_angle else "planetary54")
     draft.put("set.center_distance", millimetres(abs(distance)), f"REXS cylindrical_stage {meshes[0].id}")

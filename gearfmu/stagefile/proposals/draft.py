@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from gearfmu.errors import Problem
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.reading.files import find_stage, read_layers
 
@@ -34,13 +33,12 @@ class Unread:
 
 @dataclass
 class Draft:
-    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; problems: what could not be read;
-    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from; word:
-    what a value is that nobody gave, "assumed" or "proposed"."""
+    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; unread: everything that was not used;
+    notes: sentences for the reader; like: the stage that the rest is from; word: what a value is that nobody gave,
+    "assumed" or "proposed"."""
 
     tables: dict[str, Any]
     marks: dict[str, str] = field(default_factory=dict)
-    problems: list[Problem] = field(default_factory=list)
     unread: tuple[Unread, ...] = ()
     notes: list[str] = field(default_factory=list)
     like: str = ""

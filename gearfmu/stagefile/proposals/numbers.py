@@ -181,6 +181,14 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
     return draft
 
 
+def put_center(draft: Draft, wish: Wish, table: str, distance: float, why: str) -> None:
+    """The centre distance (m) as given, or as proposed with the rule behind it."""
+    if wish.center is None:
+        draft.assume(f"{table}.center_distance", millimetres(distance), why)
+    else:
+        draft.put(f"{table}.center_distance", millimetres(distance), GIVEN)
+
+
 def distance_of(wish: Wish, usual: float) -> float:
     """Centre distance (m) of the first two gears: as given, that of the given profile shifts, else `usual`. SpecError
     where both are given and disagree."""
@@ -194,24 +202,22 @@ def distance_of(wish: Wish, usual: float) -> float:
     return wish.center or found
 
 
-def put_wishes(draft: Draft, wish: Wish, places: tuple[str, str]) -> None:
-    """Bores and tip relief that were asked for, of both external gears."""
-    for place, bore in zip(places, wish.bores, strict=False):
-        draft.put(f"{place}.bore_diameter", millimetres(bore), GIVEN)
-    for place in places if wish.relief else ():
-        relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
-        draft.put(f"{place}.tip_relief", relief, GIVEN)
-
-
-def put_gear(draft: Draft, place: str, gear: GearGeometry, shift: str) -> None:
-    """Teeth, profile shift (`shift`: the rule behind it), tip circle, rack and bore of an external gear."""
+def put_gear(draft: Draft, wish: Wish, number: int, place: str, gear: GearGeometry, shift: str) -> None:
+    """Teeth, profile shift (`shift`: the rule behind it), tip circle, rack, bore and relief of an external gear, which
+    is 0 or 1 in `wish`."""
     draft.put(f"{place}.teeth", gear.z, GIVEN)
     draft.assume(f"{place}.profile_shift", round(gear.x, 6) + 0.0, shift)
     why = f"tip clearance 0.25 m_n kept; root diameter {millimetres(round(2 * gear.r_f, 6))}"
     draft.assume(f"{place}.tip_diameter", millimetres(2 * gear.r_a), why)
     rack = {"addendum": ADDENDUM, "dedendum": DEDENDUM, "fillet_radius": round(gear.rho_fp / gear.m, 6)}
     draft.put(f"{place}.rack", rack, "proposed: ISO 53, profile A")
-    draft.assume(f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
+    if wish.bores:
+        draft.put(f"{place}.bore_diameter", millimetres(wish.bores[number]), GIVEN)
+    else:
+        draft.assume(f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
+    if wish.relief:
+        relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
+        draft.put(f"{place}.tip_relief", relief, GIVEN)
 
 
 def put_load(draft: Draft, wish: Wish, torque: float, speed: float) -> tuple[float, float]:

@@ -14,11 +14,11 @@ from gearfmu.stagefile.proposals.numbers import (
     Wish,
     begun,
     distance_of,
+    put_center,
     put_gear,
     put_load,
     put_patch,
     put_slices,
-    put_wishes,
 )
 
 NAMES = ("pinion", "wheel")
@@ -35,16 +35,12 @@ def draft_pair(wish: Wish) -> Draft:
         raise SpecError.of("", "center", millimetres(distance), out_of_reach(pair))
     geometry = pair.at(shift)
     draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in NAMES))
-    if wish.center is None:
-        why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
-        draft.assume("pair.center_distance", millimetres(distance), why)
-    else:
-        draft.put("pair.center_distance", millimetres(distance), GIVEN)
+    why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
+    put_center(draft, wish, "pair", distance, why)
     rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
     rules = (GIVEN, GIVEN) if wish.shifts else rules
-    for name, gear, rule in zip(NAMES, geometry.gears, rules, strict=True):
-        put_gear(draft, f"gears.{name}", gear, rule)
-    put_wishes(draft, wish, ("gears.pinion", "gears.wheel"))
+    for k, name in enumerate(NAMES):
+        put_gear(draft, wish, k, f"gears.{name}", geometry.gears[k], rules[k])
     _put_loads(draft, wish, geometry, width)
     put_slices(draft, rack, width)
     return draft

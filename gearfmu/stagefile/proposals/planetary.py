@@ -24,11 +24,11 @@ from gearfmu.stagefile.proposals.numbers import (
     Wish,
     begun,
     distance_of,
+    put_center,
     put_gear,
     put_load,
     put_patch,
     put_slices,
-    put_wishes,
 )
 from gearfmu.stagefile.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
 
@@ -55,15 +55,11 @@ def draft_set(wish: Wish) -> Draft:
     if problems or mesh is None or shift is None:
         raise SpecError(problems)
     draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
-    if wish.center is None:
-        same = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
-        draft.assume("set.center_distance", millimetres(distance), same)
-    else:
-        draft.put("set.center_distance", millimetres(distance), GIVEN)
+    why = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
+    put_center(draft, wish, "set", distance, why)
     _put_planets(draft, wish)
-    put_gear(draft, "sun", pair.at(shift).gears[0], SHIFT_RULE)
-    put_gear(draft, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
-    put_wishes(draft, wish, ("sun", "planet"))
+    put_gear(draft, wish, 0, "sun", pair.at(shift).gears[0], SHIFT_RULE)
+    put_gear(draft, wish, 1, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
     _put_ring(draft, mesh)
     _put_carrier(draft, wish, mesh)
     _put_loads(draft, wish, pair, shift, mesh)
