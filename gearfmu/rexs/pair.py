@@ -6,15 +6,7 @@ import math
 
 from gearfmu.geometry.mesh import common_width
 from gearfmu.quantities import to_si
-from gearfmu.rexs.gears import (
-    RexsGear,
-    gear_of,
-    place_shifts,
-    put_external,
-    put_teeth,
-    shaft_speed,
-    shaft_torque,
-)
+from gearfmu.rexs.gears import RexsGear, gear_of, place_shifts, put_external, put_teeth, shaft_speed, shaft_torque
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width

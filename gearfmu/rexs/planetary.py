@@ -22,10 +22,7 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.rexs.pair import (
-    assumed_torque,
-    put_rack_data,
-)
+from gearfmu.rexs.pair import assumed_torque, put_rack_data
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres, put_limit
 

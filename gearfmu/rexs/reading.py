@@ -71,8 +71,7 @@ def _from_xml(path: Path, content: bytes) -> tuple[str, list[Component], tuple[R
     ]
     relations = tuple(
         Relation(
-            element.get("type", ""),
-            tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref")),
+            element.get("type", ""), tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref"))
         )
         for element in root.iterfind("relations/relation")
     )

@@ -110,10 +110,7 @@ def _names(stage: Stage) -> Found:
     for name, port in stage.ports.items():
         if port.body not in stage.bodies:
             yield f"ports.{name}.body", port.body, _unknown_body(stage)
-    for group, items, longest in (
-        ("engagements", stage.engagements, 31),
-        ("supports", stage.supports, 20),
-    ):
+    for group, items, longest in (("engagements", stage.engagements, 31), ("supports", stage.supports, 20)):
         for item in items:
             if len(item.name) > longest:
                 yield f"{group}.{item.name}.name", item.name, f"at most {longest} characters: shorten it"

@@ -15,16 +15,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
-from gearfmu.stagefile.reading.base import (
-    LaterFields,
-    Name,
-    Quantity,
-    Spec,
-    Text,
-    entry,
-    named_tables,
-    refuse,
-)
+from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Spec, Text, entry, named_tables, refuse
 from gearfmu.stagefile.tables.bodies import (
     Backlash,
     GearSpec,

@@ -11,14 +11,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.stagefile.forms.shapes import gears_in_mesh
 from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Text, entry, refuse
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.stagefile.tables.connections import (
-    Bearings,
-    ContactSpec,
-    LevelSpec,
-    Limits,
-    OperatingSpec,
-    PortSpec,
-)
+from gearfmu.stagefile.tables.connections import Bearings, ContactSpec, LevelSpec, Limits, OperatingSpec, PortSpec
 
 Table = TypeVar("Table")
 

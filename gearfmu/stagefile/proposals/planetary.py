@@ -8,14 +8,7 @@ from collections.abc import Iterator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.mesh import MOUNTS, RingMesh, least_apart, set_ratio
-from gearfmu.geometry.shifts import (
-    DEDENDUM,
-    RING_FILLET,
-    OpenPair,
-    ring_of,
-    ring_shortcomings,
-    sum_of_shifts,
-)
+from gearfmu.geometry.shifts import DEDENDUM, RING_FILLET, OpenPair, ring_of, ring_shortcomings, sum_of_shifts
 from gearfmu.quantities import range_of
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
@@ -157,9 +150,7 @@ def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
     draft.assume("carrier.thickness", millimetres(thickness), "0.6 of the face width")
     draft.assume("carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
     draft.assume(
-        "carrier.mesh.scale",
-        _CARRIER_SCALE,
-        "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh",
+        "carrier.mesh.scale", _CARRIER_SCALE, "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh"
     )
     inputs = 6 * ((wish.planets or 1) + 1)
     draft.assume("carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
