@@ -173,7 +173,7 @@ class Origin:
 
 
 _OF_FORMS = ("pair", "contact", "geometry", "torque_max", "speed_max", "set", "sun", "planet", "ring", "carrier")
-_OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
+OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
 
 
 class Stage(LaterFields):
@@ -216,7 +216,7 @@ class Stage(LaterFields):
             raise AttributeError(f"a Stage has no {', '.join(sorted(unknown))}: change what is written in its file")
         found, form = super().model_copy(update=update, deep=deep), self._origin.form
         if form is not None:
-            said = set(update or {}) <= _OF_BOTH & set(type(form).model_fields)
+            said = set(update or {}) <= OF_BOTH & set(type(form).model_fields)
             found._origin = replace(self._origin, form=form.model_copy(update=update)) if said else Origin()
         return found
 

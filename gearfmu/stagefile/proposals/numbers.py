@@ -36,6 +36,11 @@ _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the sh
 INCH = 25.4e-3  # m
 _SAME = 1e-4  # of the module: centre distances that agree
 _LEAST_FILLET = 0.05  # of the module
+_RANGES = {  # of the numbers of a Wish
+    "module": "module", "width": "face_width", "planets": "planets", "center": "center_distance",
+    "helix": "helix_angle", "pressure_angle": "pressure_angle", "torque": "torque_max", "speed": "speed_max",
+    "relief": "relief",
+}  # fmt: skip
 _PATCH_PER_HERTZ = 2.0  # slices of tilted or helical teeth carry more than the mean
 
 
@@ -96,16 +101,12 @@ def new_from_numbers(name: str, wish: Wish, folder: str | os.PathLike[str] = "."
     kind = "planetary set" if wish.planets else "pair"
     origin = f"proposed for a {kind} of {wish.shown} teeth, m_n = {millimetres(wish.rack.m)}"
     with tempfile.TemporaryDirectory() as apart:  # an invalid stage is never left behind
-        _judge(write_drafted(name, draft.tables, draft.marks, origin, apart))
+        path = write_drafted(name, draft.tables, draft.marks, origin, apart)
+        try:
+            load_stage(path)
+        except SpecError as error:
+            raise SpecError(replace(problem, file="") for problem in error.problems) from None
     return write_drafted(name, draft.tables, draft.marks, origin, folder)
-
-
-def _judge(path: Path) -> None:
-    """SpecError, without the name of the file, where the stage is not valid."""
-    try:
-        load_stage(path)
-    except SpecError as error:
-        raise SpecError(replace(problem, file="") for problem in error.problems) from None
 
 
 def draft_of(wish: Wish) -> Draft:
@@ -114,7 +115,7 @@ def draft_of(wish: Wish) -> Draft:
     from gearfmu.stagefile.proposals.planetary import draft_set
 
     wish = replace(wish, teeth=tuple(abs(z) for z in wish.teeth))
-    if problems := [*_missing(wish), *_beyond(wish), *_no_fillet(wish)]:
+    if problems := [*_missing(wish), *_beyond(wish)]:
         raise SpecError(problems)
     return draft_set(wish) if wish.planets else draft_pair(wish)
 
@@ -130,38 +131,23 @@ def _missing(wish: Wish) -> Iterator[Problem]:
         yield Problem("", "width", "", 'this number is missing: give the common face width, such as "20 mm"')
     for field, given in (("shifts", wish.shifts), ("bores", wish.bores)):
         if len(given) not in (0, 2):
-            yield Problem(
-                "", field, str(len(given)), f"give two: of {'sun and planet' if wish.planets else 'both gears'}"
-            )
+            remedy = f"give two: of {'sun and planet' if wish.planets else 'both gears'}"
+            yield Problem("", field, str(len(given)), remedy)
     if wish.unequal and not wish.planets:
         yield Problem("", "unequal", "", "this is about the places of planets: give their number")
 
 
-def _no_fillet(wish: Wish) -> Iterator[Problem]:
+def _beyond(wish: Wish) -> list[Problem]:
+    given, kinds = vars(wish) | {"relief": wish.relief or None}, ("teeth", "teeth", "ring_teeth")
+    numbers = {f"teeth ({z})": (float(z), range_of(kind)) for z, kind in zip(wish.teeth, kinds, strict=False)}
+    numbers |= {field: (given[field], range_of(kind)) for field, kind in _RANGES.items()}
+    numbers |= {f"bores ({bore:g} m)": (bore, range_of("bore")) for bore in wish.bores}
+    numbers |= {f"shifts ({shift:g})": (shift, range_of("profile_shift")) for shift in wish.shifts}
+    problems = range_problems(numbers)
     if wish.rack.fillet < _LEAST_FILLET:
         remedy = f"the tips of a rack with dedendum {DEDENDUM:g} m_n are pointed: take less, such as 25 deg"
-        yield Problem("", "pressure_angle", degrees(wish.pressure_angle), remedy)
-
-
-def _beyond(wish: Wish) -> list[Problem]:
-    kinds = ("teeth", "teeth", "ring_teeth")
-    numbers = {f"teeth ({z})": (float(z), range_of(kind)) for z, kind in zip(wish.teeth, kinds, strict=False)}
-    return range_problems(
-        numbers
-        | {
-            "module": (wish.module, range_of("module")),
-            "width": (wish.width, range_of("face_width")),
-            "planets": (wish.planets, range_of("planets")),
-            "center": (wish.center, range_of("center_distance")),
-            "helix": (wish.helix, range_of("helix_angle")),
-            "pressure_angle": (wish.pressure_angle, range_of("pressure_angle")),
-            "torque": (wish.torque, range_of("torque_max")),
-            "speed": (wish.speed, range_of("speed_max")),
-            "relief": (wish.relief or None, range_of("relief")),
-        }
-        | {f"bores ({bore:g} m)": (bore, range_of("bore")) for bore in wish.bores}
-        | {f"shifts ({shift:g})": (shift, range_of("profile_shift")) for shift in wish.shifts}
-    )
+        problems.append(Problem("", "pressure_angle", degrees(wish.pressure_angle), remedy))
+    return problems
 
 
 def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
