@@ -230,8 +230,7 @@ def shaft_torque(model: RexsModel, component: Component) -> float | None:
     """Largest torque (N·m) that an external load brings into the shaft of a gear, over all load cases."""
     shafts = model.related(component, "shaft", relation="assembly")
     loads = [load for shaft in shafts for load in model.related(shaft, "external_load")]
-    found = [model.largest(load, "torque_around_u_axis", "N*m") for load in loads]
-    return max((value for value in found if value), default=None)
+    return max((m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))), default=None)
 
 
 def shaft_speed(model: RexsModel, component: Component) -> float | None:

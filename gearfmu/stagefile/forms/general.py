@@ -352,13 +352,9 @@ class Stage(LaterFields):
         bodies = {name: body for name, body in self.bodies.items() if name not in names}
         return self.model_copy(update={"bodies": bodies, "supports": tuple(supports)})
 
-    def carrier_of(self, rotor: str) -> str | None:
-        """Name of the rotor in whose axes a rotor stands; None: the ground."""
-        return self.rotors[rotor].carried_by
-
     def frame_of(self, mesh: EngagementSpec) -> str | None:
         """Name of the rotor in whose axes an engagement rolls; None: the ground."""
-        return self.carrier_of(self.rotor_of(mesh.gears[0]))
+        return self.rotors[self.rotor_of(mesh.gears[0])].carried_by
 
     def rotor_of(self, body: str) -> str:
         """Name of the rotor that a body belongs to."""

@@ -153,11 +153,7 @@ def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
     unit = quantity.unit if quantity else ""
     text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
     meaning = field.description or ""
-    choices = (
-        [part for part in get_args(field.annotation) if isinstance(part, str)]
-        if get_origin(field.annotation) is Literal
-        else []
-    )
+    choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
     if len(choices) > 1:
         meaning += f" ({' | '.join(choices)})"
     return f"{text:<42}  # {meaning}{f' [{unit}]' if unit else ''}"

@@ -30,13 +30,13 @@ def library_roots() -> tuple[Path, ...]:
     return tuple(root for root in candidates if root.is_dir())
 
 
+def _shipped_files() -> list[Path]:
+    return [path for root in library_roots() for path in sorted(root.glob("*/stage*.toml"))]
+
+
 def shipped_stages() -> list[str]:
     """Names that `find_stage` knows: "fzg_c", and "fzg_c/stage_relief" for further stage files of a folder."""
-    names = set()
-    for root in library_roots():
-        for path in root.glob("*/stage*.toml"):
-            names.add(path.parent.name if path.name == "stage.toml" else f"{path.parent.name}/{path.stem}")
-    return sorted(names)
+    return sorted({p.parent.name if p.name == "stage.toml" else f"{p.parent.name}/{p.stem}" for p in _shipped_files()})
 
 
 def find_stage(name: str | os.PathLike[str]) -> Path:
@@ -59,8 +59,7 @@ def find_stage(name: str | os.PathLike[str]) -> Path:
 
 def _shipped_of_name(name: str) -> Path | None:
     """The shipped stage file that says `name = …` so."""
-    files = (path for root in library_roots() for path in sorted(root.glob("*/stage*.toml")))
-    return next((path for path in files if read_toml(path).get("name") == name), None)
+    return next((path for path in _shipped_files() if read_toml(path).get("name") == name), None)
 
 
 def model_folder(stage: Any) -> Path:

@@ -102,10 +102,7 @@ class _Reader(RowReader):
             return {}
         found = {}
         for (name, scale), cell in zip(scales, cells, strict=True):
-            try:
-                value = number(cell)
-            except ValueError:
-                value = np.nan
+            value = number(cell) if _is_number(cell) else np.nan
             if name and not np.isfinite(value):
                 self.refuse(f"{where}, {name}", cell, "expected a finite number")
             elif name and (refusal := range_of(name).refusal(scale * value)):
