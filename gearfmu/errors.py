@@ -42,6 +42,11 @@ class SpecError(GearfmuError):
         assert self.problems, "a SpecError without a problem"
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    @classmethod
+    def of(cls, file: object, field: str, value: object, remedy: str) -> SpecError:
+        """The error with one problem."""
+        return cls([Problem(str(file), field, str(value), remedy)])
+
 
 class MeshError(GearfmuError):
     """A geometry that the mesher cannot fill with valid elements at the chosen counts."""

@@ -240,10 +240,6 @@ class GearGeometry(ReferenceGear):
         """Unit normals (..., 2) out of tooth 0 in the transverse section."""
         return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
 
-    def tip_edge_centre(self, sg: int = 1) -> np.ndarray:
-        """Centre (2,) in m of the tip edge rounding."""
-        return self.flank_point(self.s_tip, sg) - self.tip_edge * self.flank_normal(self.s_tip, sg)
-
 
 @lru_cache(maxsize=64)
 def _crossing(gear: GearGeometry) -> float:

@@ -66,11 +66,7 @@ class Draw:
 
 
 def draw(
-    tolerances: Tolerances,
-    teeth: int,
-    pressure_angle: float,
-    seed: Sequence[int],
-    per_tooth: bool = True,
+    tolerances: Tolerances, teeth: int, pressure_angle: float, seed: Sequence[int], per_tooth: bool = True
 ) -> Draw:
     """A gear of these tolerances, the same for the same seed (integers) on every machine and with every numpy.
 

@@ -9,62 +9,49 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
+from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry, ReferenceGear
 
 HANDS = {"sun": 1, "planet": -1, "ring": -1}  # sign of the helix angle over that of the set
 MOUNTS = 6  # of a ring, where nothing says how many
 
 
-class HasGeometry(Protocol):
-    """A stage that is a pair."""
-
-    @property
-    def geometry(self) -> PairGeometry:
-        """Its pair."""
-
-
 @dataclass(frozen=True)
-class PairGeometry:
-    """Pinion and wheel at centre distance `a` (m) with circumferential backlash j_wt (m) on the working pitch circles.
+class GearMesh:
+    """Two gears at centre distance `a` (m) with circumferential backlash j_wt (m) on the working pitch circles.
 
-    Gears of a helical pair have helix angles of opposite sign. Rolls along the path of contact are those of gear 0;
-    the other gear's is `length` − s. Gears must reach each
-    other's base circles' common tangent: a > r_b1 + r_b2 (ValueError otherwise).
+    Rolls along the path of contact are those of gear 0. It is external; gear 1 is external too (`PairGeometry`), or a
+    ring (`RingMesh`). side: 1 where the radii of both add up to the centre distance, -1 where gear 0 is inside gear 1.
     """
 
-    gears: tuple[GearGeometry, GearGeometry]
+    gears: tuple[GearGeometry, ReferenceGear]
     a: float
     backlash: float
+    side: ClassVar[int]
 
-    def __post_init__(self) -> None:
-        if not self.a > self.gears[0].r_b + self.gears[1].r_b:
-            raise ValueError("the centre distance is smaller than the sum of the base radii")
-
-    @classmethod
-    def of(cls, stage: HasGeometry) -> PairGeometry:
-        """The pair of a stage: another name of its `geometry`, for scripts of release 0.2."""
-        return stage.geometry
+    @property
+    def base(self) -> float:
+        """Sum of the base radii, of a ring their difference, m."""
+        return self.gears[1].r_b + self.side * self.gears[0].r_b
 
     @property
     def alpha_wt(self) -> float:
         """Working transverse pressure angle, rad."""
-        return math.atan2(self.length, self.gears[0].r_b + self.gears[1].r_b)
+        return math.atan2(self.length, self.base)
 
     @property
     def length(self) -> float:
         """Distance (m) of the tangent points of the line of action with the base circles, a sin α_wt."""
-        base = self.gears[0].r_b + self.gears[1].r_b
-        return math.sqrt((self.a - base) * (self.a + base))
+        return math.sqrt((self.a - self.base) * (self.a + self.base))
 
     @property
     def r_w(self) -> tuple[float, float]:
         """Working pitch radii, m."""
-        teeth = self.gears[0].z + self.gears[1].z
+        teeth = self.gears[1].z + self.side * self.gears[0].z
         return self.a * self.gears[0].z / teeth, self.a * self.gears[1].z / teeth
 
     @property
@@ -72,13 +59,10 @@ class PairGeometry:
         """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
         return math.pi * self.gears[0].m_t * math.cos(self.gears[0].alpha_t)
 
-    def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
-        return self.gears[0].overlap_ratio(face_width)
-
-    def opposite(self, roll: float) -> float:
-        """Roll (m) on the other gear at the contact point that has `roll` (m) on this one."""
-        return self.length - roll
+    @property
+    def start(self) -> float:
+        """Roll (m) of gear 0 at the beginning of the path of contact, where the tip edge rounding of gear 1 begins."""
+        raise NotImplementedError
 
     @property
     def path(self) -> dict[str, float]:
@@ -86,20 +70,52 @@ class PairGeometry:
 
         A, E: ends, where the tip edge roundings begin; B, D: limits of single contact; C: pitch point.
         """
-        start, end = self.opposite(self.gears[1].s_tip), self.gears[0].s_tip
+        start, end = self.start, self.gears[0].s_tip
         pitch = self.gears[0].r_b * math.tan(self.alpha_wt)
         return {"A": start, "B": end - self.base_pitch, "C": pitch, "D": start + self.base_pitch, "E": end}
-
-    def largest_relative_radius(self) -> float:
-        """Largest relative radius of curvature s (L − s)/L (m) along the path of contact."""
-        path = self.path
-        return largest_relative_radius(self.length, path["A"], path["E"])
 
     @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio of the usable flanks, up to where the tip edge roundings begin."""
         path = self.path
         return (path["E"] - path["A"]) / self.base_pitch
+
+    def overlap_ratio(self, face_width: float) -> float:
+        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
+        return self.gears[0].overlap_ratio(face_width)
+
+    @property
+    def normal_backlash(self) -> float:
+        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
+        return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
+
+
+@dataclass(frozen=True)
+class PairGeometry(GearMesh):
+    """Pinion and wheel, of a helical pair with helix angles of opposite sign. The roll of the wheel is `length` − s.
+
+    Gears must reach each other's base circles' common tangent: a > r_b1 + r_b2 (ValueError otherwise).
+    """
+
+    gears: tuple[GearGeometry, GearGeometry]
+    side = 1
+
+    def __post_init__(self) -> None:
+        if not self.a > self.base:
+            raise ValueError("the centre distance is smaller than the sum of the base radii")
+
+    def opposite(self, roll: float) -> float:
+        """Roll (m) on the other gear at the contact point that has `roll` (m) on this one."""
+        return self.length - roll
+
+    @property
+    def start(self) -> float:
+        return self.opposite(self.gears[1].s_tip)
+
+    def largest_relative_radius(self) -> float:
+        """Largest relative radius of curvature s (L − s)/L (m) along the path of contact."""
+        roll = min(max(self.length / 2, self.path["A"]), self.path["E"])
+        return roll * (self.length - roll) / self.length
 
     @property
     def tip_circle_contact_ratio(self) -> float:
@@ -120,11 +136,6 @@ class PairGeometry:
         inv_w = float(involute.inv(self.alpha_wt))
         thickness = [2 * r_w * (gear.psi_b - inv_w) for r_w, gear in zip(self.r_w, self.gears, strict=True)]
         return 2 * math.pi * self.r_w[0] / self.gears[0].z - sum(thickness)
-
-    @property
-    def normal_backlash(self) -> float:
-        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
-        return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
 
     @property
     def wheel_phase(self) -> float:
@@ -152,58 +163,30 @@ def mount_spaces(teeth: int, points: int) -> list[int]:
 
 
 @dataclass(frozen=True)
-class RingMesh:
-    """A planet in the ring at centre distance `a` (m), with circumferential backlash (m) on its working pitch circle.
+class RingMesh(GearMesh):
+    """A planet in its ring. Along the line of action the ring's roll is that of the planet plus `length`.
+    a > r_b,ring − r_b,planet > 0 is needed (ValueError otherwise)."""
 
-    Along the line of action the ring's roll is that of the planet plus `length`. a > r_b,ring − r_b,planet is needed
-    (ValueError otherwise).
-    """
-
-    planet: GearGeometry
-    ring: InternalGearGeometry
-    a: float
-    backlash: float
+    gears: tuple[GearGeometry, InternalGearGeometry]
+    side = -1
 
     def __post_init__(self) -> None:
-        if not self.a > self.ring.r_b - self.planet.r_b > 0:
+        if not self.a > self.base > 0:
             raise ValueError("the centre distance is smaller than the difference of the base radii")
 
     @property
-    def gears(self) -> tuple[GearGeometry, InternalGearGeometry]:
-        """Planet and ring."""
-        return self.planet, self.ring
+    def planet(self) -> GearGeometry:
+        """The gear in the ring."""
+        return self.gears[0]
 
     @property
-    def length(self) -> float:
-        """Distance (m) of the line of action's tangent points with the base circles, a sin α_wt."""
-        base = self.ring.r_b - self.planet.r_b
-        return math.sqrt((self.a - base) * (self.a + base))
+    def ring(self) -> InternalGearGeometry:
+        """The ring."""
+        return self.gears[1]
 
     @property
-    def alpha_wt(self) -> float:
-        """Working pressure angle, rad."""
-        return math.atan2(self.length, self.ring.r_b - self.planet.r_b)
-
-    @property
-    def path(self) -> dict[str, float]:
-        """Rolls (m) of the planet at the ends of the path of contact: A at the ring's tip, E at its own; C pitch."""
-        pitch = self.planet.r_b * math.tan(self.alpha_wt)
-        return {"A": self.ring.s_tip - self.length, "C": pitch, "E": self.planet.s_tip}
-
-    @property
-    def planet_pitch_radius(self) -> float:
-        """Working pitch radius (m) of the planet."""
-        return self.a * self.planet.z / (self.ring.z - self.planet.z)
-
-    @property
-    def contact_ratio(self) -> float:
-        """Transverse contact ratio of the usable flanks."""
-        return (self.path["E"] - self.path["A"]) / self.base_pitch
-
-    @property
-    def base_pitch(self) -> float:
-        """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
-        return math.pi * self.planet.m_t * math.cos(self.planet.alpha_t)
+    def start(self) -> float:
+        return self.ring.s_tip - self.length
 
     def outer_single_contact(self, gear: int) -> float:
         """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
@@ -212,11 +195,6 @@ class RingMesh:
     def inner_single_contact(self, gear: int) -> float:
         """Roll (m) of the point of single contact that is nearer to the root of the planet (0) or of the ring (1)."""
         return (self.path["E"] - self.base_pitch, self.path["A"] + self.base_pitch + self.length)[gear]
-
-    @property
-    def normal_backlash(self) -> float:
-        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
-        return self.backlash * math.cos(self.alpha_wt) * math.cos(self.planet.beta_b)
 
     def ring_phase(self, planet_angle: float, direction: float) -> float:
         """Angle (rad) of the ring's space 0 at which its drive flank touches that of the planet's tooth 0 at the angle
@@ -371,9 +349,3 @@ def half_width(load: float, radius: float, e_star: float) -> float:
     Johnson, *Contact Mechanics*, eq. 4.43.
     """
     return math.sqrt(4 * load * radius / (math.pi * e_star))
-
-
-def largest_relative_radius(length: float, low: float, high: float) -> float:
-    """Largest relative radius of curvature s (L − s)/L (m) of two involutes for rolls s in [low, high]."""
-    roll = min(max(length / 2, low), high)
-    return roll * (length - roll) / length

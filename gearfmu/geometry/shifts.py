@@ -203,7 +203,7 @@ def ring_of(planet: GearGeometry, z: int, a: float) -> InternalGearGeometry:
     tips = (
         reference - m * (ADDENDUM - x),
         a + planet.r_f + CLEARANCE * m,
-        RingMesh(planet, ring, a, 0.0).least_tip_radius,
+        RingMesh((planet, ring), a, 0.0).least_tip_radius,
     )
     return replace(ring, r_a=math.ceil(2e5 * max(tips)) / 2e5)
 

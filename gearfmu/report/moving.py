@@ -163,7 +163,7 @@ def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
 
 def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray, phase: float) -> Drawn:
     (name, body), rotor = named, stage.rotor_of(named[0])
-    display, carrier = body.picture, stage.carrier_of(rotor)
+    display, carrier = body.picture, stage.rotors[rotor].carried_by
     assert display is not None
     turned = _rotor_angle(trace, stage, rotor)
     assert turned is not None

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.stagefile.proposals.draft import Draft, millimetres, put_proportions
+from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres, put_proportions
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
@@ -84,7 +85,7 @@ def gear_of(model: RexsModel, component: Component) -> RexsGear | None:
 
 def _agreed(model: RexsModel, places: list[Component], name: str, unit: str) -> float | None:
     """The one value that gear and flanks give, SI; a problem where left and right flank differ."""
-    found = [model.si(place, name, unit) if unit else model.number(place, name) for place in places]
+    found = [model.si(place, name, unit) for place in places]
     values = [value for value in found if value is not None]
     if values and max(values) - min(values) > 1e-9 * max(abs(value) for value in values):
         shown = ", ".join(f"{value:g}" for value in values)
@@ -94,13 +95,43 @@ def _agreed(model: RexsModel, places: list[Component], name: str, unit: str) -> 
 
 
 def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
-    """Teeth, width, tip edge and material of a gear at `place` of the draft; not profile shift and diameters."""
+    """Teeth, width, tip edge, material, mesh and load patch of a gear at `place` of the draft; not profile shift and
+    diameters."""
     draft.put(f"{place}.teeth", gear.teeth, gear.origin)
     draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
     for part in ("tip_relief", "lead", "index_deviation", "import"):
         draft.drop(f"{place}.{part}")
     put_proportions(draft, place, gear.module, gear.face_width)
+    draft.assume(f"{place}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
     _put_material(model, draft, place, gear.component)
+
+
+def place_shifts(draft: Draft, gears: dict[str, RexsGear], distance: float) -> None:
+    """Profile shifts of two external gears by their places, as given; missing ones share what a centre distance (m)
+    without backlash leaves."""
+    first = next(iter(gears.values()))
+    teeth, given = sum(gear.teeth for gear in gears.values()), [gear.x for gear in gears.values() if gear.x is not None]
+    total = sum_of_shifts(first.module, first.pressure_angle, first.helix_angle, teeth, distance)
+    for place, gear in gears.items():
+        if gear.x is not None:
+            draft.put(f"{place}.profile_shift", gear.x, f"{gear.origin}, its flanks")
+        else:
+            gear.x = round((total - sum(given)) / (len(gears) - len(given)), 6) + 0.0
+            draft.assume(f"{place}.profile_shift", gear.x, "no backlash at the centre distance, equal shares")
+
+
+def put_external(model: RexsModel, draft: Draft, place: str, gear: RexsGear, topping: float, rule: str) -> None:
+    """Rack, tip diameter, bore and bearing of an external gear whose profile shift is known. topping : k of ISO 21771
+    that keeps the tip clearance, for a missing tip diameter d + 2 m_n (h*_aP + x + k); rule : the same in words."""
+    put_rack(model, draft, f"{place}.rack", gear)
+    gear.drop_placeholder(draft)
+    if gear.tip_diameter is not None:
+        draft.put(f"{place}.tip_diameter", millimetres(gear.tip_diameter), gear.origin)
+    else:
+        radius = gear.reference_radius + gear.module * (draft.at(f"{place}.rack.addendum") + (gear.x or 0.0) + topping)
+        draft.assume(f"{place}.tip_diameter", millimetres(math.floor(2e5 * radius) / 1e5), rule)
+    _put_bore(model, draft, place, gear)
+    _put_bearing(model, draft, f"{place}.bearing", gear.component)
 
 
 def put_rack(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
@@ -109,7 +140,7 @@ def put_rack(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None
     for tool in tools[:1]:
         origin = f"REXS {tool.type} {tool.id}, tool"
         for name, key in TOOL_FACTORS:
-            value = model.number(tool, name)
+            value = model.si(tool, name, "")
             if value is not None and value > 0:
                 draft.put(f"{place}.{key}", value, origin)
 
@@ -123,7 +154,7 @@ def _put_material(model: RexsModel, draft: Draft, place: str, component: Compone
         for name, key, unit in (
             ("elastic_modulus", "youngs_modulus", "Pa"), ("density", "density", "kg/m^3"), ("poisson_ratio", "", "")
         ):  # fmt: skip
-            size = model.si(material, name, unit) if unit else model.number(material, name)
+            size = model.si(material, name, unit)
             if size is not None and size > 0:
                 value = model.quantity(material, name, unit) if unit else size
                 draft.put(f"{place}.material.{key or name}", value, origin)
@@ -158,10 +189,10 @@ def _along(model: RexsModel, section: Component, name: str, share: float) -> flo
     return begin if begin is None or end is None else begin + share * (end - begin)
 
 
-def put_bore(model: RexsModel, draft: Draft, place: str, gear: RexsGear, root_diameter: float) -> None:
+def _put_bore(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
     """The bore: the shaft's outer diameter where the gear sits on it, its inner one where both are one piece."""
-    largest = root_diameter - 2 * gear.module
-    field = f"{place}.bore_diameter"
+    root = 2 * (gear.reference_radius - gear.module * (draft.at(f"{place}.rack.dedendum") - (gear.x or 0.0)))
+    largest, field = root - 2 * gear.module, f"{place}.bore_diameter"
     found = section_diameters(model, gear.component)
     if found is not None:
         inner, outer, origin = found
@@ -171,10 +202,10 @@ def put_bore(model: RexsModel, draft: Draft, place: str, gear: RexsGear, root_di
         if 0 < inner <= largest:
             draft.put(field, millimetres(inner), f"{origin}, inner diameter: gear and shaft of one piece")
             return
-    draft.assume(field, millimetres(round(0.5 * root_diameter, 4)), "half the root diameter")
+    draft.assume(field, millimetres(round(0.5 * root, 4)), "half the root diameter")
 
 
-def put_bearing(model: RexsModel, draft: Draft, place: str, component: Component) -> None:
+def _put_bearing(model: RexsModel, draft: Draft, place: str, component: Component) -> None:
     """Stiffness of the bearings of a gear's shaft as one bearing at the gear, the shaft being rigid."""
     shafts = model.related(component, "shaft", relation="assembly")
     bearings = [b for shaft in shafts for b in model.related(shaft, *BEARINGS, relation="side")]
@@ -199,8 +230,7 @@ def shaft_torque(model: RexsModel, component: Component) -> float | None:
     """Largest torque (N·m) that an external load brings into the shaft of a gear, over all load cases."""
     shafts = model.related(component, "shaft", relation="assembly")
     loads = [load for shaft in shafts for load in model.related(shaft, "external_load")]
-    found = [model.largest(load, "torque_around_u_axis", "N*m") for load in loads]
-    return max((value for value in found if value), default=None)
+    return max((m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))), default=None)
 
 
 def shaft_speed(model: RexsModel, component: Component) -> float | None:

@@ -80,12 +80,12 @@ class RexsModel:
     def quantity(self, component: Component, name: str, unit: str) -> str | None:
         """The attribute as text for a stage file ("4.5 mm"), which must have the dimension of the SI unit `unit`."""
         attribute = component.attributes.get(name)
-        if attribute is None:
-            return None
-        return self._with_unit(component, attribute, unit)
+        return None if attribute is None else self._with_unit(component, attribute, unit)
 
     def si(self, component: Component, name: str, unit: str) -> float | None:
-        """The attribute in the SI unit `unit`."""
+        """The attribute in the SI unit `unit`; without one a plain number."""
+        if not unit:
+            return self._number(component, name)
         text = self.quantity(component, name, unit)
         return None if text is None else to_si(text, unit)
 
@@ -95,8 +95,7 @@ class RexsModel:
         texts = [self._with_unit(component, place[name], unit) for place in places if name in place]
         return max((abs(to_si(text, unit)) for text in texts if text is not None), default=None)
 
-    def number(self, component: Component, name: str) -> float | None:
-        """A plain number."""
+    def _number(self, component: Component, name: str) -> float | None:
         attribute = component.attributes.get(name)
         if attribute is None:
             return None

@@ -3,21 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from gearfmu.geometry.mesh import common_width
-from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.quantities import to_si
-from gearfmu.rexs.gears import (
-    RexsGear,
-    gear_of,
-    put_bearing,
-    put_bore,
-    put_rack,
-    put_teeth,
-    shaft_speed,
-    shaft_torque,
-)
+from gearfmu.rexs.gears import RexsGear, gear_of, place_shifts, put_external, put_teeth, shaft_speed, shaft_torque
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
@@ -28,6 +17,7 @@ from gearfmu.stagefile.proposals.draft import (
     Draft,
     degrees,
     millimetres,
+    put_limit,
     put_shafts,
     usual_torque,
 )
@@ -38,25 +28,24 @@ NAMES = ("pinion", "wheel")
 
 
 def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Component]) -> Draft:
-    """The draft of a pair; what cannot be read is in its problems."""
+    """The draft of a pair; what cannot be read is in the model's problems."""
     read = [gear_of(model, component) for component in pair]
     distance = model.si(stage, "center_distance", "m")
     if not distance:
         model.refuse(stage, "center_distance", "", "this attribute is missing: add it")
     gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
     if len(gears) < 2 or not distance:
-        return Draft({}, problems=model.problems)
+        return Draft({})
     draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
     _put_pair(model, draft, stage, gears)
-    place_shifts(draft, gears, "gears.{}.profile_shift".format, distance)
-    for name, gear in zip(NAMES, gears, strict=True):
-        put_teeth(model, draft, f"gears.{name}", gear)
-        put_rack(model, draft, f"gears.{name}.rack", gear)
-        put_bearing(model, draft, f"gears.{name}.bearing", gear.component)
+    places = dict(zip(("gears.pinion", "gears.wheel"), gears, strict=True))
+    place_shifts(draft, places, distance)
+    apart = (distance - sum(gear.reference_radius for gear in gears)) / gears[0].module
+    topping = min(0.0, apart - sum(gear.x or 0.0 for gear in gears))
+    for place, gear in places.items():
+        put_teeth(model, draft, place, gear)
+        put_external(model, draft, place, gear, topping, "d + 2 m_n (h_aP + x + k), tip clearance kept")
     _even_bearings(draft, gears)
-    put_tips(draft, gears, "gears.{}".format, distance)
-    for name, gear in zip(NAMES, gears, strict=True):
-        put_bore(model, draft, f"gears.{name}", gear, root_diameter(draft, f"gears.{name}", gear))
     _put_loads(model, draft, gears)
     _put_what_fits(draft, gears)
     return draft
@@ -95,45 +84,7 @@ def put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
         ):
             if abs(value - own) > 1e-9 * own:
                 draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
-
-
-def place_shifts(draft: Draft, gears: list[RexsGear], place: Callable[[str], str], distance: float) -> None:
-    """Profile shifts as given; missing ones from the centre distance of a pair without backlash."""
-    first = gears[0]
-    total = sum_of_shifts(
-        first.module, first.pressure_angle, first.helix_angle, sum(gear.teeth for gear in gears), distance
-    )
-    rest = total - sum(gear.x for gear in gears if gear.x is not None)
-    missing = sum(gear.x is None for gear in gears)
-    for name, gear in zip(NAMES, gears, strict=True):
-        if gear.x is not None:
-            draft.put(place(name), gear.x, f"{gear.origin}, its flanks")
-        else:
-            gear.x = round(rest / missing, 6) + 0.0
-            draft.assume(place(name), gear.x, "no backlash at the centre distance, equal shares")
-
-
-def put_tips(draft: Draft, gears: list[RexsGear], place: Callable[[str], str], distance: float) -> None:
-    """Tip diameters as given; missing ones d + 2 m_n (h*_aP + x + k), k of ISO 21771 keeping the tip clearance."""
-    module, total = gears[0].module, sum(gear.x or 0.0 for gear in gears)
-    reference = sum(gear.reference_radius for gear in gears)
-    topping = min(0.0, (distance - reference) / module - total)
-    for name, gear in zip(NAMES, gears, strict=True):
-        field = f"{place(name)}.tip_diameter"
-        gear.drop_placeholder(draft)
-        if gear.tip_diameter is not None:
-            draft.put(field, millimetres(gear.tip_diameter), gear.origin)
-            continue
-        addendum = draft.tables["gears"][name].get("rack", {}).get("addendum", 1.0)
-        radius = gear.reference_radius + module * (addendum + (gear.x or 0.0) + topping)
-        gear.tip_diameter = math.floor(2 * radius * 1e5) / 1e5
-        draft.assume(field, millimetres(gear.tip_diameter), "d + 2 m_n (h_aP + x + k), tip clearance kept")
-
-
-def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
-    """d_f (m) with the rack that the draft has for the gear."""
-    dedendum = draft.at(place).get("rack", {}).get("dedendum", 1.25)
-    return 2 * (gear.reference_radius - gear.module * (dedendum - (gear.x or 0.0)))
+        gear.module, gear.pressure_angle = first.module, first.pressure_angle
 
 
 def assumed_torque(gears: list[RexsGear]) -> float:
@@ -146,28 +97,19 @@ def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     ratio = gears[1].teeth / gears[0].teeth
     torques = [shaft_torque(model, gear.component) for gear in gears]
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
-    if found:
-        torque = rounded_up(found, 3)
-        draft.put("torque_max", f"{torque:g} N*m", "REXS external_load, the largest of all load cases")
-    else:
-        torque = rounded_up(assumed_torque(gears), 2)
-        draft.assume("torque_max", f"{torque:g} N*m", "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears")
+    why = "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"
+    known = (found, "REXS external_load, the largest of all load cases")
+    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), why))
     put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     speeds = [shaft_speed(model, gear.component) for gear in gears]
-    speed = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
-    if speed:
-        draft.put("speed_max", f"{rounded_up(speed, 4):g} rad/s", "REXS shaft, the largest of all load cases")
-    else:
-        assumed = f"{rounded_up(PITCH_SPEED / gears[0].reference_radius, 2):g} rad/s"
-        draft.assume("speed_max", assumed, "20 m/s at the reference circle")
+    known = (speeds[0] or (speeds[1] * ratio if speeds[1] else None), "REXS shaft, the largest of all load cases")
+    put_limit(draft, "speed_max", known, (PITCH_SPEED / gears[0].reference_radius, "20 m/s at the reference circle"))
 
 
 def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:
     """Backlash and load strips, which need the whole pair; where it cannot be formed the loader says why."""
     module = gears[0].module
     draft.assume("pair.backlash", millimetres(BACKLASH_PER_MODULE * module), "2 % of the module")
-    for name in NAMES:
-        draft.assume(f"gears.{name}.body.strip_half_width", millimetres(STRIP_PER_MODULE * module), "0.12 m_n")
     pair, _ = validate(PairSpec, draft.tables["pair"], "")
     specs = [validate(GearSpec, draft.tables["gears"][name] | {"name": name}, "")[0] for name in NAMES]
     known = [spec for spec in specs if spec is not None]

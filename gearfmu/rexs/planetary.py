@@ -12,8 +12,8 @@ from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
-    put_bearing,
-    put_bore,
+    place_shifts,
+    put_external,
     put_rack,
     put_teeth,
     section_diameters,
@@ -22,32 +22,28 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.rexs.pair import (
-    assumed_torque,
-    put_rack_data,
-    root_diameter,
-)
+from gearfmu.rexs.pair import assumed_torque, put_rack_data
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
+from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres, put_limit
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
 
 
 def draft_set(model: RexsModel, stage: Component) -> Draft:
-    """The draft of a planetary set; what cannot be read is in its problems."""
+    """The draft of a planetary set; what cannot be read is in the model's problems."""
     meshes = model.related(stage, "cylindrical_stage", relation="assembly")
     found = _parts(model, meshes)
     distance = _distance(model, meshes)
     if found is None or distance is None:
         remedy = "needs cylindrical_stage parts with a center_distance that join one sun, planets and one ring_gear"
         model.problems.append(Problem(str(model.path), str(stage), "", remedy))
-        return Draft({}, problems=model.problems)
+        return Draft({})
     components, planets = found
     read = [gear_of(model, component) for component in components]
     gears = [gear for gear in read if gear is not None]
     if len(gears) < 3:
-        return Draft({}, problems=model.problems)
+        return Draft({})
     _check_planets(model, planets, gears[1])
     draft = Draft.after("helical_set" if gears[0].helix_angle else "planetary54")
     draft.put("set.center_distance", millimetres(abs(distance)), f"REXS cylindrical_stage {meshes[0].id}")
@@ -56,8 +52,9 @@ def draft_set(model: RexsModel, stage: Component) -> Draft:
     _put_shifts(draft, gears, abs(distance))
     for name, gear in zip(_PLACES, gears, strict=True):
         put_teeth(model, draft, name, gear)
-        draft.assume(f"{name}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
-    _put_shapes(model, draft, gears, abs(distance))
+    for name, gear in (("sun", gears[0]), ("planet", gears[1])):
+        put_external(model, draft, name, gear, 0.0, "d + 2 m_n (1 + x)")
+    _put_ring(model, draft, gears[2], abs(distance))
     _put_carrier(model, draft, stage, gears, abs(distance))
     _put_loads(model, draft, stage, gears, planets)
     draft.assume("set.backlash", millimetres(BACKLASH_PER_MODULE * gears[0].module), "2 % of the module")
@@ -131,16 +128,7 @@ def _put_shifts(draft: Draft, gears: list[RexsGear], distance: float) -> None:
     centre distance is taken."""
     sun, planet, ring = gears
     alpha, beta, module = sun.pressure_angle, sun.helix_angle, sun.module
-    if sun.x is None or planet.x is None:
-        rest = sum_of_shifts(module, alpha, beta, sun.teeth + planet.teeth, distance)
-        rest -= (sun.x or 0.0) + (planet.x or 0.0)
-        share = rest / ((sun.x is None) + (planet.x is None))
-    for name, gear in (("sun", sun), ("planet", planet)):
-        if gear.x is not None:
-            draft.put(f"{name}.profile_shift", gear.x, f"{gear.origin}, its flanks")
-        else:
-            gear.x = round(share, 6) + 0.0
-            draft.assume(f"{name}.profile_shift", gear.x, "no backlash at the centre distance, equal shares")
+    place_shifts(draft, {"sun": sun, "planet": planet}, distance)
     fitting = (planet.x or 0.0) + sum_of_shifts(module, alpha, beta, ring.teeth - planet.teeth, distance)
     if ring.x is None:
         ring.x = round(fitting, 6) + 0.0
@@ -152,22 +140,7 @@ def _put_shifts(draft: Draft, gears: list[RexsGear], distance: float) -> None:
     draft.put("ring.profile_shift", ring.x, f"{ring.origin}, its flanks{side}")
 
 
-def _put_shapes(model: RexsModel, draft: Draft, gears: list[RexsGear], distance: float) -> None:
-    sun, planet, ring = gears
-    for name, gear in (("sun", sun), ("planet", planet)):
-        put_rack(model, draft, f"{name}.rack", gear)
-        gear.drop_placeholder(draft)
-        if gear.tip_diameter is not None:
-            draft.put(f"{name}.tip_diameter", millimetres(gear.tip_diameter), gear.origin)
-        else:
-            radius = gear.reference_radius + gear.module * (1 + (gear.x or 0.0))
-            draft.assume(f"{name}.tip_diameter", millimetres(math.floor(2e5 * radius) / 1e5), "d + 2 m_n (1 + x)")
-        put_bore(model, draft, name, gear, root_diameter(draft, name, gear))
-        put_bearing(model, draft, f"{name}.bearing", gear.component)
-    _put_ring(model, draft, planet, ring, distance)
-
-
-def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, distance: float) -> None:
+def _put_ring(model: RexsModel, draft: Draft, ring: RexsGear, distance: float) -> None:
     put_rack(model, draft, "ring", ring)
     ring.drop_placeholder(draft)
     if ring.tip_diameter is not None:
@@ -176,7 +149,7 @@ def _put_ring(model: RexsModel, draft: Draft, planet: RexsGear, ring: RexsGear, 
         radius = ring.reference_radius - ring.module * (1 - (ring.x or 0.0))
         radius = max(radius, _tip_that_clears(draft, distance))
         draft.assume("ring.tip_diameter", millimetres(rounded_up(2 * radius, 5)), "d - 2 m_n (1 - x), clear of planets")
-    root = 2 * (ring.reference_radius + ring.module * (draft.tables["ring"].get("dedendum", 1.25) + (ring.x or 0.0)))
+    root = 2 * (ring.reference_radius + ring.module * (draft.at("ring.dedendum") + (ring.x or 0.0)))
     found = section_diameters(model, ring.component)
     if found is not None and found[1] > root + 2 * ring.module:
         draft.put("ring.rim_diameter", millimetres(found[1]), f"{found[2]}, outer diameter")
@@ -203,7 +176,7 @@ def _tip_that_clears(draft: Draft, distance: float) -> float:
         return 0.0
     shapes = (gear_geometry(planet, shared, HANDS["planet"]), ring_geometry(ring, shared, HANDS["ring"]))
     try:
-        return RingMesh(*shapes, distance, 0.0).least_tip_radius
+        return RingMesh(shapes, distance, 0.0).least_tip_radius
     except ValueError:
         return 0.0
 
@@ -250,16 +223,10 @@ def _put_loads(
     sun, planet, ring = gears
     ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
-    if torque:
-        text = f"{rounded_up(torque * ratio, 3):g} N*m"
-        draft.put("torque_max", text, "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
-    else:
-        sharing: Any = draft.tables["set"].get("load_sharing", 1.35)
-        assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
-        draft.assume("torque_max", f"{rounded_up(assumed, 2):g} N*m", "4 N/mm2 in the mesh of the sun (K of a pair)")
-    if speed:
-        text = f"{rounded_up(speed / ratio, 4):g} rad/s"
-        draft.put("speed_max", text, "REXS shaft of the sun, over 1 + z_ring/z_sun")
-    else:
-        assumed = PITCH_SPEED / sun.reference_radius / ratio
-        draft.assume("speed_max", f"{rounded_up(assumed, 2):g} rad/s", "20 m/s at the sun's reference circle")
+    sharing: Any = draft.at("set.load_sharing")
+    known = (torque and torque * ratio, "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
+    assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
+    put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
+    known = (speed and speed / ratio, "REXS shaft of the sun, over 1 + z_ring/z_sun")
+    assumed = PITCH_SPEED / sun.reference_radius / ratio
+    put_limit(draft, "speed_max", known, (assumed, "20 m/s at the sun's reference circle"))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import SpecError
 from gearfmu.rexs.model import Attribute, Component, Relation, RexsModel
 
 _ENDINGS = (".rexs", ".xml", ".rexsj", ".json")
@@ -31,7 +31,7 @@ def read_rexs(path: Path) -> RexsModel:
     version, components, relations, cases = (_from_json if is_json else _from_xml)(path, content)
     known = {component.id: component for component in components}
     if len(known) < len(components):
-        raise _refused(path, "two components have the same id")
+        raise SpecError.of(path, "", "", "two components have the same id")
     for identifier, attributes in cases:
         if identifier in known:
             known[identifier].cases.append(attributes)
@@ -45,19 +45,15 @@ def _bytes(path: Path) -> bytes:
         with zipfile.ZipFile(path) as archive:
             inside = [info for info in archive.infolist() if info.filename.lower().endswith(_ENDINGS)]
             if len(inside) != 1 or inside[0].file_size > _LARGEST:
-                raise _refused(path, f"the archive must hold one .rexs or .rexsj file, not {len(inside)}")
+                raise SpecError.of(path, "", "", f"the archive must hold one .rexs or .rexsj file, not {len(inside)}")
             return archive.read(inside[0])
     except OSError as error:
-        raise _refused(path, f"the file cannot be read ({error.strerror}): check the path") from error
-
-
-def _refused(path: Path, remedy: str) -> SpecError:
-    return SpecError([Problem(str(path), "", "", remedy)])
+        raise SpecError.of(path, "", "", f"the file cannot be read ({error.strerror}): check the path") from error
 
 
 def _known_version(path: Path, version: str) -> str:
     if version.split(".")[0] != "1":
-        raise _refused(path, f"REXS version {version}: versions 1.0 to 1.7 are read")
+        raise SpecError.of(path, "", "", f"REXS version {version}: versions 1.0 to 1.7 are read")
     return version
 
 
@@ -65,9 +61,9 @@ def _from_xml(path: Path, content: bytes) -> tuple[str, list[Component], tuple[R
     try:
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
-        raise _refused(path, f"neither JSON nor well-formed XML ({error})") from error
+        raise SpecError.of(path, "", "", f"neither JSON nor well-formed XML ({error})") from error
     if root.tag != "model" or not root.get("version"):
-        raise _refused(path, "the root element of a REXS file is <model version=…>")
+        raise SpecError.of(path, "", "", "the root element of a REXS file is <model version=…>")
     version = _known_version(path, root.get("version", ""))
     components = [
         Component(element.get("id", ""), element.get("type", ""), element.get("name", ""), _xml_attributes(element))
@@ -75,8 +71,7 @@ def _from_xml(path: Path, content: bytes) -> tuple[str, list[Component], tuple[R
     ]
     relations = tuple(
         Relation(
-            element.get("type", ""),
-            tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref")),
+            element.get("type", ""), tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref"))
         )
         for element in root.iterfind("relations/relation")
     )
@@ -113,10 +108,10 @@ def _from_json(path: Path, content: bytes) -> tuple[str, list[Component], tuple[
             for entry in case["components"]
         ]
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise _refused(path, f"no valid JSON ({error})") from error
+        raise SpecError.of(path, "", "", f"no valid JSON ({error})") from error
     except (KeyError, TypeError, AttributeError) as error:
         remedy = 'not of the form {"model": {"version": …, "relations": […], "components": […]}} of REXS in JSON'
-        raise _refused(path, f"{remedy} ({type(error).__name__}: {error})") from error
+        raise SpecError.of(path, "", "", f"{remedy} ({type(error).__name__}: {error})") from error
     return version, components, relations, cases
 
 

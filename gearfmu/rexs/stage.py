@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import SpecError
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import draft_pair
 from gearfmu.rexs.planetary import draft_set
@@ -40,7 +40,7 @@ def _chosen(model: RexsModel, wanted: str) -> Component:
         return fitting[0]
     known = "; ".join(str(one) for one in stages) or "none (only cylindrical_stage and planetary_stage are read)"
     remedy = f"say which stage with --stage: {known}" if fitting else f"there is no such stage: {known}"
-    raise SpecError([Problem(str(model.path), "stage", wanted, remedy)])
+    raise SpecError.of(model.path, "stage", wanted, remedy)
 
 
 def _gears(model: RexsModel, stage: Component) -> tuple[Component, Component]:
@@ -48,5 +48,5 @@ def _gears(model: RexsModel, stage: Component) -> tuple[Component, Component]:
     if len(gears) != 2 or any(gear.type == "ring_gear" for gear in gears):
         listed = ", ".join(map(str, gears)) or "none"
         remedy = "a pair needs a relation of type stage with two cylindrical_gear; a ring alone is read in a set only"
-        raise SpecError([Problem(str(model.path), str(stage), listed, remedy)])
+        raise SpecError.of(model.path, str(stage), listed, remedy)
     return gears[0], gears[1]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Annotated
 
 from pydantic import Field
 
-from gearfmu.errors import Problem
-from gearfmu.stagefile.reading.base import Name, Quantity, Spec, Switch
+from gearfmu.scenefile.shaft_loads import Found, Time
+from gearfmu.stagefile.reading.base import Name, Quantity, Spec, Switch, entry
 
-Time = Annotated[float, Quantity("time")]
 MOST_FRAMES = 2000
 
 
@@ -19,11 +17,9 @@ class DeformationChoice(Spec):
     `every` so often, shown as a film."""
 
     gears: Annotated[tuple[Name, ...], Field(min_length=1, description="names of gears, e.g. ring")]
-    times: tuple[Time, ...] = Field(default=(), description="the report shows a picture of each")
-    every: Annotated[float, Quantity("step")] | None = Field(
-        default=None, description="from one frame of the film to the next"
-    )
-    vtu: Switch = Field(default=False, description="also write every frame for ParaView, as .vtu with a .pvd")
+    times: tuple[Time, ...] = entry("the report shows a picture of each", ())
+    every: Annotated[float, Quantity("step")] | None = entry("from one frame of the film to the next", None)
+    vtu: Switch = entry("also write every frame for ParaView, as .vtu with a .pvd", False)
 
     def film_steps(self, step: float, steps: int) -> list[int]:
         """Numbers of the communication steps (s) at whose ends the film has a frame, 0: the start."""
@@ -33,21 +29,19 @@ class DeformationChoice(Spec):
         return sorted({round(k * self.every / step) for k in range(count)})
 
     def picture_steps(self, step: float) -> list[int]:
-        """The same of the pictures."""
+        """Numbers of the communication steps (s) at whose ends a picture is taken."""
         return sorted({round(time / step) for time in self.times})
 
 
-def deformation_problems(choice: DeformationChoice, step: float, duration: float, file: str) -> Iterator[Problem]:
+def deformation_problems(choice: DeformationChoice, step: float, duration: float) -> Found:
     """What no single field shows."""
     for k, time in enumerate(choice.times):
         if time > duration * (1 + 1e-9):
-            remedy = f"must not exceed the duration, {duration:g} s"
-            yield Problem(file, f"deformation.times[{k}]", f"{time:g} s", remedy)
+            yield f"deformation.times[{k}]", f"{time:g} s", f"must not exceed the duration, {duration:g} s"
     if not choice.times and choice.every is None:
-        yield Problem(file, "deformation", "", 'when? write times = ["10 ms"], every = "1 ms", or both')
+        yield "deformation", "", 'when? write times = ["10 ms"], every = "1 ms", or both'
     if choice.every is not None and choice.every < step * (1 - 1e-9):
-        remedy = f"must not be below the communication step, {step:g} s"
-        yield Problem(file, "deformation.every", f"{choice.every:g} s", remedy)
+        yield "deformation.every", f"{choice.every:g} s", f"must not be below the communication step, {step:g} s"
     elif choice.every is not None and duration / choice.every > MOST_FRAMES:
         remedy = f"makes more than {MOST_FRAMES} frames: use {duration / MOST_FRAMES:.2g} s or more"
-        yield Problem(file, "deformation.every", f"{choice.every:g} s", remedy)
+        yield "deformation.every", f"{choice.every:g} s", remedy

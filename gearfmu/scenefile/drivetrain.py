@@ -5,20 +5,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field
-
-from gearfmu.stagefile.reading.base import Quantity, Spec
+from gearfmu.stagefile.reading.base import Quantity, Spec, entry
+from gearfmu.stagefile.tables.connections import Damping, Inertia, Stiffness
 
 ASSUMED = "assumed"
-Inertia = Annotated[float, Quantity("inertia")]
-Stiffness = Annotated[float, Quantity("torsional_stiffness")]
-Damping = Annotated[float, Quantity("torsional_damping")]
 Amplitude = Annotated[float, Quantity("amplitude")]
 
 
 def _value(default: Any, meaning: str, source: str = ASSUMED) -> Any:
     """A value with its meaning and where it comes from; `...` where the scene must give it."""
-    return Field(default=default, description=meaning, json_schema_extra={"source": source})
+    return entry(meaning, default, json_schema_extra={"source": source})
 
 
 class PassengerCar(Spec):
@@ -28,9 +24,7 @@ class PassengerCar(Spec):
     to it by the rigid final drive ratio, and turns with the wheel gear. Other pairs and synchronisers are not modelled.
     """
 
-    chain_in_fmu: Annotated[
-        bool, Field(description="secondary mass, clutch and input shaft are computed inside the FMU")
-    ] = True
+    chain_in_fmu: bool = entry("secondary mass, clutch and input shaft are computed inside the FMU", True)
     crank_inertia: Inertia = _value(0.05, "crankshaft with rods' share, four cylinders, 2 l")
     dmf_primary_inertia: Inertia = _value(0.11, "dual-mass flywheel, primary mass")
     dmf_stiffness: Stiffness = _value(

@@ -8,105 +8,97 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gearfmu.errors import Problem
-from gearfmu.scenefile.shaft_loads import ShaftLoad, Time, law_problems, time_problems
-from gearfmu.stagefile.reading.base import Name, Quantity, Spec
+from gearfmu.scenefile.shaft_loads import Found, ShaftLoad, Time, law_problems, time_problems
+from gearfmu.stagefile.reading.base import Name, Quantity, Spec, entry
+from gearfmu.stagefile.tables.connections import Damping, Inertia, Stiffness
 
 GROUND = "ground"
-Inertia = Annotated[float, Quantity("inertia")]
-Stiffness = Annotated[float, Quantity("torsional_stiffness")]
-Damping = Annotated[float, Quantity("torsional_damping")]
 Capacity = Annotated[float, Quantity("clutch_capacity")]
 
 
 class ClutchSpec(Spec):
     """Capacity over time: straight lines through (time, torque), constant outside; the same time twice is a jump."""
 
-    capacity: Annotated[tuple[tuple[Time, Capacity], ...], Field(min_length=1)] = Field(
-        description="torque that it transmits when it slips, over time"
+    capacity: Annotated[tuple[tuple[Time, Capacity], ...], Field(min_length=1)] = entry(
+        "torque that it transmits when it slips, over time"
     )
-    peak: Annotated[float, Quantity("peak")] = Field(
-        default=1.0, description="when it sticks it holds up to this many times its capacity"
-    )
+    peak: Annotated[float, Quantity("peak")] = entry("when it sticks it holds up to this many times its capacity", 1.0)
 
 
 class PortShaft(Spec):
     """The shaft between a port of the stage and a part; it belongs to the stage. What is not given is that of the
     stage's port."""
 
-    on: Name = Field(description="an inertia, or ground")
-    stiffness: Stiffness | None = Field(default=None, description="of the shaft")
-    damping: Damping | None = Field(default=None, description="of the shaft")
+    on: Name = entry("an inertia, or ground")
+    stiffness: Stiffness | None = entry("of the shaft", None)
+    damping: Damping | None = entry("of the shaft", None)
 
 
 class InertiaPart(Spec):
     """A rigid inertia."""
 
-    inertia: Inertia = Field(description="about its axis")
-    speed: Annotated[float, Quantity("speed")] | None = Field(
-        default=None, description="at the start; not needed where shafts or meshes lead to a known speed"
+    inertia: Inertia = entry("about its axis")
+    speed: Annotated[float, Quantity("speed")] | None = entry(
+        "at the start; not needed where shafts or meshes lead to a known speed", None
     )
 
 
 class ShaftPart(Spec):
     """A shaft between two inertias, or an inertia and ground."""
 
-    between: tuple[Name, Name] = Field(description="its two ends: inertias, or an inertia and ground")
-    stiffness: Stiffness = Field(description="torque per twist")
-    damping: Damping = Field(default=0.0, description="torque per speed of twist")
+    between: tuple[Name, Name] = entry("its two ends: inertias, or an inertia and ground")
+    stiffness: Stiffness = entry("torque per twist")
+    damping: Damping = entry("torque per speed of twist", 0.0)
 
 
 class ClutchPart(ClutchSpec):
     """A dry clutch between two inertias; between an inertia and ground it is a brake."""
 
-    between: tuple[Name, Name] = Field(description="its two sides; slip is the first's speed less the second's")
+    between: tuple[Name, Name] = entry("its two sides; slip is the first's speed less the second's")
 
 
 class TorquePart(ShaftLoad):
     """A torque of the outside on one inertia: the sum of the given laws, about +z."""
 
-    on: Name = Field(description="the inertia")
+    on: Name = entry("the inertia")
 
 
 class Drivetrain(Spec):
     """Parts by name. A stage's port hangs on the inertia that `ports` names; ports without an entry stay as the stage
     has them, fixed or without torque."""
 
-    ports: dict[Name, PortShaft] = Field(description="part on each port of the stage")
-    inertias: dict[Name, InertiaPart] = Field(description="rigid inertias")
-    shafts: dict[Name, ShaftPart] = Field(default={}, description="shafts between inertias")
-    clutches: dict[Name, ClutchPart] = Field(default={}, description="clutches and brakes")
-    torques: dict[Name, TorquePart] = Field(default={}, description="torques of the outside on inertias")
+    ports: dict[Name, PortShaft] = entry("part on each port of the stage")
+    inertias: dict[Name, InertiaPart] = entry("rigid inertias")
+    shafts: dict[Name, ShaftPart] = entry("shafts between inertias", {})
+    clutches: dict[Name, ClutchPart] = entry("clutches and brakes", {})
+    torques: dict[Name, TorquePart] = entry("torques of the outside on inertias", {})
 
 
-def drivetrain_problems(parts: Drivetrain, file: str) -> Iterator[Problem]:
+def drivetrain_problems(parts: Drivetrain) -> Found:
     """What no single field of [drivetrain] shows."""
     if not parts.ports:
-        remedy = 'nothing hangs on the stage: write e.g. [drivetrain.ports.carrier] on = "engine"'
-        yield Problem(file, "drivetrain.ports", "", remedy)
-    yield from _name_problems(parts, file)
+        yield "drivetrain.ports", "", 'nothing hangs on the stage: write e.g. [drivetrain.ports.carrier] on = "engine"'
+    yield from _name_problems(parts)
     for field, used, may_be_ground in _uses(parts):
         known = [*parts.inertias, *([GROUND] if may_be_ground else [])]
         if used not in known:
-            yield Problem(file, field, f'"{used}"', f"there is no such part; there are {', '.join(known)}")
+            yield field, f'"{used}"', f"there is no such part; there are {', '.join(known)}"
     for table in ("shafts", "clutches"):
         for name, part in getattr(parts, table).items():
             if part.between[0] == part.between[1]:
-                field, value = f"drivetrain.{table}.{name}.between", f'"{part.between[0]}" twice'
-                yield Problem(file, field, value, "name two different ends")
+                yield f"drivetrain.{table}.{name}.between", f'"{part.between[0]}" twice', "name two different ends"
     for name, clutch in parts.clutches.items():
-        yield from time_problems(clutch.capacity, file, f"drivetrain.clutches.{name}.capacity")
+        yield from time_problems(clutch.capacity, f"drivetrain.clutches.{name}.capacity")
     for name, torque in parts.torques.items():
-        yield from law_problems(torque, file, f"drivetrain.torques.{name}")
+        yield from law_problems(torque, f"drivetrain.torques.{name}")
 
 
-def _name_problems(parts: Drivetrain, file: str) -> Iterator[Problem]:
+def _name_problems(parts: Drivetrain) -> Found:
     seen: dict[str, str] = {GROUND: "the ground"}
     for table in ("inertias", "shafts", "clutches", "torques"):
         for name in getattr(parts, table):
             if name in seen:
-                remedy = f"the name is that of {seen[name]}: give it another"
-                yield Problem(file, f"drivetrain.{table}.{name}", "", remedy)
+                yield f"drivetrain.{table}.{name}", "", f"the name is that of {seen[name]}: give it another"
             seen.setdefault(name, f"drivetrain.{table}.{name}")
 
 

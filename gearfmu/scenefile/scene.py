@@ -4,31 +4,35 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError, near_or_all
 from gearfmu.scenefile.deformation import DeformationChoice, deformation_problems
 from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
 from gearfmu.scenefile.parts import ClutchSpec, Drivetrain, drivetrain_problems
-from gearfmu.scenefile.shaft_loads import ShaftLoad, load_problems, time_problems
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
+from gearfmu.scenefile.shaft_loads import Found, ShaftLoad, Time, load_problems, time_problems
+from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Spec, Switch, Text, entry, read_toml, validate
 from gearfmu.stagefile.reading.files import Changes, changed_tables, merged_tables, shipped_stages
+from gearfmu.stagefile.tables.connections import Slices
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
 TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}
 SPEED = "start.pinion_speed"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
+Speed = Annotated[float, Quantity("speed")]
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "em", "rk45", "central"]
 Contact = Literal["by_level", "line", "nodal"]
 
 
-class Effects(Spec):
+class Effects(LaterFields):
     """Effects of the stage, all on unless switched off: docs/effects.md."""
+
+    later = ("housing",)
 
     elastic: Switch = True
     residual: Switch = True
@@ -49,12 +53,6 @@ class Effects(Spec):
     film: Switch = True
     housing: Switch = True
 
-    @model_serializer(mode="wrap")
-    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
-        """Scenes that are older than housings stay what they were."""
-        tables: dict[str, object] = handler(self)
-        return {key: value for key, value in tables.items() if key != "housing" or not value}
-
     @property
     def off(self) -> tuple[str, ...]:
         """Names of those that are off."""
@@ -65,11 +63,11 @@ class StageChoice(Spec):
     """Which stage, and how it is computed. h = 0: the step that suits model and level; contact:
     docs/howto-nodal.md."""
 
-    name: Annotated[Text, Field(description='a path or the name of a shipped stage, e.g. "fzg_c/stage_relief"')]
+    name: Text = entry('a path or the name of a shipped stage, e.g. "fzg_c/stage_relief"')
     level: Level = "standard"
     integrator: Integrator = "dg4"
     contact: Contact = "by_level"
-    slices: Annotated[Count, Whole("slices")] = 5
+    slices: Slices = 5
     h: Annotated[float, Quantity("internal_step")] = 0.0
     effects: Effects = Effects()
 
@@ -78,7 +76,7 @@ class CouplingChoice(Spec):
     """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0
     for the communication step."""
 
-    step: Annotated[float, Quantity("step"), Field(description="communication step")]
+    step: Annotated[float, Quantity("step")] = entry("communication step")
     master: Literal["gs_mean", "jacobi"] = "gs_mean"
     micro_step: Annotated[float, Quantity("micro_step")] = 0.0
 
@@ -87,10 +85,8 @@ class StartSpec(Spec):
     """Speeds at the start; pinion_speed, also written input_speed: of the stage's input, its first port; slip: engine
     faster than the pinion by this."""
 
-    pinion_speed: Annotated[float, Quantity("speed")] = Field(
-        validation_alias=AliasChoices("pinion_speed", "input_speed")
-    )
-    slip: Annotated[float, Quantity("speed")] = 0.0
+    pinion_speed: Speed = Field(validation_alias=AliasChoices("pinion_speed", "input_speed"))
+    slip: Speed = 0.0
 
 
 class SceneSpec(Spec):
@@ -103,7 +99,7 @@ class SceneSpec(Spec):
     name: Name
     description: Text
     duration: Annotated[float, Quantity("duration")]
-    settle: Annotated[float, Quantity("time")] = 0.0
+    settle: Time = 0.0
     stage: StageChoice
     coupling: CouplingChoice
     start: StartSpec
@@ -160,7 +156,7 @@ def load_scene(path_or_name: str | Path, changes: Changes | None = None) -> Scen
         tables["start"].pop("input_speed", None)  # its other name
     scene, problems = validate(SceneSpec, merged_tables(tables, changed_tables(SceneSpec, full)), str(path))
     if scene is not None:
-        problems = list(_problems(scene, str(path)))
+        problems = [Problem(str(path), *found) for found in _problems(scene)]
     if scene is None or problems:
         raise SpecError(problems)
     return scene
@@ -176,7 +172,7 @@ def full_key(tables: Mapping[str, Any], key: str, file: str) -> str:
     found = next((f"{drive}.{name}" for drive, name in TORQUES.items() if drive in tables), None)
     if found is None:
         remedy = "this scene's drive has no single torque: name the field, such as shaft_loads.<port>.constant"
-        raise SpecError([Problem(file, "torque", "", remedy)])
+        raise SpecError.of(file, "torque", "", remedy)
     return found
 
 
@@ -190,65 +186,46 @@ def scene_path(path_or_name: str | Path) -> Path:
     file = str(path_or_name)
     if given.exists() or file in shipped_stages():
         remedy = "this is a stage: name it in a scene under [stage] (docs/howto-scene.md), or use the verb simulate"
-        raise SpecError([Problem(file, "", "", remedy)])
+        raise SpecError.of(file, "", "", remedy)
     hint = near_or_all(file, shipped_scenes(), "shipped are", cutoff=0.6)
-    raise SpecError([Problem(file, "", "", f"no such file and no shipped scene: {hint}")])
+    raise SpecError.of(file, "", "", f"no such file and no shipped scene: {hint}")
 
 
-def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
+def _problems(scene: SceneSpec) -> Found:
     """What no single field shows."""
     chosen = [key for key in DRIVES if getattr(scene, key) is not None]
     if len(chosen) != 1:
         remedy = "give exactly one of [passenger_car], [test_rig], [shaft_loads] and [drivetrain]"
-        yield Problem(file, "", "", f"{remedy}, found {' and '.join(chosen) or 'none'}")
+        yield "", "", f"{remedy}, found {' and '.join(chosen) or 'none'}"
     if scene.passenger_car is not None and scene.clutch is None:
-        yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
+        yield "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity"
     if scene.passenger_car is None and scene.clutch is not None:
         remedy = "only the passenger car has this clutch: remove this table, or write [drivetrain.clutches.…]"
-        yield Problem(file, "clutch", "", remedy)
+        yield "clutch", "", remedy
     if scene.passenger_car is None and scene.start.slip:
-        yield Problem(
-            file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
-        )
+        yield "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
     if scene.shaft_loads is not None:
-        yield from load_problems(scene.shaft_loads, file)
+        yield from load_problems(scene.shaft_loads)
     if scene.drivetrain is not None:
-        yield from drivetrain_problems(scene.drivetrain, file)
+        yield from drivetrain_problems(scene.drivetrain)
     if scene.clutch is not None:
-        yield from _clutch_problems(scene, scene.clutch, file)
-    yield from _time_problems(scene, file)
+        yield from time_problems(scene.clutch.capacity, "clutch.capacity")
+        if scene.clutch.peak != 1.0 and scene.chain_in_fmu:
+            remedy = "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false"
+            yield "clutch.peak", f"{scene.clutch.peak:g}", remedy
+    yield from _time_problems(scene)
     if scene.deformation is not None:
-        yield from deformation_problems(scene.deformation, scene.coupling.step, scene.duration, file)
+        yield from deformation_problems(scene.deformation, scene.coupling.step, scene.duration)
 
 
-def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:
-    yield from time_problems(clutch.capacity, file, "clutch.capacity")
-    if clutch.peak != 1.0 and scene.chain_in_fmu:
-        yield Problem(
-            file,
-            "clutch.peak",
-            f"{clutch.peak:g}",
-            "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false",
-        )
-
-
-def _time_problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
-    step, duration = scene.coupling.step, scene.duration
+def _time_problems(scene: SceneSpec) -> Found:
+    step, micro, duration = scene.coupling.step, scene.coupling.micro_step, scene.duration
     if scene.settle >= duration:
-        yield Problem(file, "settle", f"{scene.settle:g} s", f"must be shorter than the duration, {duration:g} s")
+        yield "settle", f"{scene.settle:g} s", f"must be shorter than the duration, {duration:g} s"
     if step > duration:
-        yield Problem(file, "coupling.step", f"{step:g} s", f"must not exceed the duration, {duration:g} s")
+        yield "coupling.step", f"{step:g} s", f"must not exceed the duration, {duration:g} s"
     elif abs(scene.steps * step - duration) > 1e-9 * duration:
-        yield Problem(
-            file,
-            "coupling.step",
-            f"{step:g} s",
-            f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s",
-        )
-    if scene.coupling.micro_step > step:
-        yield Problem(
-            file,
-            "coupling.micro_step",
-            f"{scene.coupling.micro_step:g} s",
-            f"must not exceed the communication step, {step:g} s",
-        )
+        remedy = f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s"
+        yield "coupling.step", f"{step:g} s", remedy
+    if micro > step:
+        yield "coupling.micro_step", f"{micro:g} s", f"must not exceed the communication step, {step:g} s"

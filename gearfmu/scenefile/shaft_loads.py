@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gearfmu.errors import Problem
-from gearfmu.stagefile.reading.base import Quantity, Spec
+from gearfmu.stagefile.reading.base import Quantity, Spec, entry
 
+Found = Iterator[tuple[str, str, str]]  # field of the scene, value, remedy
 Torque = Annotated[float, Quantity("torque")]
 Time = Annotated[float, Quantity("time")]
 
@@ -18,8 +18,8 @@ class ProportionalTorque(Spec):
     """A torque that follows the speed of the shaft: `torque` at `speed`, zero at rest. A brake has the other sign than
     its speed."""
 
-    torque: Torque = Field(description="torque at that speed")
-    speed: Annotated[float, Quantity("speed")] = Field(description="speed at which the shaft has this torque")
+    torque: Torque = entry("torque at that speed")
+    speed: Annotated[float, Quantity("speed")] = entry("speed at which the shaft has this torque")
 
     @property
     def slope(self) -> float:
@@ -30,14 +30,14 @@ class ProportionalTorque(Spec):
 class AlternatingTorque(Spec):
     """amplitude · sin(2π frequency t)."""
 
-    amplitude: Annotated[float, Quantity("amplitude")] = Field(description="of the sine")
-    frequency: Annotated[float, Quantity("frequency")] = Field(description="of the sine, which begins at zero")
+    amplitude: Annotated[float, Quantity("amplitude")] = entry("of the sine")
+    frequency: Annotated[float, Quantity("frequency")] = entry("of the sine, which begins at zero")
 
 
 class SpeedControl(Spec):
     """A drive that follows a speed over time: damping · (wanted speed − speed), on top of the other torques."""
 
-    damping: Annotated[float, Quantity("control_damping")] = Field(description="torque per deviation of the speed")
+    damping: Annotated[float, Quantity("control_damping")] = entry("torque per deviation of the speed")
     over_time: Annotated[
         tuple[tuple[Time, Annotated[float, Quantity("speed")]], ...],
         Field(min_length=1, description="wanted speed: straight lines through (time, speed), constant outside"),
@@ -47,38 +47,37 @@ class SpeedControl(Spec):
 class ShaftLoad(Spec):
     """Torque of the outside on one shaft about +z: the sum of the given laws."""
 
-    constant: Torque | None = Field(default=None, description="the same at all times")
-    over_time: Annotated[tuple[tuple[Time, Torque], ...], Field(min_length=1)] | None = Field(
-        default=None, description="straight lines through (time, torque), constant outside; the same time twice jumps"
+    constant: Torque | None = entry("the same at all times", None)
+    over_time: Annotated[tuple[tuple[Time, Torque], ...], Field(min_length=1)] | None = entry(
+        "straight lines through (time, torque), constant outside; the same time twice jumps", None
     )
-    proportional: ProportionalTorque | None = Field(default=None, description="follows the speed of the shaft")
-    alternating: AlternatingTorque | None = Field(default=None, description="a sine of time")
-    speed_control: SpeedControl | None = Field(default=None, description="follows a wanted speed over time")
+    proportional: ProportionalTorque | None = entry("follows the speed of the shaft", None)
+    alternating: AlternatingTorque | None = entry("a sine of time", None)
+    speed_control: SpeedControl | None = entry("follows a wanted speed over time", None)
 
 
-def load_problems(loads: dict[str, ShaftLoad], file: str) -> Iterator[Problem]:
+def load_problems(loads: dict[str, ShaftLoad]) -> Found:
     """What no single field of [shaft_loads] shows."""
     if not loads:
-        yield Problem(file, "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"')
+        yield "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"'
     for name, load in loads.items():
-        yield from law_problems(load, file, f"shaft_loads.{name}")
+        yield from law_problems(load, f"shaft_loads.{name}")
 
 
-def law_problems(load: ShaftLoad, file: str, table: str) -> Iterator[Problem]:
+def law_problems(load: ShaftLoad, table: str) -> Found:
     """What no single field of the torque in `table` shows."""
     laws = ShaftLoad.model_fields
     if all(getattr(load, name) is None for name in laws):
-        yield Problem(file, table, "", f"this shaft has no torque: give one or more of {', '.join(laws)}")
+        yield table, "", f"this shaft has no torque: give one or more of {', '.join(laws)}"
     wanted = load.speed_control.over_time if load.speed_control is not None else ()
     for field, points in (("over_time", load.over_time or ()), ("speed_control.over_time", wanted)):
-        yield from time_problems(points, file, f"{table}.{field}")
+        yield from time_problems(points, f"{table}.{field}")
     if load.proportional is not None and load.proportional.speed == 0.0:
-        field = f"{table}.proportional.speed"
-        yield Problem(file, field, "0 rad/s", "a torque at rest follows no speed: write it as constant")
+        yield f"{table}.proportional.speed", "0 rad/s", "a torque at rest follows no speed: write it as constant"
 
 
-def time_problems(points: Sequence[tuple[float, float]], file: str, field: str) -> Iterator[Problem]:
+def time_problems(points: Sequence[tuple[float, float]], field: str) -> Found:
     """Points (time, value) that go back in time."""
     times = [time for time, _ in points]
     if any(b < a for a, b in zip(times, times[1:], strict=False)):
-        yield Problem(file, field, "", "times must not decrease: sort the points by time")
+        yield field, "", "times must not decrease: sort the points by time"

@@ -1,13 +1,13 @@
 """Hashes of bodies as gearfmu 0.2 and 0.3 wrote them, by which their files are known again and adopted.
 
-They name the fields of a pair, a set and a general stage one by one. Bodies of today: `stored.body_hash`."""
+Bodies of today: `stored.body_hash`."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from gearfmu.geometry.mesh import HANDS
-from gearfmu.stagefile.forms.general import GearBody, RingBody, Stage
+from gearfmu.stagefile.forms.general import RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec
 from gearfmu.stagefile.stored import hash_of
 from gearfmu.stagefile.tables.bodies import TOOTHING
@@ -27,55 +27,33 @@ def former_hash(stage: Stage, name: str) -> str:
         inputs = _set_inputs(stage.written, name)
     else:
         assert not isinstance(table, CarrierBody), "carriers are of sets"
-        inputs = _ring_inputs(table) if isinstance(table, RingBody) else _gear_inputs(table)
-        if table.imported is not None:
-            inputs["body"].pop("mesh")
-            inputs["import"] = import_inputs(table.imported)
+        inputs = _toothed_inputs(table, "bore_coupling", "rim_coupling", "mounts")
+        if isinstance(table, RingBody):
+            inputs |= {"rim_coupling": table.rim_coupling} if table.rigid_bore else {}
+            if not inputs["helix_angle"]:
+                inputs.pop("helix_angle")  # files of spur rings are older than helical ones
+        else:
+            inputs |= {"kind": "external_pair"} | ({"bore_coupling": table.bore_coupling} if table.rigid_bore else {})
     return hash_of(inputs | {"algorithm_version": ALGORITHM})
 
 
-def _gear_inputs(gear: GearBody) -> dict[str, Any]:
-    inputs: dict[str, Any] = {
-        "kind": "external_pair",
-        "teeth": gear.teeth,
-        "normal_module": gear.normal_module,
-        "pressure_angle": gear.pressure_angle,
-        "helix_angle": gear.helix_angle,
-        "profile_shift": gear.profile_shift,
-        "tip_diameter": gear.tip_diameter,
-        "tip_edge_radius": gear.tip_edge_radius,
-        "face_width": gear.face_width,
-        "bore_diameter": gear.bore_diameter,
-        "rack": {"dedendum": gear.rack.dedendum, "fillet_radius": gear.rack.fillet_radius},
-        "material": gear.material.model_dump(),
-        "modal_damping": gear.modal_damping,
-        "body": gear.body.model_dump(),
-    }
-    return inputs | ({"bore_coupling": gear.bore_coupling} if gear.rigid_bore else {})
-
-
-def _ring_inputs(ring: RingBody) -> dict[str, Any]:
-    others = {"name", "kind", "mounts", "imported", "rim_coupling"} | TOOTHING
-    inputs = {"kind": "ring"} | ring.model_dump(exclude=others)
-    if not inputs["helix_angle"]:
-        inputs.pop("helix_angle")  # files of spur rings are older than helical ones
-    return inputs | ({"rim_coupling": ring.rim_coupling} if ring.rigid_bore else {})
+def _toothed_inputs(gear: ToothedBody | SetGearSpec | RingSpec, *others: str) -> dict[str, Any]:
+    """Fields of a gear but for name, flanks, bearing and `others`; a field that is younger than 0.3 is one of these."""
+    inputs = gear.model_dump(exclude={"name", "bearing", "imported", *others} | TOOTHING)
+    if "rack" in inputs:
+        inputs["rack"].pop("addendum")  # the tip diameter says where the tooth ends
+    if gear.imported is not None:
+        inputs["body"].pop("mesh")
+        inputs["import"] = import_inputs(gear.imported)
+    return inputs
 
 
 def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
-    s, hand = spec.set, HANDS.get(name, 1)
-    common = {"kind": spec.kind, "body": name}
-    tooth = {
-        "normal_module": s.normal_module,
-        "pressure_angle": s.pressure_angle,
-        "helix_angle": hand * s.helix_angle,
-    }
+    s, common = spec.set, {"kind": spec.kind, "body": name}
     if name == "carrier":
         place: dict[str, Any] = {
-            "planets": s.planets,
-            "center_distance": s.center_distance,
-            "seat": spec.planet.face_width,
-        }
+            "planets": s.planets, "center_distance": s.center_distance, "seat": spec.planet.face_width
+        }  # fmt: skip
         if s.positions is not None:
             place["positions"] = [k / (spec.sun.teeth + spec.ring.teeth) for k in s.positions]
         couplings = ["bore", *(f"bolt{k}" for k in range(s.planets))]
@@ -85,13 +63,8 @@ def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
             carrier["import"] = import_inputs(spec.carrier.imported)
         return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
     parts: dict[str, SetGearSpec | RingSpec] = dict(zip(HANDS, spec.gears, strict=True))
-    part = parts[name]
-    gear = part.model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
+    gear, helix = _toothed_inputs(parts[name]), HANDS[name] * s.helix_angle
     if gear.get("mounts"):
         gear["mounts"].pop("damping_ratio")
-    if name != "ring":
-        gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
-    if part.imported is not None:
-        gear["body"].pop("mesh")
-        gear["import"] = import_inputs(part.imported)
+    tooth = {"normal_module": s.normal_module, "pressure_angle": s.pressure_angle, "helix_angle": helix}
     return common | tooth | gear

@@ -12,13 +12,7 @@ from gearfmu.stagefile.reading.base import Spec
 
 def stage_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of stage.toml: quantities are text with a unit, gears are tables by name."""
-    schema = file_schema(StageSpec)
-    schema["title"] = "gearfmu stage"
-    del schema["properties"]["source"]
-    schema["required"] = [name for name in schema["required"] if name != "source"]
-    gear = schema["$defs"]["GearSpec"]
-    del gear["properties"]["name"]
-    gear["required"] = [name for name in gear["required"] if name != "name"]
+    schema = _form_schema(StageSpec, "gearfmu stage", {"GearSpec": {"name"}})
     schema["properties"]["gears"] = {
         "type": "object", "description": schema["properties"]["gears"]["description"],
         "minProperties": 2, "maxProperties": 2, "additionalProperties": {"$ref": "#/$defs/GearSpec"},
@@ -28,33 +22,29 @@ def stage_schema() -> dict[str, Any]:
 
 def set_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the stage.toml of a planetary set."""
-    schema = file_schema(PlanetarySpec)
-    schema["title"] = "gearfmu planetary set"
-    del schema["properties"]["source"]
-    schema["required"] = [name for name in schema["required"] if name != "source"]
-    for part in ("SetGearSpec", "RingSpec"):
-        gear = schema["$defs"][part]
-        del gear["properties"]["name"]
-        gear["required"] = [name for name in gear["required"] if name != "name"]
-    return _with_base(schema)
+    parts = {"SetGearSpec": {"name"}, "RingSpec": {"name"}}
+    return _with_base(_form_schema(PlanetarySpec, "gearfmu planetary set", parts))
 
 
 def general_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the stage.toml of a general stage: a table for every body by its name."""
-    schema = file_schema(Stage)
-    schema["title"] = "gearfmu general stage"
-    schema["required"] = [*(name for name in schema["required"] if name != "source"), "kind"]
     here = {"GearBody": {"name", "bearing"}, "RingBody": {"name", "mounts"}, "ShaftBody": {"name"}}
-    for part, elsewhere in here.items():
-        body = schema["$defs"][part]
-        body["properties"] = {key: value for key, value in body["properties"].items() if key not in elsewhere}
-        body["required"] = [name for name in body["required"] if name not in elsewhere]
+    schema = _form_schema(Stage, "gearfmu general stage", here)
+    schema["required"].append("kind")
     for name in ("Bearing", "MountsSpec"):
         schema["$defs"].pop(name, None)
-    del schema["properties"]["source"]
     for name in ("bodies", "rotors", "ports"):
         schema["properties"][name]["additionalProperties"] = False
     return _with_base(schema)
+
+
+def _form_schema(kind: type[Spec], title: str, elsewhere: dict[str, set[str]]) -> dict[str, Any]:
+    """Schema of a form without `source` and, of its parts by class, without the fields that stand elsewhere."""
+    schema = file_schema(kind) | {"title": title}
+    for table, names in [(schema, {"source"}), *((schema["$defs"][part], own) for part, own in elsewhere.items())]:
+        table["properties"] = {name: field for name, field in table["properties"].items() if name not in names}
+        table["required"] = [name for name in table["required"] if name not in names]
+    return schema
 
 
 def _with_base(schema: dict[str, Any]) -> dict[str, Any]:

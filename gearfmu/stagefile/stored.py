@@ -40,7 +40,7 @@ def stored_files(spec: Spec) -> dict[str, str]:
             found[field] = hashlib.sha256(Path(table[key]).read_bytes()).hexdigest()
         except OSError as error:
             remedy = f"cannot be read ({error.strerror}): write the path relative to the stage file"
-            raise SpecError([Problem(str(getattr(spec, "source", "")), field, table[key], remedy)]) from error
+            raise SpecError.of(getattr(spec, "source", ""), field, table[key], remedy) from error
     return found
 
 

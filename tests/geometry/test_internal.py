@@ -66,7 +66,9 @@ def test_planet_and_ring_touch_where_the_gap_vanishes():
 def test_least_tip_radius_is_where_the_planets_form_circle_is_met():
     assert SET.ring_mesh.least_tip_radius == pytest.approx(65.36e-3, abs=5e-6)
     edge = replace(RING, r_a=SET.ring_mesh.least_tip_radius, tip_edge=0.0)
-    assert replace(SET.ring_mesh, ring=edge).path["A"] == pytest.approx(SET.ring_mesh.planet.s_form, abs=1e-12)
+    assert replace(SET.ring_mesh, gears=(SET.ring_mesh.planet, edge)).path["A"] == pytest.approx(
+        SET.ring_mesh.planet.s_form, abs=1e-12
+    )
 
 
 def test_planets_fit_between_sun_and_ring():
@@ -93,7 +95,7 @@ def test_no_backlash_at_the_centre_distance_of_the_reference_circles():
 
 def test_tips_collide_when_the_ring_has_few_teeth_more_than_the_planet():
     small = replace(RING, z=22, r_a=RING.m * 11 - RING.m)
-    close = replace(SET.ring_mesh, ring=small, a=RING.m * 2)
+    close = replace(SET.ring_mesh, gears=(SET.ring_mesh.planet, small), a=RING.m * 2)
     assert SET.ring_mesh.tip_clearance_angle > 0 > close.tip_clearance_angle
 
 

@@ -11,7 +11,7 @@ import pytest
 from fzg import PAIR, PINION, WHEEL, gear
 
 from gearfmu.geometry import PairGeometry, ReliefCurve, involute
-from gearfmu.geometry.mesh import contact_modulus, half_width, largest_relative_radius
+from gearfmu.geometry.mesh import contact_modulus, half_width
 
 LOOSE = PairGeometry((PINION, WHEEL), 91.7e-3, 3e-4)
 OTHER = PairGeometry((gear(21, 0.3, 106e-3, 30e-3), gear(34, -0.1, 160e-3, 40e-3)), 124.8e-3, 1e-4)
@@ -135,6 +135,9 @@ def test_hertz_half_width_is_consistent_with_its_peak_pressure() -> None:
 
 
 def test_largest_relative_radius_lies_mid_path_or_at_its_end() -> None:
-    assert largest_relative_radius(2.0, 0.1, 1.9) == 0.5
-    assert largest_relative_radius(2.0, 0.1, 0.8) == pytest.approx(0.8 * 1.2 / 2)
-    assert largest_relative_radius(2.0, 1.5, 1.9) == pytest.approx(1.5 * 0.5 / 2)
+    slow = PairGeometry((gear(20, 0.0, 99e-3, 30e-3), gear(80, 0.0, 369e-3, 30e-3)), 225e-3, 0.0)
+    fast = PairGeometry(slow.gears[::-1], slow.a, 0.0)
+    for pair, place in ((PAIR, 0.5), (slow, slow.path["E"] / slow.length), (fast, fast.path["A"] / fast.length)):
+        path = np.linspace(pair.path["A"], pair.path["E"], 2001) / pair.length
+        assert pair.largest_relative_radius() == pytest.approx(pair.length * place * (1 - place))
+        assert pair.largest_relative_radius() == pytest.approx(pair.length * np.max(path * (1 - path)), rel=1e-6)

@@ -84,7 +84,7 @@ def test_reach_ends_where_nothing_can_be_made() -> None:
 
 def test_a_ring_meets_its_planet_without_backlash_and_above_its_form_circle() -> None:
     planet = OpenPair(SPUR, (30, 20), 0.050).at(-0.1674).gears[1]
-    mesh = RingMesh(planet, ring_of(planet, 70, 0.050), 0.050, 0.0)
+    mesh = RingMesh((planet, ring_of(planet, 70, 0.050)), 0.050, 0.0)
     assert mesh.nominal_backlash == pytest.approx(0.0, abs=1e-9) and not list(ring_shortcomings(mesh))
     roll = float(involute.roll_at_radius(mesh.ring.r_a, mesh.ring.r_b)) - mesh.length
     assert roll >= planet.s_form

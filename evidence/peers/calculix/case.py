@@ -12,7 +12,7 @@ import numpy as np
 
 from evidence.peers.calculix.ccx import run_deck, torques
 from evidence.peers.calculix.deck import Placed, Problem, write_deck
-from evidence.peers.calculix.section import Fineness, gear_plane
+from evidence.peers.calculix.section import Fineness, gear_plane, tip_edge_centre
 from evidence.peers.calculix.solid import extruded
 from gearfmu.geometry import PairGeometry
 
@@ -74,9 +74,7 @@ def _at_tip_edge(pair: PairGeometry, tip: int, roll: float) -> list[float]:
     (docs/theory.md eq. 6)."""
     gear, other = pair.gears[tip], pair.gears[1 - tip]
     along = roll / gear.r_b - gear.psi_b - pair.alpha_wt  # the tooth's angle from the line of centres
-    centre = gear.tip_edge_centre() @ np.array(
-        [[math.cos(along), math.sin(along)], [-math.sin(along), math.cos(along)]]
-    )
+    centre = tip_edge_centre(gear) @ np.array([[math.cos(along), math.sin(along)], [-math.sin(along), math.cos(along)]])
     distance = centre - [pair.a, 0.0]
     touched = math.sqrt(distance @ distance - other.r_b**2) - gear.tip_edge
     return [gear.s_tip, touched] if tip == 0 else [touched, gear.s_tip]

@@ -34,7 +34,7 @@ from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_force
 from gearfmu.body import Body, load_body
 from gearfmu.body.store import save_body
 from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.mesh import contact_modulus, half_width, largest_relative_radius
+from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.stage import assemble
 from gearfmu.stage.run.te import TANGENT, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
@@ -166,7 +166,7 @@ def problem_at(case: Case, te: float) -> Problem:
     contacts = touching(pair, turn)
     steel = spec.written.gears[0].material
     e_star = contact_modulus((steel.youngs_modulus,) * 2, (steel.poisson_ratio,) * 2)
-    radius = largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    radius = pair.largest_relative_radius()
     wide = half_width(case.torque / pair.gears[0].r_b / WIDTH, radius, e_star)
     fine = Fineness(
         patch=PATCH * wide, growth=2.0, thickness=2, depth_growth=2.6, rim=2, root=2, far_root=1, far_flank=1

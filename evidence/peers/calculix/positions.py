@@ -34,7 +34,7 @@ from evidence.peers.calculix.sun_planet import set_bodies, sun_planet
 from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.mesh import contact_modulus, half_width, largest_relative_radius
+from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.stage import TeResult, assemble, loaded_te
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
@@ -75,7 +75,7 @@ def case_at(spec: Stage, pair: PairGeometry, torque: float, bores: str) -> Case:
         (materials[0].youngs_modulus, materials[1].youngs_modulus),
         (materials[0].poisson_ratio, materials[1].poisson_ratio),
     )
-    radius = largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    radius = pair.largest_relative_radius()
     load = torque / pair.gears[0].r_b / spec.gears[0].face_width
     wide = half_width(load, radius, e_star)
     fine = Fineness(patch=PATCH * wide, size=SIZE * wide)

@@ -61,16 +61,21 @@ def surface(gear: GearGeometry, u: np.ndarray) -> np.ndarray:
     turn = np.maximum(u - (end - start), 0.0) / gear.tip_edge
     normal = gear.flank_normal(gear.s_tip)
     along = np.array([normal[1], -normal[0]])
-    arc = gear.tip_edge_centre() + gear.tip_edge * (
+    arc = tip_edge_centre(gear) + gear.tip_edge * (
         np.cos(turn)[:, None] * normal + np.sin(turn)[:, None] * along * np.sign(along[0])
     )
     return np.where((turn > 0)[:, None], arc, flank)
 
 
+def tip_edge_centre(gear: GearGeometry) -> np.ndarray:
+    """Centre (2,) in m of the tip edge rounding of flank sg = +1."""
+    return gear.flank_point(gear.s_tip) - gear.tip_edge * gear.flank_normal(gear.s_tip)
+
+
 def lengths(gear: GearGeometry) -> tuple[float, float]:
     """Arc length (m) of the flank, and of flank and meshed tip edge together."""
     start, end = involute.arc_length(np.array([gear.s_form, gear.s_tip]), gear.r_b)
-    full_turn = math.acos(float(gear.flank_normal(gear.s_tip) @ _radial(gear.tip_edge_centre())))
+    full_turn = math.acos(float(gear.flank_normal(gear.s_tip) @ _radial(tip_edge_centre(gear))))
     return float(end - start), float(end - start) + EDGE_TURN * full_turn * gear.tip_edge
 
 

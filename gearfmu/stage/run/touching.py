@@ -29,7 +29,7 @@ def angle_of(trace: Trace, stage: Stage, gear: str) -> np.ndarray | None:
     """Angle (n,) rad of a gear in the axes in which its axis stands, those of its carrier where it has one; None where
     that was not recorded."""
     rotor = stage.rotor_of(gear)
-    names = [name + GEAR_PHI for name in (rotor, stage.carrier_of(rotor)) if name is not None]
+    names = [name + GEAR_PHI for name in (rotor, stage.rotors[rotor].carried_by) if name is not None]
     if any(name not in trace for name in names):
         return None
     return trace[names[0]] - trace[names[1]] if len(names) > 1 else trace[names[0]]

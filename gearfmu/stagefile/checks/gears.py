@@ -268,7 +268,7 @@ def mesh_problems(mesh: Meshed) -> Found:
     elif all(field.split(".")[0] in _SHAPE_NO_FLANK for _, field, *_ in found):
         assert isinstance(a, GearGeometry)
         if isinstance(b, InternalGearGeometry):
-            internal = RingMesh(a, b, mesh.distance, mesh.backlash)
+            internal = RingMesh((a, b), mesh.distance, mesh.backlash)
             yield from _internal(mesh, internal)
             yield from _load_patches(mesh, internal)
         else:

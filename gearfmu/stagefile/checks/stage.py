@@ -110,10 +110,7 @@ def _names(stage: Stage) -> Found:
     for name, port in stage.ports.items():
         if port.body not in stage.bodies:
             yield f"ports.{name}.body", port.body, _unknown_body(stage)
-    for group, items, longest in (
-        ("engagements", stage.engagements, 31),
-        ("supports", stage.supports, 20),
-    ):
+    for group, items, longest in (("engagements", stage.engagements, 31), ("supports", stage.supports, 20)):
         for item in items:
             if len(item.name) > longest:
                 yield f"{group}.{item.name}.name", item.name, f"at most {longest} characters: shorten it"
@@ -140,11 +137,8 @@ def _places(stage: Stage) -> Found:
             elif not origin - 1e-9 <= at <= origin + body.length + 1e-9:
                 yield field, millimetres(at), f"not on the shaft {name}: {_range(origin, origin + body.length)}"
         elif at is not None and not math.isclose(at, origin, abs_tol=1e-9):
-            yield (
-                field,
-                millimetres(at),
-                f"{name} is a gear and held at its mid-width, {millimetres(origin)}: leave it away",
-            )
+            remedy = f"{name} is a gear and held at its mid-width, {millimetres(origin)}: leave it away"
+            yield field, millimetres(at), remedy
 
 
 def _on_shaft(stage: Stage, field: str, at: float | None) -> float | None:

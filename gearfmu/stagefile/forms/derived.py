@@ -78,7 +78,7 @@ def _derived_set_helix(spec: PlanetarySpec, g: PlanetaryGeometry) -> dict[str, A
     """What a helical set has besides: angle and overlap, and what torque_max presses along the axis in the mean."""
     sun = g.sun_mesh.gears[0]
     axial = spec.torque_max / g.ratio / spec.set.planets / sun.r * math.tan(abs(sun.beta))
-    apart = g.sun_mesh.r_w[1] + g.ring_mesh.planet_pitch_radius
+    apart = g.sun_mesh.r_w[1] + g.ring_mesh.r_w[0]
     return {
         "base_helix_angle_deg": math.degrees(sun.beta_b),
         "overlap_ratio": sun.overlap_ratio(common_width(spec.gears)),

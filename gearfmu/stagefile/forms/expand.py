@@ -10,6 +10,7 @@ from typing import Any
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.forms.general import (
+    OF_BOTH,
     EngagementSpec,
     Form,
     GearBody,
@@ -24,7 +25,7 @@ from gearfmu.stagefile.forms.planetary import PlanetarySpec, RingSpec, SetGearSp
 from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier, with_relief_rolls
 from gearfmu.stagefile.reading.base import Spec
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.stagefile.tables.connections import Bearing, PortSpec, RollingMount, SupportSpec
+from gearfmu.stagefile.tables.connections import Bearing, ContactSpec, PortSpec, RollingMount, SupportSpec
 
 CARRIER = "carrier"
 
@@ -67,7 +68,7 @@ def with_bores(stage: Stage, coupling: str) -> Stage:
     form = stage.written
     if isinstance(form, PlanetarySpec):
         remedy = "the gears of a planetary set keep averaging bores: leave it away"
-        raise SpecError([Problem(str(stage.source), "bore", coupling, remedy)])
+        raise SpecError.of(stage.source, "bore", coupling, remedy)
     if isinstance(form, Stage):
         gears = {gear.name: _coupled(gear, coupling) for gear in form.gears if not isinstance(gear, RingBody)}
         return rewritten(stage, bodies=form.bodies | gears)
@@ -80,9 +81,7 @@ def _expanded_pair(spec: StageSpec) -> Stage:
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
     pinion, wheel = spec.gears
     stage = Stage(
-        name=spec.name,
-        description=spec.description,
-        source=spec.source,
+        **_said_alike(spec),
         slices=spec.contact.slices,
         nodal=spec.contact.nodal,
         bodies={gear.name: gear for gear in pair_gears(pair, spec.gears)},
@@ -92,19 +91,14 @@ def _expanded_pair(spec: StageSpec) -> Stage:
                 name="mesh",
                 gears=(pinion.name, wheel.name),
                 backlash=pair.backlash,
-                damping=spec.contact.damping,
                 torque_max=spec.torque_max,
                 speed_max=spec.speed_max,
                 misalignment=pair.misalignment,
-                friction=spec.contact.friction,
-                film=spec.contact.film,
+                **_contact(spec.contact),
             ),
         ),
         supports=tuple(_held(gear.name, gear.bearing) for gear in spec.gears),
-        bearings=spec.bearings,
-        operating=spec.operating,
         ports={g.name: _placed(spec.ports[g.name], body=g.name) for g in spec.gears},
-        levels=spec.levels,
     )
     places = {f"bodies.{gear.name}": f"gears.{gear.name}" for gear in spec.gears}
     places |= {f"supports.{gear.name}": f"gears.{gear.name}.bearing" for gear in spec.gears}
@@ -136,9 +130,7 @@ def _expanded_set(spec: PlanetarySpec) -> Stage:
     bodies[CARRIER] = set_carrier(spec)
     cut: dict[str, Any] = {} if spec.contact is None else {"slices": spec.contact.slices, "nodal": spec.contact.nodal}
     stage = Stage(
-        name=spec.name,
-        description=spec.description,
-        source=spec.source,
+        **_said_alike(spec),
         bodies=bodies,
         rotors=_set_rotors(spec, planets),
         engagements=_set_meshes(spec, planets),
@@ -147,7 +139,6 @@ def _expanded_set(spec: PlanetarySpec) -> Stage:
             name: _placed(port, body=name, node="bore" if name == "carrier" else None)
             for name, port in spec.ports.items()
         },
-        levels=spec.levels,
         **cut,
     )
     shared = dict.fromkeys(planets, "planet")
@@ -209,8 +200,7 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
 
 def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
-    contact = {name: getattr(spec.contact, name, None) for name in ("damping", "friction", "film")}
-    common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
+    common: dict[str, Any] = {"backlash": spec.set.backlash, **_contact(spec.contact)}
     torque, relative = spec.mesh_torque, (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
     moves = spec.contact is not None and spec.speed_max is not None
     made = EngagementSpec if moves else partial(EngagementSpec.model_construct, misalignment=None)
@@ -252,14 +242,10 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
 
 def _held(body: str, bearing: Bearing | RollingMount, **where: Any) -> SupportSpec:
     if isinstance(bearing, RollingMount):
-        return SupportSpec(
-            name=body, body=body, bearing=bearing.rolling, span=bearing.span, carries=bearing.carries,
-            damping_ratio=bearing.damping_ratio,
-        )  # fmt: skip
-    return SupportSpec(
-        name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
-        damping_ratio=bearing.damping_ratio, **where,
-    )  # fmt: skip
+        held: dict[str, Any] = {"bearing": bearing.rolling, "span": bearing.span, "carries": bearing.carries}
+    else:
+        held = {"radial": bearing.stiffness, "axial": bearing.axial, "tilt": bearing.tilt}
+    return SupportSpec(name=body, body=body, damping_ratio=bearing.damping_ratio, **held, **where)
 
 
 def _coupled(gear: Any, coupling: str) -> Any:
@@ -277,6 +263,15 @@ def pair_gears(pair: PairSpec, gears: Sequence[GearSpec]) -> list[GearBody]:
 def _set_gear(gear: SetGearSpec, of: SetSpec, **changes: Any) -> GearBody:
     """Sun or planet in the terms of any stage."""
     return GearBody(**_fields(SetGearSpec, gear) | {"bearing": None} | changes, **_angles(of, HANDS[gear.name]))
+
+
+def _said_alike(spec: StageSpec | PlanetarySpec) -> dict[str, Any]:
+    return {name: value for name, value in spec if name in OF_BOTH}
+
+
+def _contact(contact: ContactSpec | None) -> dict[str, Any]:
+    """What a mesh has of the tooth contact of a file; nothing where a set says nothing of it."""
+    return {name: None if contact is None else dict(contact)[name] for name in ("damping", "friction", "film")}
 
 
 def _placed(port: PortSpec, **where: Any) -> PlacedPort:

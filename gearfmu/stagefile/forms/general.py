@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables, refuse
+from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Spec, Text, entry, named_tables, refuse
 from gearfmu.stagefile.tables.bodies import (
     Backlash,
     GearSpec,
@@ -24,23 +24,24 @@ from gearfmu.stagefile.tables.bodies import (
     Module,
     PressureAngle,
     ShaftBody,
-    SurfaceCoupling,
 )
 from gearfmu.stagefile.tables.connections import (
     Bearing,
     Bearings,
+    ContactDamping,
     FilmSpec,
     FrictionSpec,
-    LaterFields,
     LevelSpec,
     Limits,
     NodalSpec,
     OperatingSpec,
     Place,
     PortSpec,
+    Slices,
     SupportSpec,
 )
 from gearfmu.stagefile.tables.housing import HousingBody
+from gearfmu.stagefile.tables.imported import SurfaceCoupling
 
 if TYPE_CHECKING:
     from gearfmu.stagefile.forms.pair import StageSpec
@@ -53,15 +54,15 @@ Axis = Annotated[float, Quantity("axis")]
 class GearBody(GearSpec):
     """A toothed body: a GearSpec with its basic rack's module and angles; what holds it stands in `supports`."""
 
-    kind: Literal["gear"] = Field(default="gear", description="kind of body")
-    normal_module: Module = Field(description="normal module m_n")
-    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
-    helix_angle: HelixAngle = Field(
-        default=0.0,
-        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed gear, whose "
+    kind: Literal["gear"] = entry("kind of body", "gear")
+    normal_module: Module = entry("normal module m_n")
+    pressure_angle: PressureAngle = entry("normal pressure angle of the basic rack")
+    helix_angle: HelixAngle = entry(
+        "helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed gear, whose "
         "mate is left-handed",
+        0.0,
     )
-    bearing: Bearing | None = Field(default=None, description="not here: write [[supports]]")  # type: ignore[assignment]
+    bearing: Bearing | None = entry("not here: write [[supports]]", None)  # type: ignore[assignment]
 
     @field_validator("bearing")
     @classmethod
@@ -76,18 +77,17 @@ class RingBody(RingSpec):
     motion of its rim; what holds it stands in `supports`, and a port holds its spin."""
 
     name: Name
-    kind: Literal["ring"] = Field(description="kind of body")
-    normal_module: Module = Field(description="normal module m_n")
-    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
-    helix_angle: HelixAngle = Field(
-        default=0.0,
-        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed ring, whose "
+    kind: Literal["ring"] = entry("kind of body")
+    normal_module: Module = entry("normal module m_n")
+    pressure_angle: PressureAngle = entry("normal pressure angle of the basic rack")
+    helix_angle: HelixAngle = entry(
+        "helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed ring, whose "
         "mate is right-handed too",
+        0.0,
     )
-    mounts: MountsSpec | None = Field(default=None, description="not here: write [[supports]]")
-    rim_coupling: SurfaceCoupling = Field(
-        default="averaging",
-        description="how the rim meets its node: averaging (RBE3, the rim may deform) or rigid (RBE2, a stiff housing)",
+    mounts: MountsSpec | None = entry("not here: write [[supports]]", None)
+    rim_coupling: SurfaceCoupling = entry(
+        "how the rim meets its node: averaging (RBE3, the rim may deform) or rigid (RBE2, a stiff housing)", "averaging"
     )
 
     @model_validator(mode="after")
@@ -118,47 +118,41 @@ Reduced: TypeAlias = ToothedBody | CarrierBody | HousingBody  # bodies that have
 class RotorSpec(Spec):
     """Bodies that turn together about one axis."""
 
-    axis: tuple[Axis, Axis] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
-    offset: tuple[Place, Place] = Field(
-        default=(0.0, 0.0), description="deviation of the axis from that place: teeth are placed as if there were none"
+    axis: tuple[Axis, Axis] = entry("x and y of the axis; of a carried rotor, in the carrier's axes")
+    offset: tuple[Place, Place] = entry(
+        "deviation of the axis from that place: teeth are placed as if there were none", (0.0, 0.0)
     )
-    carried_by: Name | None = Field(
-        default=None,
-        description="rotor in whose axes this one and its supports are fixed (planet carrier); the ground when absent",
+    carried_by: Name | None = entry(
+        "rotor in whose axes this one and its supports are fixed (planet carrier); the ground when absent", None
     )
-    stands: bool = Field(default=False, description="it does not turn: supports with torsion hold it")
-    bodies: Annotated[dict[Name, Place], Field(min_length=1)] = Field(
-        description="place of every body along the axis: mid-width of a gear, beginning of a shaft"
+    stands: bool = entry("it does not turn: supports with torsion hold it", False)
+    bodies: Annotated[dict[Name, Place], Field(min_length=1)] = entry(
+        "place of every body along the axis: mid-width of a gear, beginning of a shaft"
     )
 
 
 class EngagementSpec(Spec):
     """Two gears in mesh; a ring is gear B."""
 
-    name: Name = Field(description="name of the mesh")
-    gears: tuple[Name, Name] = Field(description="gear A, gear B (the ring where there is one)")
-    backlash: Backlash = Field(
-        description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
-    )
-    damping: Annotated[float, Quantity("contact_damping")] = Field(
-        description="contact damping per metre of face width"
-    )
-    torque_max: Annotated[float, Quantity("mesh_torque_max")] = Field(description="largest torque on gear A")
-    speed_max: Annotated[float, Quantity("mesh_speed_max")] = Field(description="largest speed of gear A")
-    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
-    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
-    misalignment: Misalignment | None = Field(
-        default=None,
-        description="parallelism errors of the axes, B's seen from A's; parallel when the table is absent",
+    name: Name = entry("name of the mesh")
+    gears: tuple[Name, Name] = entry("gear A, gear B (the ring where there is one)")
+    backlash: Backlash = entry("circumferential backlash j_wt of the assembled pair on the working pitch circle")
+    damping: ContactDamping = entry("contact damping per metre of face width")
+    torque_max: Annotated[float, Quantity("mesh_torque_max")] = entry("largest torque on gear A")
+    speed_max: Annotated[float, Quantity("mesh_speed_max")] = entry("largest speed of gear A")
+    friction: FrictionSpec | None = entry("friction of the flanks; none when absent", None)
+    film: FilmSpec | None = entry("squeeze film in open gaps; none when absent", None)
+    misalignment: Misalignment | None = entry(
+        "parallelism errors of the axes, B's seen from A's; parallel when the table is absent", None
     )
 
 
 class PlacedPort(PortSpec):
     """A port and where it meets its rotor."""
 
-    body: Name = Field(description="body whose node is the port")
-    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
-    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
+    body: Name = entry("body whose node is the port")
+    at: Place | None = entry("place along the axis; a gear's mid-width when absent", None)
+    node: Name | None = entry("node of a carrier: bore, bolt0, bolt1 …", None)
 
 
 @dataclass(frozen=True)
@@ -179,7 +173,7 @@ class Origin:
 
 
 _OF_FORMS = ("pair", "contact", "geometry", "torque_max", "speed_max", "set", "sun", "planet", "ring", "carrier")
-_OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
+OF_BOTH = {"name", "description", "source", "levels", "bearings", "operating"}  # fields that forms have too
 
 
 class Stage(LaterFields):
@@ -191,24 +185,24 @@ class Stage(LaterFields):
     later = ("operating", "bearings")
     _origin: Origin = PrivateAttr(default_factory=Origin)
 
-    name: Name = Field(description="name of the stage, also of its FMU")
-    description: Text = Field(default="", description="one line about the stage")
+    name: Name = entry("name of the stage, also of its FMU")
+    description: Text = entry("one line about the stage", "")
     source: Path
-    kind: Literal["general"] = Field(default="general", description="kind of stage")
-    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
-    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
+    kind: Literal["general"] = entry("kind of stage", "general")
+    slices: Slices = entry("slices across the face width", 5)
+    nodal: NodalSpec = entry("nodal contact, for level paper", default_factory=NodalSpec)
     bodies: dict[
         Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody | HousingBody, Field(discriminator="kind")]
-    ] = Field(description="bodies by name")
-    rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body but a housing in one of them")
-    engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
-    supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
-    bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the supports, by name")
-    operating: OperatingSpec | None = Field(
-        default=None, description="load at which rolling bearings are linearised; needed where there are some"
+    ] = entry("bodies by name")
+    rotors: dict[Name, RotorSpec] = entry("rotors by name; every body but a housing in one of them")
+    engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = entry("meshes")
+    supports: tuple[SupportSpec, ...] = entry("bearings and seats", ())
+    bearings: Bearings = entry("rolling bearings of the supports, by name", default_factory=dict)
+    operating: OperatingSpec | None = entry(
+        "load at which rolling bearings are linearised; needed where there are some", None
     )
-    ports: dict[Name, PlacedPort] = Field(description="ports by name")
-    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+    ports: dict[Name, PlacedPort] = entry("ports by name")
+    levels: LevelSpec = entry("cut frequencies", default_factory=LevelSpec)
 
     @field_validator("bodies", mode="before")
     @classmethod
@@ -222,7 +216,7 @@ class Stage(LaterFields):
             raise AttributeError(f"a Stage has no {', '.join(sorted(unknown))}: change what is written in its file")
         found, form = super().model_copy(update=update, deep=deep), self._origin.form
         if form is not None:
-            said = set(update or {}) <= _OF_BOTH & set(type(form).model_fields)
+            said = set(update or {}) <= OF_BOTH & set(type(form).model_fields)
             found._origin = replace(self._origin, form=form.model_copy(update=update)) if said else Origin()
         return found
 
@@ -358,13 +352,9 @@ class Stage(LaterFields):
         bodies = {name: body for name, body in self.bodies.items() if name not in names}
         return self.model_copy(update={"bodies": bodies, "supports": tuple(supports)})
 
-    def carrier_of(self, rotor: str) -> str | None:
-        """Name of the rotor in whose axes a rotor stands; None: the ground."""
-        return self.rotors[rotor].carried_by
-
     def frame_of(self, mesh: EngagementSpec) -> str | None:
         """Name of the rotor in whose axes an engagement rolls; None: the ground."""
-        return self.carrier_of(self.rotor_of(mesh.gears[0]))
+        return self.rotors[self.rotor_of(mesh.gears[0])].carried_by
 
     def rotor_of(self, body: str) -> str:
         """Name of the rotor that a body belongs to."""

@@ -5,21 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.stagefile.forms.shapes import gears_in_mesh
-from gearfmu.stagefile.reading.base import Name, Quantity, Text, refuse
+from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Text, entry, refuse
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.stagefile.tables.connections import (
-    Bearings,
-    ContactSpec,
-    LaterFields,
-    LevelSpec,
-    Limits,
-    OperatingSpec,
-    PortSpec,
-)
+from gearfmu.stagefile.tables.connections import Bearings, ContactSpec, LevelSpec, Limits, OperatingSpec, PortSpec
 
 Table = TypeVar("Table")
 
@@ -34,23 +26,21 @@ class StageSpec(LaterFields):
 
     later = ("operating", "bearings")
 
-    name: Name = Field(description="name of the stage, also of its FMU")
-    description: Text = Field(default="", description="one line about the stage")
+    name: Name = entry("name of the stage, also of its FMU")
+    description: Text = entry("one line about the stage", "")
     source: Path
-    kind: Literal["external_pair"] = Field(default="external_pair", description="kind of stage")
-    torque_max: Annotated[float, Quantity("torque_max")] = Field(
-        description="largest pinion torque the model is made for"
+    kind: Literal["external_pair"] = entry("kind of stage", "external_pair")
+    torque_max: Annotated[float, Quantity("torque_max")] = entry("largest pinion torque the model is made for")
+    speed_max: Annotated[float, Quantity("speed_max")] = entry("largest pinion speed the model is made for")
+    pair: PairSpec = entry("the pair")
+    gears: tuple[GearSpec, GearSpec] = entry("pinion, then wheel; under other names the pinion first")
+    contact: ContactSpec = entry("tooth contact")
+    bearings: Bearings = entry("rolling bearings of the gears, by name", default_factory=dict)
+    operating: OperatingSpec | None = entry(
+        "load at which rolling bearings are linearised; needed where there are some", None
     )
-    speed_max: Annotated[float, Quantity("speed_max")] = Field(description="largest pinion speed the model is made for")
-    pair: PairSpec = Field(description="the pair")
-    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel; under other names the pinion first")
-    contact: ContactSpec = Field(description="tooth contact")
-    bearings: Bearings = Field(default_factory=dict, description="rolling bearings of the gears, by name")
-    operating: OperatingSpec | None = Field(
-        default=None, description="load at which rolling bearings are linearised; needed where there are some"
-    )
-    ports: dict[str, PortSpec] = Field(description="one port a shaft")
-    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+    ports: dict[str, PortSpec] = entry("one port a shaft")
+    levels: LevelSpec = entry("cut frequencies", default_factory=LevelSpec)
 
     @property
     def limits(self) -> Limits:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, field_validator
+from pydantic import field_validator
 
 from gearfmu.geometry.mesh import set_ratio
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Text, Whole, named_tables
+from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Spec, Text, Whole, entry, named_tables
 from gearfmu.stagefile.tables.bodies import (
     Backlash,
     BodySpec,
+    CenterDistance,
     Eccentricity,
+    Elements,
+    ElementsTwo,
     FaceWidth,
     Factor,
     HelixAngle,
@@ -31,7 +34,6 @@ from gearfmu.stagefile.tables.connections import (
     Bearing,
     ContactSpec,
     Diameter,
-    LaterFields,
     Length,
     LevelSpec,
     Limits,
@@ -39,74 +41,61 @@ from gearfmu.stagefile.tables.connections import (
     Ratio,
     SupportSpec,
 )
-from gearfmu.stagefile.tables.housing import HousingBody
+from gearfmu.stagefile.tables.housing import HousingBody, Method
 from gearfmu.stagefile.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
-Elements = Annotated[Count, Whole("elements")]
-ElementsTwo = Annotated[Count, Whole("elements_two")]
-CouplingKind = Literal["rigid", "averaging"]
 
 
 class SetSpec(Spec):
     """The set as a whole; sun–planet and planet–ring share centre distance, module and pressure angle."""
 
-    planets: Annotated[Count, Whole("planets")] = Field(
-        description="number of planets; equally spaced where `positions` is absent"
-    )
-    positions: tuple[Annotated[int, Whole("position")], ...] | None = Field(
-        default=None,
-        description="places of the planets in steps of 360 deg/(z_sun + z_ring), the only ones at which their teeth "
+    planets: Annotated[Count, Whole("planets")] = entry("number of planets; equally spaced where `positions` is absent")
+    positions: tuple[Annotated[int, Whole("position")], ...] | None = entry(
+        "places of the planets in steps of 360 deg/(z_sun + z_ring), the only ones at which their teeth "
         "fit: ascending, the first 0",
+        None,
     )
-    center_distance: Annotated[float, Quantity("center_distance")] = Field(
-        description="distance of planet and sun axes, the radius of the bolt circle"
-    )
-    normal_module: Module = Field(description="normal module m_n")
-    pressure_angle: PressureAngle = Field(description="normal pressure angle")
-    helix_angle: HelixAngle = Field(
-        default=0.0,
-        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the sun is right-handed, "
+    center_distance: CenterDistance = entry("distance of planet and sun axes, the radius of the bolt circle")
+    normal_module: Module = entry("normal module m_n")
+    pressure_angle: PressureAngle = entry("normal pressure angle")
+    helix_angle: HelixAngle = entry(
+        "helix angle beta at the reference circle, -35 deg to 35 deg; positive: the sun is right-handed, "
         "planets and ring are left-handed",
+        0.0,
     )
-    backlash: Backlash = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
-    load_sharing: Annotated[float, Quantity("load_sharing")] = Field(
-        default=1.35, description="mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)"
+    backlash: Backlash = entry("circumferential backlash j_wt of either mesh on its working pitch circle")
+    load_sharing: Annotated[float, Quantity("load_sharing")] = entry(
+        "mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)", 1.35
     )
-    pin_errors: dict[Pin, tuple[PinError, PinError]] = Field(
-        default={},
-        description="deviation of single pins from their places: number of the bolt (planet1 is on bolt 0) → radial, "
-        "tangential",
+    pin_errors: dict[Pin, tuple[PinError, PinError]] = entry(
+        "deviation of single pins from their places: number of the bolt (planet1 is on bolt 0) → radial, tangential", {}
     )
-    planet_eccentricity: dict[Pin, Eccentricity] = Field(
-        default={},
-        description="eccentric toothings of single planets: number of the bolt → amount, angle; before that of all",
+    planet_eccentricity: dict[Pin, Eccentricity] = entry(
+        "eccentric toothings of single planets: number of the bolt → amount, angle; before that of all", {}
     )
 
 
 class SetGearSpec(Toothing):
     """Sun or planet: an external gear."""
 
-    model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
-
     name: Name
-    teeth: Teeth = Field(description="number of teeth z")
-    profile_shift: ProfileShift = Field(default=0.0, description="profile shift coefficient x")
-    tip_diameter: TipDiameter = Field(description="tip diameter d_a")
-    face_width: FaceWidth = Field(description="face width b")
-    bore_diameter: Diameter = Field(description="diameter of the bore")
-    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
-    rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
-    material: Material = Field(description="material")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    body: BodySpec = Field(description="mesh and reduction")
-    bearing: Bearing | None = Field(
-        default=None,
-        description="of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion",
+    teeth: Teeth = entry("number of teeth z")
+    profile_shift: ProfileShift = entry("profile shift coefficient x", 0.0)
+    tip_diameter: TipDiameter = entry("tip diameter d_a")
+    face_width: FaceWidth = entry("face width b")
+    bore_diameter: Diameter = entry("diameter of the bore")
+    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
+    rack: RackSpec = entry("basic rack", default_factory=RackSpec)
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    body: BodySpec = entry("mesh and reduction")
+    bearing: Bearing | None = entry(
+        "of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion", None
     )
-    imported: ImportSpec | None = Field(
-        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    imported: ImportSpec | None = entry(
+        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
     )
 
 
@@ -115,55 +104,49 @@ class MountsSpec(LaterFields):
 
     later = ("to", "node")
 
-    points: Annotated[Count, Whole("mounts")] = Field(
-        description="number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
+    points: Annotated[Count, Whole("mounts")] = entry(
+        "number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
     )
-    stiffness: Annotated[float, Quantity("mount_stiffness")] = Field(
-        description="stiffness of one mount, the same in all three directions"
+    stiffness: Annotated[float, Quantity("mount_stiffness")] = entry(
+        "stiffness of one mount, the same in all three directions"
     )
-    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m), of all mounts together")
-    to: Name | None = Field(
-        default=None, description="housing that holds the ring along and about its axis; the ground when absent"
-    )
-    node: Name | None = Field(default=None, description="seat of that housing")
+    damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m), of all mounts together", 0.03)
+    to: Name | None = entry("housing that holds the ring along and about its axis; the ground when absent", None)
+    node: Name | None = entry("seat of that housing", None)
 
 
 class RingSpec(Toothing):
     """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
 
-    model_config = ConfigDict(populate_by_name=True)
-
     name: Name = "ring"
-    teeth: Annotated[Count, Whole("ring_teeth")] = Field(description="number of teeth z")
-    profile_shift: ProfileShift = Field(default=0.0, description="profile shift coefficient x, positive outwards")
-    tip_diameter: TipDiameter = Field(description="tip diameter, the smallest of the ring")
-    rim_diameter: Diameter = Field(description="outer diameter of the rim")
-    face_width: FaceWidth = Field(description="face width b")
-    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
-    dedendum: Factor = Field(default=1.25, description="root depth below the reference circle, factor of m")
-    fillet_radius: Factor = Field(
-        default=0.3, description="root fillet, an arc tangent to flank and root circle, factor of m"
-    )
-    material: Material = Field(description="material")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    mounts: MountsSpec | None = Field(default=None, description="elastic mounts; none when the table is absent")
-    body: BodySpec = Field(description="mesh and reduction")
-    imported: RingImportSpec | None = Field(
-        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    teeth: Annotated[Count, Whole("ring_teeth")] = entry("number of teeth z")
+    profile_shift: ProfileShift = entry("profile shift coefficient x, positive outwards", 0.0)
+    tip_diameter: TipDiameter = entry("tip diameter, the smallest of the ring")
+    rim_diameter: Diameter = entry("outer diameter of the rim")
+    face_width: FaceWidth = entry("face width b")
+    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
+    dedendum: Factor = entry("root depth below the reference circle, factor of m", 1.25)
+    fillet_radius: Factor = entry("root fillet, an arc tangent to flank and root circle, factor of m", 0.3)
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    mounts: MountsSpec | None = entry("elastic mounts; none when the table is absent", None)
+    body: BodySpec = entry("mesh and reduction")
+    imported: RingImportSpec | None = entry(
+        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
     )
 
 
 class CarrierMeshSpec(Spec):
     """Element counts of one bolt's sector (20-node hexahedra; half of it, mirrored)."""
 
-    around: ElementsTwo = Field(default=4, description="elements around the bolt towards bore and rim, each half side")
-    sides: ElementsTwo = Field(default=4, description="elements around the bolt towards the next bolt")
-    bolt: Elements = Field(default=4, description="elements from the bolt's core outwards")
-    disc: Elements = Field(default=8, description="elements from the bolt to the edges")
-    plate: Elements = Field(default=6, description="elements through the plate")
-    neck: Elements = Field(default=4, description="elements in the gap between plate and seat")
-    length: Elements = Field(default=4, description="elements along the planet's seat")
-    scale: Annotated[float, Quantity("scale")] = Field(default=1.0, description="factor on all counts")
+    around: ElementsTwo = entry("elements around the bolt towards bore and rim, each half side", 4)
+    sides: ElementsTwo = entry("elements around the bolt towards the next bolt", 4)
+    bolt: Elements = entry("elements from the bolt's core outwards", 4)
+    disc: Elements = entry("elements from the bolt to the edges", 8)
+    plate: Elements = entry("elements through the plate", 6)
+    neck: Elements = entry("elements in the gap between plate and seat", 4)
+    length: Elements = entry("elements along the planet's seat", 4)
+    scale: Annotated[float, Quantity("scale")] = entry("factor on all counts", 1.0)
 
     def scaled(self, count: int, least: int = 1) -> int:
         """`count` times the scale, rounded."""
@@ -177,28 +160,22 @@ class CarrierMeshSpec(Spec):
 class CarrierSpec(Spec):
     """A plate with a bore, beside the planets, and a bolt for each of them, made of one piece."""
 
-    model_config = ConfigDict(populate_by_name=True)
-
-    bore_diameter: Diameter = Field(description="diameter of the bore")
-    outer_diameter: Diameter = Field(description="outer diameter of the plate")
-    thickness: Length = Field(description="thickness of the plate")
-    gap: Length = Field(description="clearance between the plate and the planets' faces")
-    bolt_diameter: Diameter = Field(
-        description="diameter of the bolts; their seats are as long as the planets are wide"
+    bore_diameter: Diameter = entry("diameter of the bore")
+    outer_diameter: Diameter = entry("outer diameter of the plate")
+    thickness: Length = entry("thickness of the plate")
+    gap: Length = entry("clearance between the plate and the planets' faces")
+    bolt_diameter: Diameter = entry("diameter of the bolts; their seats are as long as the planets are wide")
+    coupling: dict[Name, Literal["rigid", "averaging"]] = entry(
+        'how "bore", "bolt0", "bolt1" … are held: rigid (RBE2) or averaging (RBE3)', {}
     )
-    coupling: dict[Name, CouplingKind] = Field(
-        default={}, description='how "bore", "bolt0", "bolt1" … are held: rigid (RBE2) or averaging (RBE3)'
-    )
-    material: Material = Field(description="material")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    method: Literal["krylov", "rubin", "craig_bampton", "modal"] = Field(
-        default="krylov", description="method of reduction; every one ends in oscillators"
-    )
-    modes: Annotated[Count, Whole("carrier_modes")] = Field(default=120, description="number of oscillators stored")
-    mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
-    bearing: Bearing | None = Field(default=None, description="between its bore and the ground; for motion")
-    imported: CarrierImportSpec | None = Field(
-        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    method: Method = entry("method of reduction; every one ends in oscillators", "krylov")
+    modes: Annotated[Count, Whole("carrier_modes")] = entry("number of oscillators stored", 120)
+    mesh: CarrierMeshSpec = entry("element counts", default_factory=CarrierMeshSpec)
+    bearing: Bearing | None = entry("between its bore and the ground; for motion", None)
+    imported: CarrierImportSpec | None = entry(
+        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
     )
 
     def coupling_of(self, interface: str) -> str:
@@ -210,13 +187,11 @@ class CarrierBody(CarrierSpec):
     """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
     planetary_set, with the places of its bolts."""
 
-    name: Name = Field(description="name of the carrier")
-    kind: Literal["carrier"] = Field(description="kind of body")
-    circle: Annotated[float, Quantity("center_distance")] = Field(default=0.0, description="radius of the bolt circle")
-    seat_length: FaceWidth = Field(default=0.0, description="length of the planets' seats")
-    bolts: tuple[Annotated[float, Quantity("bolt_place")], ...] = Field(
-        default=(), description="places of the bolts, in turns from +x"
-    )
+    name: Name = entry("name of the carrier")
+    kind: Literal["carrier"] = entry("kind of body")
+    circle: CenterDistance = entry("radius of the bolt circle", 0.0)
+    seat_length: FaceWidth = entry("length of the planets' seats", 0.0)
+    bolts: tuple[Annotated[float, Quantity("bolt_place")], ...] = entry("places of the bolts, in turns from +x", ())
 
 
 class PlanetarySpec(LaterFields):
@@ -224,29 +199,24 @@ class PlanetarySpec(LaterFields):
 
     later = ("bodies", "supports")
 
-    name: Name = Field(description="name of the stage")
-    description: Text = Field(default="", description="one line about the stage")
+    name: Name = entry("name of the stage")
+    description: Text = entry("one line about the stage", "")
     source: Path
-    kind: Literal["planetary_set"] = Field(description="kind of stage")
-    torque_max: Annotated[float, Quantity("torque_max")] = Field(
-        description="largest carrier torque the model is made for"
+    kind: Literal["planetary_set"] = entry("kind of stage")
+    torque_max: Annotated[float, Quantity("torque_max")] = entry("largest carrier torque the model is made for")
+    set: SetSpec = entry("the set")
+    sun: SetGearSpec = entry("sun")
+    planet: SetGearSpec = entry("one planet; all are equal")
+    ring: RingSpec = entry("ring")
+    carrier: CarrierSpec = entry("carrier")
+    speed_max: Annotated[float, Quantity("speed_max")] | None = entry("largest speed of the carrier; for motion", None)
+    contact: ContactSpec | None = entry("tooth contact; for motion", None)
+    ports: dict[Name, PortSpec] = entry(
+        "ports: carrier and sun, input first; a third, ring, holds the ring, which stands without it", {}
     )
-    set: SetSpec = Field(description="the set")
-    sun: SetGearSpec = Field(description="sun")
-    planet: SetGearSpec = Field(description="one planet; all are equal")
-    ring: RingSpec = Field(description="ring")
-    carrier: CarrierSpec = Field(description="carrier")
-    speed_max: Annotated[float, Quantity("speed_max")] | None = Field(
-        default=None, description="largest speed of the carrier; for motion"
-    )
-    contact: ContactSpec | None = Field(default=None, description="tooth contact; for motion")
-    ports: dict[Name, PortSpec] = Field(
-        default={},
-        description="ports: carrier and sun, input first; a third, ring, holds the ring, which stands without it",
-    )
-    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
-    bodies: dict[Name, HousingBody] = Field(default={}, description="a housing on which the ring stands, by its name")
-    supports: tuple[SupportSpec, ...] = Field(default=(), description="feet of the housing")
+    levels: LevelSpec = entry("cut frequencies", default_factory=LevelSpec)
+    bodies: dict[Name, HousingBody] = entry("a housing on which the ring stands, by its name", {})
+    supports: tuple[SupportSpec, ...] = entry("feet of the housing", ())
 
     @field_validator("bodies", mode="before")
     @classmethod

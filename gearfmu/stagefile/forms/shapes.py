@@ -68,7 +68,7 @@ def set_geometry(spec: PlanetarySpec) -> PlanetaryGeometry:
     sun, planet, ring = set_geometries(spec)
     a, backlash = spec.set.center_distance, spec.set.backlash
     return PlanetaryGeometry(
-        PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), planet_angles(spec)
+        PairGeometry((sun, planet), a, backlash), RingMesh((planet, ring), a, backlash), planet_angles(spec)
     )
 
 
@@ -110,7 +110,7 @@ def mesh_shape(stage: Stage, mesh: EngagementSpec) -> MeshShape:
     distance = centre_distance(stage, mesh)
     assert isinstance(a, GearGeometry), "gear A is external"
     if isinstance(b, InternalGearGeometry):
-        return RingMesh(a, b, distance, mesh.backlash)
+        return RingMesh((a, b), distance, mesh.backlash)
     return PairGeometry((a, b), distance, mesh.backlash)
 
 

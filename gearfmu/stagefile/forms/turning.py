@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
+from gearfmu.stagefile.forms.general import EngagementSpec, Stage
+from gearfmu.stagefile.forms.shapes import toothed
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,13 @@ def shafts_of(stage: Stage) -> Shafts:
     """Input and output of a stage: its first and its second port. SpecError where it has fewer, or where no meshes lead
     from one to the other."""
     if len(stage.ports) < 2:
-        raise _refused(stage, ", ".join(stage.ports), "a stage needs an input and an output: write a second [ports.…]")
+        remedy = "a stage needs an input and an output: write a second [ports.…]"
+        raise SpecError.of(stage.source, "ports", ", ".join(stage.ports), remedy)
     first, second = list(stage.ports)[:2]
     driven, turning = stage.rotor_of(stage.ports[second].body), turns(stage, first)
     if driven not in turning or driven == stage.rotor_of(stage.ports[first].body):
         remedy = "no meshes lead from the first port to the second: put the two that drive and load the stage first"
-        raise _refused(stage, f"{first}, {second}", remedy)
+        raise SpecError.of(stage.source, "ports", f"{first}, {second}", remedy)
     return Shafts(first, second, float(1 / turning[driven]))
 
 
@@ -56,7 +58,7 @@ def rolling(stage: Stage) -> list[dict[str, Fraction]]:
 
 def _rolling(stage: Stage, mesh: EngagementSpec) -> dict[str, Fraction]:
     """Factors of the rotors' speeds in z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
-    z_a, z_b = (_teeth(stage, gear) for gear in mesh.gears)
+    z_a, z_b = (toothed(stage, gear).teeth for gear in mesh.gears)
     z_b *= -1 if stage.internal(mesh) else 1
     factors: dict[str, Fraction] = defaultdict(Fraction)
     for rotor, teeth in ((stage.rotor_of(mesh.gears[0]), z_a), (stage.rotor_of(mesh.gears[1]), z_b)):
@@ -118,7 +120,7 @@ class Meshing:
 def meshings(stage: Stage) -> dict[str, Meshing]:
     """The `Meshing` of every engagement by name."""
     return {
-        m.name: Meshing(stage.rotor_of(m.gears[0]), stage.frame_of(m), _teeth(stage, m.gears[0]))
+        m.name: Meshing(stage.rotor_of(m.gears[0]), stage.frame_of(m), toothed(stage, m.gears[0]).teeth)
         for m in stage.engagements
     }
 
@@ -137,13 +139,3 @@ def require_driven(stage: Stage, driven: Collection[str], by: str) -> None:
     remedy = f"{by} drives {' and '.join(driven)} only: make this port one of kind torque or fixed"
     if problems := undriven(stage, driven, remedy):
         raise SpecError(problems)
-
-
-def _teeth(stage: Stage, gear: str) -> int:
-    body = stage.bodies[gear]
-    assert isinstance(body, ToothedBody)
-    return body.teeth
-
-
-def _refused(stage: Stage, value: str, remedy: str) -> SpecError:
-    return SpecError([Problem(str(stage.source), "ports", value, remedy)])

@@ -36,17 +36,14 @@ def coarse_stage(stage: str | os.PathLike[str], folder: str | os.PathLike[str] |
     source, spec = find_stage(stage), load_stage(stage).written
     target = (source.parent / FOLDER if folder is None else Path(folder)) / source.name
     base = Path(os.path.relpath(source, target.parent)).as_posix()
-    lines = [f'base = "{base}"', f'name = "{spec.name[:33]}_coarse"', f'description = "{_description(spec)}"']
+    text = spec.description.replace("\\", "\\\\").replace('"', '\\"')
+    text = f"coarse: {text}" if text else "coarse"
+    lines = [f'base = "{base}"', f'name = "{spec.name[:33]}_coarse"', f'description = "{text}"']
     for place, table in _tables(spec):
         lines += ["", f"[{place}]", *(f"{key} = {value!r}" for key, value in table.items())]
     target.parent.mkdir(parents=True, exist_ok=True)
     write_text(target, _HEAD.format(file=base, error=STATED_ERROR) + "\n".join(lines) + "\n")
     return target
-
-
-def _description(spec: Form | Stage) -> str:
-    text = spec.description.replace("\\", "\\\\").replace('"', '\\"')
-    return f"coarse: {text}" if text else "coarse"
 
 
 def _tables(spec: Form | Stage) -> list[tuple[str, dict[str, Any]]]:

@@ -7,7 +7,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from gearfmu.errors import Problem
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.reading.files import find_stage, read_layers
 
@@ -34,13 +33,12 @@ class Unread:
 
 @dataclass
 class Draft:
-    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; problems: what could not be read;
-    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from; word:
-    what a value is that nobody gave, "assumed" or "proposed"."""
+    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; unread: everything that was not used;
+    notes: sentences for the reader; like: the stage that the rest is from; word: what a value is that nobody gave,
+    "assumed" or "proposed"."""
 
     tables: dict[str, Any]
     marks: dict[str, str] = field(default_factory=dict)
-    problems: list[Problem] = field(default_factory=list)
     unread: tuple[Unread, ...] = ()
     notes: list[str] = field(default_factory=list)
     like: str = ""
@@ -106,6 +104,19 @@ def put_shafts(draft: Draft, torques: dict[str, float]) -> None:
         draft.assume(f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")
         draft.assume(f"ports.{name}.c", f"{rounded_up(_DAMPING * stiffness, 2):g} N*m*s/rad", "5 us times k")
         draft.assume(f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
+
+
+def put_limit(draft: Draft, field: str, known: tuple[float | None, str], usual: tuple[float, str]) -> float:
+    """Puts `torque_max` (N·m) or `speed_max` (rad/s), rounded up, and returns it: as known, with its origin, else the
+    usual one, with the rule behind it."""
+    unit, digits = {"torque_max": ("N*m", 3), "speed_max": ("rad/s", 4)}[field]
+    if known[0]:
+        value = rounded_up(known[0], digits)
+        draft.put(field, f"{value:g} {unit}", known[1])
+    else:
+        value = rounded_up(usual[0], 2)
+        draft.assume(field, f"{value:g} {unit}", usual[1])
+    return value
 
 
 def millimetres(value: float) -> str:

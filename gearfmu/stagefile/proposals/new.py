@@ -14,10 +14,10 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import SpecError
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
-from gearfmu.stagefile.reading.base import Quantity, fields_by_key, inner_model, metadata_of, model_of_table, read_toml
+from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml
 from gearfmu.stagefile.reading.files import find_stage, read_layers
 from gearfmu.stagefile.stage import load_stage
 
@@ -62,7 +62,7 @@ def free_target(name: str, folder: str | os.PathLike[str] = ".") -> Path:
     """Where the stage `name` will be written. SpecError when it is no name, or the file exists already."""
     target = _target(name, folder)
     if target.exists():
-        raise SpecError([_exists(target)])
+        raise _exists(target)
     return target
 
 
@@ -76,7 +76,7 @@ def stage_text(raw: dict[str, Any], head: str, marks: Mapping[str, str] = Mappin
 def _target(name: str, folder: str | os.PathLike[str]) -> Path:
     if not _NAME.match(name):
         remedy = "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
-        raise SpecError([Problem("", "name", f'"{name}"', remedy)])
+        raise SpecError.of("", "name", f'"{name}"', remedy)
     return Path(folder) / name / "stage.toml"
 
 
@@ -105,14 +105,14 @@ def _write_new(target: Path, text: str) -> Path:
                 raise FileExistsError(target) from None
             os.rename(temporary, target)
     except FileExistsError:
-        raise SpecError([_exists(target)]) from None
+        raise _exists(target) from None
     finally:
         temporary.unlink(missing_ok=True)
     return target
 
 
-def _exists(target: Path) -> Problem:
-    return Problem(str(target), "", "", "this file exists already: choose another name, or edit it")
+def _exists(target: Path) -> SpecError:
+    return SpecError.of(target, "", "", "this file exists already: choose another name, or edit it")
 
 
 def _table(
@@ -123,11 +123,11 @@ def _table(
         key: field for key, field in fields_by_key(kind).items() if key != "source" and not (key == "name" and place)
     }
     for key, field in fields.items():
-        if inner_model(field.annotation) is None:
+        if model_of_table(field.annotation) is None:
             mark = marks.get(".".join((*place, key)), "")
             yield _line(key, field, raw) + (f"; {mark}" if mark else "")
     for key, field in fields.items():
-        inner = inner_model(field.annotation)
+        inner = model_of_table(field.annotation)
         if inner is None:
             continue
         named = get_origin(field.annotation) in (tuple, dict)
@@ -149,15 +149,11 @@ def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str
 
 
 def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
-    quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
+    quantity = quantity_of(field)
     unit = quantity.unit if quantity else ""
     text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
     meaning = field.description or ""
-    choices = (
-        [part for part in get_args(field.annotation) if isinstance(part, str)]
-        if get_origin(field.annotation) is Literal
-        else []
-    )
+    choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
     if len(choices) > 1:
         meaning += f" ({' | '.join(choices)})"
     return f"{text:<42}  # {meaning}{f' [{unit}]' if unit else ''}"

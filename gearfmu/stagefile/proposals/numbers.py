@@ -36,6 +36,11 @@ _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the sh
 INCH = 25.4e-3  # m
 _SAME = 1e-4  # of the module: centre distances that agree
 _LEAST_FILLET = 0.05  # of the module
+_RANGES = {  # of the numbers of a Wish
+    "module": "module", "width": "face_width", "planets": "planets", "center": "center_distance",
+    "helix": "helix_angle", "pressure_angle": "pressure_angle", "torque": "torque_max", "speed": "speed_max",
+    "relief": "relief",
+}  # fmt: skip
 _PATCH_PER_HERTZ = 2.0  # slices of tilted or helical teeth carry more than the mean
 
 
@@ -81,9 +86,7 @@ def wish_of(given: Mapping[str, Any]) -> Wish:
     pitch = numbers.pop("diametral_pitch", None)
     if pitch is not None:
         if "module" in numbers or not pitch > 0:
-            raise SpecError(
-                [Problem("", "diametral_pitch", f"{pitch:g}", "a positive number, or the module, not both")]
-            )
+            raise SpecError.of("", "diametral_pitch", f"{pitch:g}", "a positive number, or the module, not both")
         numbers["module"] = INCH / pitch
     return Wish(**numbers)
 
@@ -98,16 +101,12 @@ def new_from_numbers(name: str, wish: Wish, folder: str | os.PathLike[str] = "."
     kind = "planetary set" if wish.planets else "pair"
     origin = f"proposed for a {kind} of {wish.shown} teeth, m_n = {millimetres(wish.rack.m)}"
     with tempfile.TemporaryDirectory() as apart:  # an invalid stage is never left behind
-        _judge(write_drafted(name, draft.tables, draft.marks, origin, apart))
+        path = write_drafted(name, draft.tables, draft.marks, origin, apart)
+        try:
+            load_stage(path)
+        except SpecError as error:
+            raise SpecError(replace(problem, file="") for problem in error.problems) from None
     return write_drafted(name, draft.tables, draft.marks, origin, folder)
-
-
-def _judge(path: Path) -> None:
-    """SpecError, without the name of the file, where the stage is not valid."""
-    try:
-        load_stage(path)
-    except SpecError as error:
-        raise SpecError(replace(problem, file="") for problem in error.problems) from None
 
 
 def draft_of(wish: Wish) -> Draft:
@@ -116,7 +115,7 @@ def draft_of(wish: Wish) -> Draft:
     from gearfmu.stagefile.proposals.planetary import draft_set
 
     wish = replace(wish, teeth=tuple(abs(z) for z in wish.teeth))
-    if problems := [*_missing(wish), *_beyond(wish), *_no_fillet(wish)]:
+    if problems := [*_missing(wish), *_beyond(wish)]:
         raise SpecError(problems)
     return draft_set(wish) if wish.planets else draft_pair(wish)
 
@@ -132,38 +131,23 @@ def _missing(wish: Wish) -> Iterator[Problem]:
         yield Problem("", "width", "", 'this number is missing: give the common face width, such as "20 mm"')
     for field, given in (("shifts", wish.shifts), ("bores", wish.bores)):
         if len(given) not in (0, 2):
-            yield Problem(
-                "", field, str(len(given)), f"give two: of {'sun and planet' if wish.planets else 'both gears'}"
-            )
+            remedy = f"give two: of {'sun and planet' if wish.planets else 'both gears'}"
+            yield Problem("", field, str(len(given)), remedy)
     if wish.unequal and not wish.planets:
         yield Problem("", "unequal", "", "this is about the places of planets: give their number")
 
 
-def _no_fillet(wish: Wish) -> Iterator[Problem]:
+def _beyond(wish: Wish) -> list[Problem]:
+    given, kinds = vars(wish) | {"relief": wish.relief or None}, ("teeth", "teeth", "ring_teeth")
+    numbers = {f"teeth ({z})": (float(z), range_of(kind)) for z, kind in zip(wish.teeth, kinds, strict=False)}
+    numbers |= {field: (given[field], range_of(kind)) for field, kind in _RANGES.items()}
+    numbers |= {f"bores ({bore:g} m)": (bore, range_of("bore")) for bore in wish.bores}
+    numbers |= {f"shifts ({shift:g})": (shift, range_of("profile_shift")) for shift in wish.shifts}
+    problems = range_problems(numbers)
     if wish.rack.fillet < _LEAST_FILLET:
         remedy = f"the tips of a rack with dedendum {DEDENDUM:g} m_n are pointed: take less, such as 25 deg"
-        yield Problem("", "pressure_angle", degrees(wish.pressure_angle), remedy)
-
-
-def _beyond(wish: Wish) -> list[Problem]:
-    kinds = ("teeth", "teeth", "ring_teeth")
-    numbers = {f"teeth ({z})": (float(z), range_of(kind)) for z, kind in zip(wish.teeth, kinds, strict=False)}
-    return range_problems(
-        numbers
-        | {
-            "module": (wish.module, range_of("module")),
-            "width": (wish.width, range_of("face_width")),
-            "planets": (wish.planets, range_of("planets")),
-            "center": (wish.center, range_of("center_distance")),
-            "helix": (wish.helix, range_of("helix_angle")),
-            "pressure_angle": (wish.pressure_angle, range_of("pressure_angle")),
-            "torque": (wish.torque, range_of("torque_max")),
-            "speed": (wish.speed, range_of("speed_max")),
-            "relief": (wish.relief or None, range_of("relief")),
-        }
-        | {f"bores ({bore:g} m)": (bore, range_of("bore")) for bore in wish.bores}
-        | {f"shifts ({shift:g})": (shift, range_of("profile_shift")) for shift in wish.shifts}
-    )
+        problems.append(Problem("", "pressure_angle", degrees(wish.pressure_angle), remedy))
+    return problems
 
 
 def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
@@ -183,6 +167,14 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
     return draft
 
 
+def put_center(draft: Draft, wish: Wish, table: str, distance: float, why: str) -> None:
+    """The centre distance (m) as given, or as proposed with the rule behind it."""
+    if wish.center is None:
+        draft.assume(f"{table}.center_distance", millimetres(distance), why)
+    else:
+        draft.put(f"{table}.center_distance", millimetres(distance), GIVEN)
+
+
 def distance_of(wish: Wish, usual: float) -> float:
     """Centre distance (m) of the first two gears: as given, that of the given profile shifts, else `usual`. SpecError
     where both are given and disagree."""
@@ -192,28 +184,26 @@ def distance_of(wish: Wish, usual: float) -> float:
     found = distance_of_shifts(rack.m, rack.alpha, rack.beta, teeth, total)
     if wish.center is not None and abs(wish.center - found) > _SAME * rack.m:
         remedy = f"the profile shifts, {total:g} together, belong to {millimetres(found)}: leave one of both away"
-        raise SpecError([Problem("", "center", millimetres(wish.center), remedy)])
+        raise SpecError.of("", "center", millimetres(wish.center), remedy)
     return wish.center or found
 
 
-def put_wishes(draft: Draft, wish: Wish, places: tuple[str, str]) -> None:
-    """Bores and tip relief that were asked for, of both external gears."""
-    for place, bore in zip(places, wish.bores, strict=False):
-        draft.put(f"{place}.bore_diameter", millimetres(bore), GIVEN)
-    for place in places if wish.relief else ():
-        relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
-        draft.put(f"{place}.tip_relief", relief, GIVEN)
-
-
-def put_gear(draft: Draft, place: str, gear: GearGeometry, shift: str) -> None:
-    """Teeth, profile shift (`shift`: the rule behind it), tip circle, rack and bore of an external gear."""
+def put_gear(draft: Draft, wish: Wish, number: int, place: str, gear: GearGeometry, shift: str) -> None:
+    """Teeth, profile shift (`shift`: the rule behind it), tip circle, rack, bore and relief of an external gear, which
+    is 0 or 1 in `wish`."""
     draft.put(f"{place}.teeth", gear.z, GIVEN)
     draft.assume(f"{place}.profile_shift", round(gear.x, 6) + 0.0, shift)
     why = f"tip clearance 0.25 m_n kept; root diameter {millimetres(round(2 * gear.r_f, 6))}"
     draft.assume(f"{place}.tip_diameter", millimetres(2 * gear.r_a), why)
     rack = {"addendum": ADDENDUM, "dedendum": DEDENDUM, "fillet_radius": round(gear.rho_fp / gear.m, 6)}
     draft.put(f"{place}.rack", rack, "proposed: ISO 53, profile A")
-    draft.assume(f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
+    if wish.bores:
+        draft.put(f"{place}.bore_diameter", millimetres(wish.bores[number]), GIVEN)
+    else:
+        draft.assume(f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
+    if wish.relief:
+        relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
+        draft.put(f"{place}.tip_relief", relief, GIVEN)
 
 
 def put_load(draft: Draft, wish: Wish, torque: float, speed: float) -> tuple[float, float]:
@@ -237,7 +227,7 @@ def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometr
     if least > most:
         shown = f"1.5 Hertz half-widths, {millimetres(least)}, are more than half the flank, {millimetres(most)}"
         remedy = f"{shown}: at most {100 * (most / least) ** 2:.2g} % of this torque, or a larger module or width"
-        raise SpecError([Problem("", "torque", draft.at("torque_max"), remedy)])
+        raise SpecError.of("", "torque", draft.at("torque_max"), remedy)
     wide = min(_PATCH_PER_HERTZ / STRIP_PER_HERTZ * least, most)
     why = "0.12 m_n" if usual >= wide else "2 Hertz half-widths at torque_max"
     value = usual if usual >= wide else max(least, rounded_down(wide, 3))

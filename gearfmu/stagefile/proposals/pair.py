@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.mesh import PairGeometry, largest_relative_radius
+from gearfmu.errors import SpecError
+from gearfmu.geometry.mesh import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
@@ -14,11 +14,11 @@ from gearfmu.stagefile.proposals.numbers import (
     Wish,
     begun,
     distance_of,
+    put_center,
     put_gear,
     put_load,
     put_patch,
     put_slices,
-    put_wishes,
 )
 
 NAMES = ("pinion", "wheel")
@@ -32,19 +32,15 @@ def draft_pair(wish: Wish) -> Draft:
     pair = OpenPair(rack, teeth, distance)
     shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
     if shift is None:
-        raise SpecError([Problem("", "center", millimetres(distance), out_of_reach(pair))])
+        raise SpecError.of("", "center", millimetres(distance), out_of_reach(pair))
     geometry = pair.at(shift)
     draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in NAMES))
-    if wish.center is None:
-        why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
-        draft.assume("pair.center_distance", millimetres(distance), why)
-    else:
-        draft.put("pair.center_distance", millimetres(distance), GIVEN)
+    why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
+    put_center(draft, wish, "pair", distance, why)
     rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
     rules = (GIVEN, GIVEN) if wish.shifts else rules
-    for name, gear, rule in zip(NAMES, geometry.gears, rules, strict=True):
-        put_gear(draft, f"gears.{name}", gear, rule)
-    put_wishes(draft, wish, ("gears.pinion", "gears.wheel"))
+    for k, name in enumerate(NAMES):
+        put_gear(draft, wish, k, f"gears.{name}", geometry.gears[k], rules[k])
     _put_loads(draft, wish, geometry, width)
     put_slices(draft, rack, width)
     return draft
@@ -56,7 +52,7 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     ratio = wheel.z / pinion.z
     usual = usual_torque(2 * pinion.r, ratio, width), PITCH_SPEED / pinion.r
     torque, _ = put_load(draft, wish, *usual)
-    radius = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
+    radius = geometry.largest_relative_radius()
     for name, gear in zip(NAMES, geometry.gears, strict=True):
         put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
     put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))

@@ -7,15 +7,8 @@ from collections.abc import Iterator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.mesh import MOUNTS, RingMesh, largest_relative_radius, least_apart, set_ratio
-from gearfmu.geometry.shifts import (
-    DEDENDUM,
-    RING_FILLET,
-    OpenPair,
-    ring_of,
-    ring_shortcomings,
-    sum_of_shifts,
-)
+from gearfmu.geometry.mesh import MOUNTS, RingMesh, least_apart, set_ratio
+from gearfmu.geometry.shifts import DEDENDUM, RING_FILLET, OpenPair, ring_of, ring_shortcomings, sum_of_shifts
 from gearfmu.quantities import range_of
 from gearfmu.stagefile.checks.gears import rounded_up
 from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, usual_torque
@@ -24,11 +17,11 @@ from gearfmu.stagefile.proposals.numbers import (
     Wish,
     begun,
     distance_of,
+    put_center,
     put_gear,
     put_load,
     put_patch,
     put_slices,
-    put_wishes,
 )
 from gearfmu.stagefile.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
 
@@ -55,15 +48,11 @@ def draft_set(wish: Wish) -> Draft:
     if problems or mesh is None or shift is None:
         raise SpecError(problems)
     draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
-    if wish.center is None:
-        same = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
-        draft.assume("set.center_distance", millimetres(distance), same)
-    else:
-        draft.put("set.center_distance", millimetres(distance), GIVEN)
+    why = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
+    put_center(draft, wish, "set", distance, why)
     _put_planets(draft, wish)
-    put_gear(draft, "sun", pair.at(shift).gears[0], SHIFT_RULE)
-    put_gear(draft, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
-    put_wishes(draft, wish, ("sun", "planet"))
+    put_gear(draft, wish, 0, "sun", pair.at(shift).gears[0], SHIFT_RULE)
+    put_gear(draft, wish, 1, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
     _put_ring(draft, mesh)
     _put_carrier(draft, wish, mesh)
     _put_loads(draft, wish, pair, shift, mesh)
@@ -120,7 +109,7 @@ def _ring_mesh(wish: Wish, planet: GearGeometry, distance: float) -> tuple[RingM
     difference = sum_of_shifts(planet.m, planet.alpha, planet.beta, ring - planet.z, distance)
     if ring <= planet.z or not abs(difference) < 3:
         return None, [Problem("", "teeth", wish.shown, f"sun and ring have no common centre distance: {coaxial}")]
-    mesh = RingMesh(planet, ring_of(planet, ring, distance), distance, 0.0)
+    mesh = RingMesh((planet, ring_of(planet, ring, distance)), distance, 0.0)
     if found := list(ring_shortcomings(mesh)):
         return None, [Problem("", "teeth", wish.shown, f"{', '.join(found)}; {coaxial}, the ring has {ring}")]
     return mesh, []
@@ -161,9 +150,7 @@ def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
     draft.assume("carrier.thickness", millimetres(thickness), "0.6 of the face width")
     draft.assume("carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
     draft.assume(
-        "carrier.mesh.scale",
-        _CARRIER_SCALE,
-        "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh",
+        "carrier.mesh.scale", _CARRIER_SCALE, "two fifths of the memory of 1, frequencies 0.8 % above a finer mesh"
     )
     inputs = 6 * ((wish.planets or 1) + 1)
     draft.assume("carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
@@ -177,8 +164,7 @@ def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: Rin
     usual = usual_torque(2 * sun.r, planet.z / sun.z, width) * count / _SHARING[count] * ratio
     torque, _ = put_load(draft, wish, usual, PITCH_SPEED / sun.r / ratio)
     load = _SHARING[count] * torque / ratio / count / sun.r_b / width
-    outer = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
-    inner = mesh.largest_relative_radius()
+    outer, inner = geometry.largest_relative_radius(), mesh.largest_relative_radius()
     put_patch(draft, "sun", sun, load, outer)
     put_patch(draft, "planet", planet, load, max(outer, inner))
     put_patch(draft, "ring", mesh.ring, load, inner)

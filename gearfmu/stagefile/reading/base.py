@@ -11,9 +11,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationError,
+    model_serializer,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -31,9 +39,24 @@ _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*
 
 
 class Spec(BaseModel):
-    """Base of all specs: frozen, unknown keys refused, numbers finite."""
+    """Base of all specs: frozen, unknown keys refused, numbers finite. A field whose word in a file is none in Python
+    (`import`, `class`) is also known by its name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+
+class LaterFields(Spec):
+    """A table whose fields named in `later` are left out of its dump where they have their defaults: a file without
+    them is what it was before they were known."""
+
+    later: ClassVar[tuple[str, ...]] = ()
+
+    @model_serializer(mode="wrap")
+    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        tables: dict[str, object] = handler(self)
+        defaults = {name: type(self).model_fields[name].get_default(call_default_factory=True) for name in self.later}
+        silent = {name for name, value in self if name in defaults and value == defaults[name]}
+        return {name: value for name, value in tables.items() if name not in silent}
 
 
 SpecType = TypeVar("SpecType", bound=Spec)
@@ -127,6 +150,12 @@ Count = Annotated[int, Strict()]
 Switch = Annotated[bool, Strict()]
 
 
+def entry(meaning: str, default: Any = ..., **more: Any) -> Any:
+    """A field of a table: its meaning for the reader, and its default where a file need not give it. more : as of
+    pydantic's Field."""
+    return Field(default=default, description=meaning, **more)
+
+
 def refuse(remedy: str) -> PydanticCustomError:
     """The exception for a validator to raise: `remedy` becomes the problem's text."""
     return PydanticCustomError("refused", "{remedy}", {"remedy": remedy})
@@ -151,7 +180,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         remedy = "the file is not UTF-8 text: save it as UTF-8"
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         remedy = f"not valid TOML: {error}"
-    raise SpecError([Problem(str(path), "", "", remedy)])
+    raise SpecError.of(path, "", "", remedy)
 
 
 def validate(
@@ -173,47 +202,36 @@ def _follows(entry: Any, entries: Sequence[Any]) -> bool:
     return entry["type"] == "too_short" and any(inside)
 
 
-def _is_tag(raw: object, part: str | int) -> bool:
-    """Whether `part` of a place only names the class that a table is read as."""
-    return isinstance(raw, dict) and part not in raw and part in (raw.get("kind", "gear"), *_TAGS)
-
-
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
-    for part in loc:
-        if _is_tag(raw, part):
-            continue
-        inside, label = _step(raw, part)
+    for _, label in _steps(raw, loc):
         path += label if label.startswith("[") or not path else f".{label}"
-        raw = inside
     return path
 
 
 def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
     """Keys and positions in `raw` that lead to a place of the model."""
-    path: list[Any] = []
+    return [key for key, _ in _steps(raw, loc)]
+
+
+def _steps(raw: Any, loc: tuple[str | int, ...]) -> Iterator[tuple[Any, str]]:
+    """Key or position in `raw` of every part of a place of the model, and how it is shown. Parts that only name the
+    class that a table is read as are left out."""
     for part in loc:
-        if _is_tag(raw, part):
-            continue
+        key, label, inside = part, str(part), None
         if isinstance(raw, dict):
-            key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
-            raw = raw.get(key)
-        else:
-            key = part
-            raw = raw[part] if isinstance(raw, list) and isinstance(part, int) and part < len(raw) else None
-        path.append(key)
-    return path
-
-
-def _step(raw: Any, part: str | int) -> tuple[Any, str]:
-    if isinstance(raw, dict):
-        key = part if part in raw or isinstance(part, str) else list(raw)[part] if part < len(raw) else str(part)
-        return raw.get(key), str(key)
-    if isinstance(raw, list) and isinstance(part, int) and part < len(raw):
-        name = raw[part].get("name") if isinstance(raw[part], dict) else None
-        return raw[part], name if isinstance(name, str) else f"[{part}]"
-    return None, str(part)
+            if part not in raw and part in (raw.get("kind", "gear"), *_TAGS):
+                continue
+            if isinstance(part, int) and part not in raw and part < len(raw):
+                key = list(raw)[part]
+            label, inside = str(key), raw.get(key)
+        elif isinstance(raw, list) and isinstance(part, int) and part < len(raw):
+            inside = raw[part]
+            name = inside.get("name") if isinstance(inside, dict) else None
+            label = name if isinstance(name, str) else f"[{part}]"
+        yield key, label
+        raw = inside
 
 
 def _problem(kind: type[Spec], raw: Any, file: str, entry: Any) -> Problem:
@@ -244,7 +262,7 @@ def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, An
     choices = [kind]
     for part in loc:
         if field := fields_by_key(choices[0]).get(part):
-            choices = inner_models(field.annotation)
+            choices = _inner_models(field.annotation)
             if not choices:
                 return {}
         else:
@@ -252,9 +270,10 @@ def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, An
     return fields_by_key(choices[0])
 
 
-def model_of_table(annotation: Any, table: object) -> type[BaseModel] | None:
-    """The spec class in an annotation that a table is read as; the first where the table says nothing."""
-    choices = inner_models(annotation)
+def model_of_table(annotation: Any, table: object = None) -> type[BaseModel] | None:
+    """The spec class in an annotation such as `Spec | None` or `dict[str, Spec]` that a table is read as, the first
+    where the table says nothing; None without one."""
+    choices = _inner_models(annotation)
     named = [choice for choice in choices if isinstance(table, dict) and table.get("kind") in _kinds(choice)]
     keyed = [choice for choice in choices if isinstance(table, dict) and vars(choice).get("key") in table]
     return next(iter(named or keyed or choices), None)
@@ -285,16 +304,16 @@ def metadata_of(field: FieldInfo) -> Iterator[Any]:
         yield from getattr(part, "__metadata__", ())
 
 
-def inner_model(annotation: Any) -> type[BaseModel] | None:
-    """The first spec class in an annotation such as `Spec | None` or `dict[str, Spec]`; None without one."""
-    return next(iter(inner_models(annotation)), None)
+def quantity_of(field: FieldInfo) -> Quantity | None:
+    """The Quantity of a field; None where it is of another kind."""
+    return next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
 
 
-def inner_models(annotation: Any) -> list[type[BaseModel]]:
+def _inner_models(annotation: Any) -> list[type[BaseModel]]:
     """The spec classes in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for part in get_args(annotation) for found in inner_models(part)]
+    return [found for part in get_args(annotation) for found in _inner_models(part)]
 
 
 def _shown(value: Any) -> str:

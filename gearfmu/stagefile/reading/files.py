@@ -30,13 +30,13 @@ def library_roots() -> tuple[Path, ...]:
     return tuple(root for root in candidates if root.is_dir())
 
 
+def _shipped_files() -> list[Path]:
+    return [path for root in library_roots() for path in sorted(root.glob("*/stage*.toml"))]
+
+
 def shipped_stages() -> list[str]:
     """Names that `find_stage` knows: "fzg_c", and "fzg_c/stage_relief" for further stage files of a folder."""
-    names = set()
-    for root in library_roots():
-        for path in root.glob("*/stage*.toml"):
-            names.add(path.parent.name if path.name == "stage.toml" else f"{path.parent.name}/{path.stem}")
-    return sorted(names)
+    return sorted({p.parent.name if p.name == "stage.toml" else f"{p.parent.name}/{p.stem}" for p in _shipped_files()})
 
 
 def find_stage(name: str | os.PathLike[str]) -> Path:
@@ -54,13 +54,12 @@ def find_stage(name: str | os.PathLike[str]) -> Path:
         return named
     shipped = shipped_stages()
     hint = near_or_all(str(name), shipped, "give the path of a stage.toml, or one of:", cutoff=0.6)
-    raise SpecError([Problem(str(name), "", "", f"there is no such stage: {hint}")])
+    raise SpecError.of(name, "", "", f"there is no such stage: {hint}")
 
 
 def _shipped_of_name(name: str) -> Path | None:
     """The shipped stage file that says `name = …` so."""
-    files = (path for root in library_roots() for path in sorted(root.glob("*/stage*.toml")))
-    return next((path for path in files if read_toml(path).get("name") == name), None)
+    return next((path for path in _shipped_files() if read_toml(path).get("name") == name), None)
 
 
 def model_folder(stage: Any) -> Path:
@@ -69,6 +68,7 @@ def model_folder(stage: Any) -> Path:
 
 
 _DEPTH = 8
+MISSING = object()
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Layers:
     def holder(self, field: str) -> Path:
         """The nearest file that says something about a field ("gears.pinion.import.file"); `path` when none does."""
         keys = field.split(".")
-        return next((path for path, raw in self.files if _holds(raw, keys)), self.path)
+        return next((path for path, raw in self.files if value_at(raw, keys) is not MISSING), self.path)
 
     def named(self, field: str, name: str) -> Path:
         """The file that a field names, as seen from here: its path is relative to the file that holds the field."""
@@ -117,32 +117,14 @@ def read_layers(path: Path) -> Layers:
         if base is None:
             return Layers(tuple(files))
         if not isinstance(base, str) or not base:
-            raise SpecError(
-                [Problem(str(current), "base", str(base), 'expected the path of a file, e.g. base = "stage.toml"')]
-            )
+            raise SpecError.of(current, "base", base, 'expected the path of a file, e.g. base = "stage.toml"')
         following = current.parent / base
         if len(files) >= _DEPTH or any(following.resolve() == seen.resolve() for seen, _ in files):
-            raise SpecError(
-                [
-                    Problem(
-                        str(current),
-                        "base",
-                        base,
-                        f"the bases form a ring or are more than {_DEPTH}: name the file that says it all",
-                    )
-                ]
-            )
+            remedy = f"the bases form a ring or are more than {_DEPTH}: name the file that says it all"
+            raise SpecError.of(current, "base", base, remedy)
         if not following.is_file():
-            raise SpecError(
-                [
-                    Problem(
-                        str(current),
-                        "base",
-                        base,
-                        f"there is no file {following}: write the path relative to this file",
-                    )
-                ]
-            )
+            remedy = f"there is no file {following}: write the path relative to this file"
+            raise SpecError.of(current, "base", base, remedy)
         current = following
 
 
@@ -158,12 +140,16 @@ def merged_tables(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any
     return result
 
 
-def _holds(raw: Any, keys: list[str]) -> bool:
-    for key in keys:
-        if not isinstance(raw, dict) or key not in raw:
-            return False
-        raw = raw[key]
-    return True
+def value_at(tables: Any, way: Sequence[Any]) -> Any:
+    """What stands at the end of the way, keys and positions; MISSING where it leads nowhere."""
+    for key in way:
+        if isinstance(tables, dict) and key in tables:
+            tables = tables[key]
+        elif isinstance(tables, list) and isinstance(key, int) and key < len(tables):
+            tables = tables[key]
+        else:
+            return MISSING
+    return tables
 
 
 Changes = Mapping[str, Any]

@@ -11,10 +11,10 @@ from pydantic import ValidationError
 
 from gearfmu.errors import UnitError
 from gearfmu.quantities import to_si
-from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path
+from gearfmu.stagefile.reading.base import FROM_FILE, Quantity, SpecType, fields_at, quantity_of, raw_path
+from gearfmu.stagefile.reading.files import value_at
 
 _ROUNDS = 4  # a key put right may bring further ones to light
-_MISSING = object()
 _BESIDE_TEETH = ("kg/m^3", "N/m", "N*m/rad", "N*m*s/rad", "N*s/m^2", "kg*m^2", "Hz", "rad/s")  # shape no tooth
 
 
@@ -42,7 +42,7 @@ def as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
 def _rename(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | int, ...]) -> bool:
     """Gives an unknown key the name that it nearly has, where nothing stands there; else takes it away."""
     *way, key = raw_path(tables, loc)
-    inside = _at(tables, way)
+    inside = value_at(tables, way)
     if not isinstance(inside, dict) or key not in inside:
         return False
     value = inside.pop(key)
@@ -58,10 +58,10 @@ def _put_right(kind: type[SpecType], tables: dict[str, Any], entry: Any) -> bool
     if not loc or entry["type"] == "missing":
         return False
     *way, key = raw_path(tables, loc)
-    inside, field = _at(tables, way), fields_at(kind, loc[:-1]).get(loc[-1])
+    inside, field = value_at(tables, way), fields_at(kind, loc[:-1]).get(loc[-1])
     if not isinstance(inside, dict) or key not in inside or field is None:
         return False
-    quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
+    quantity = quantity_of(field)
     value = inside[key]
     if quantity is not None and quantity.unit and isinstance(value, (int, float)) and not isinstance(value, bool):
         inside[key] = f"{value!r} {quantity.unit}"
@@ -88,20 +88,8 @@ def _leave_out(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | in
     """Takes away the field, or else the innermost table around it that need not be there."""
     for depth in range(len(loc), 0, -1):
         field, (*way, key) = fields_at(kind, loc[: depth - 1]).get(loc[depth - 1]), raw_path(tables, loc[:depth])
-        inside = _at(tables, way)
+        inside = value_at(tables, way)
         if field is not None and not field.is_required() and isinstance(inside, dict) and key in inside:
             del inside[key]
             return True
     return False
-
-
-def _at(tables: Any, way: list[Any]) -> Any:
-    """What stands at the end of the way; _MISSING where it leads nowhere."""
-    for key in way:
-        if isinstance(tables, dict) and key in tables:
-            tables = tables[key]
-        elif isinstance(tables, list) and isinstance(key, int) and key < len(tables):
-            tables = tables[key]
-        else:
-            return _MISSING
-    return tables

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from gearfmu.quantities import quantity_text
-from gearfmu.stagefile.reading.base import Quantity, metadata_of
+from gearfmu.stagefile.reading.base import quantity_of
 
 
 def shown(spec: BaseModel) -> dict[str, Any]:
@@ -16,7 +16,7 @@ def shown(spec: BaseModel) -> dict[str, Any]:
     found = {}
     for name, field in type(spec).model_fields.items():
         value = getattr(spec, name)
-        quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
+        quantity = quantity_of(field)
         if value is not None:
             found[name] = _of(value, quantity.unit if quantity else "")
     return found

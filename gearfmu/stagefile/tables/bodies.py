@@ -8,14 +8,14 @@ positive; a *deviation* is positive where there is more material than nominal (I
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from gearfmu.quantities import kernel_limits
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, refuse
+from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, entry, refuse
 from gearfmu.stagefile.tables.connections import Diameter, GearBearing, Length
-from gearfmu.stagefile.tables.imported import ImportSpec
+from gearfmu.stagefile.tables.imported import ImportSpec, SurfaceCoupling
 
 Depth = Annotated[float, Quantity("flank_depth")]
 Slope = Annotated[float, Quantity("flank_slope")]
@@ -29,23 +29,21 @@ ReliefKind = Annotated[
 class EndRelief(Spec):
     """Material taken off towards both ends of the face width."""
 
-    amount: Depth = Field(description="end relief at either end of the face width, normal to the involute")
-    length: Length = Field(description="length from either end over which it fades to nothing")
-    kind: ReliefKind = Field(default="parabolic", description="shape over that length")
+    amount: Depth = entry("end relief at either end of the face width, normal to the involute")
+    length: Length = entry("length from either end over which it fades to nothing")
+    kind: ReliefKind = entry("shape over that length", "parabolic")
 
 
 class LeadSpec(Spec):
     """Flank modifications across the face width, on both flanks of every tooth (ISO 21771)."""
 
-    slope: Slope = Field(
-        default=0.0,
-        description="helix slope f_Hbeta over the whole face width, normal to the involute; positive: both flanks are "
+    slope: Slope = entry(
+        "helix slope f_Hbeta over the whole face width, normal to the involute; positive: both flanks are "
         "turned like a right-hand helix (of a left-handed gear ISO 1328-1 counts it the other way)",
+        0.0,
     )
-    crowning: Depth = Field(
-        default=0.0, description="lead crowning C_beta: depth at both ends of the face width, none at its middle"
-    )
-    end_relief: EndRelief | None = Field(default=None, description="end relief; none when the table is absent")
+    crowning: Depth = entry("lead crowning C_beta: depth at both ends of the face width, none at its middle", 0.0)
+    end_relief: EndRelief | None = entry("end relief; none when the table is absent", None)
 
 
 class Misalignment(Spec):
@@ -54,17 +52,15 @@ class Misalignment(Spec):
     In the frame of the stage: pinion's axis z, wheel on +x; errors count from the end at −z to that at +z.
     """
 
-    out_of_plane: Parallelism = Field(
-        default=0.0,
-        description="f_SigmaBeta, deviation out of the common plane of the axes over the span; positive: at its +z end "
+    out_of_plane: Parallelism = entry(
+        "f_SigmaBeta, deviation out of the common plane of the axes over the span; positive: at its +z end "
         "the wheel's axis lies further towards +y",
+        0.0,
     )
-    in_plane: Parallelism = Field(
-        default=0.0,
-        description="f_SigmaDelta, deviation in the common plane over the span; positive: the centre distance grows "
-        "towards +z",
+    in_plane: Parallelism = entry(
+        "f_SigmaDelta, deviation in the common plane over the span; positive: the centre distance grows towards +z", 0.0
     )
-    span: Length = Field(description="length L along the axes over which both are measured (bearing span)")
+    span: Length = entry("length L along the axes over which both are measured (bearing span)")
 
     @model_validator(mode="after")
     def _nearly_parallel(self) -> Misalignment:
@@ -79,124 +75,99 @@ Angle = Annotated[float, Quantity("angle")]
 Tilt = Annotated[float, Quantity("wobble")]
 Relief = Annotated[float, Quantity("relief")]
 Pitch = Annotated[float, Quantity("pitch_deviation")]
-Roll = Quantity("roll", words=("outer_single_contact",))
-InnerRoll = Quantity("roll", words=("inner_single_contact",))
+# the loader puts a roll in the place of these words
+OuterRoll = Annotated[float, Quantity("roll", words=("outer_single_contact",))]
+InnerRoll = Annotated[float, Quantity("roll", words=("inner_single_contact",))]
 Part = Literal["pitch", "profile", "helix"]
 
 
 class TipRelief(Spec):
     """Tip relief on both flanks of every tooth."""
 
-    amount: Relief = Field(description="relief normal to the involute at the tip diameter")
-    start_roll: Annotated[float, Roll] = Field(
-        default=cast(Any, "outer_single_contact"),  # the loader puts the roll in its place
-        description='roll length of its beginning, or "outer_single_contact"',
-    )
-    kind: ReliefKind = Field(default="parabolic", description="shape over the roll length")
+    amount: Relief = entry("relief normal to the involute at the tip diameter")
+    start_roll: OuterRoll = entry('roll length of its beginning, or "outer_single_contact"', "outer_single_contact")
+    kind: ReliefKind = entry("shape over the roll length", "parabolic")
 
 
 class RootRelief(Spec):
     """Root relief on both flanks of every tooth."""
 
-    amount: Relief = Field(description="relief normal to the involute where the flank ends at its root (form diameter)")
-    start_roll: Annotated[float, InnerRoll] = Field(
-        default=cast(Any, "inner_single_contact"),  # the loader puts the roll in its place
-        description='roll length of its beginning, or "inner_single_contact"',
-    )
-    kind: ReliefKind = Field(default="parabolic", description="shape over the roll length")
+    amount: Relief = entry("relief normal to the involute where the flank ends at its root (form diameter)")
+    start_roll: InnerRoll = entry('roll length of its beginning, or "inner_single_contact"', "inner_single_contact")
+    kind: ReliefKind = entry("shape over the roll length", "parabolic")
 
 
 class ProfileSpec(Spec):
     """Modifications along the profile of both flanks of every tooth, over the usable flank from its form diameter to
     its tip."""
 
-    slope: Slope = Field(
-        default=0.0,
-        description="profile slope f_Halpha over the usable flank, none at its middle roll; positive: more material "
+    slope: Slope = entry(
+        "profile slope f_Halpha over the usable flank, none at its middle roll; positive: more material "
         "towards the tip",
+        0.0,
     )
-    crowning: Depth = Field(
-        default=0.0, description="profile crowning C_alpha: depth at both ends of the usable flank, none at its middle"
-    )
+    crowning: Depth = entry("profile crowning C_alpha: depth at both ends of the usable flank, none at its middle", 0.0)
 
 
 class DeviationClass(Spec):
     """Deviations drawn at random within a tolerance class of ISO 1328-1:2013, the same for the same seed."""
 
-    model_config = ConfigDict(populate_by_name=True)  # `class` is no name in Python
-
-    tolerance_class: Annotated[Count, Whole("tolerance_class")] = Field(
-        alias="class", description="flank tolerance class A"
+    tolerance_class: Annotated[Count, Whole("tolerance_class")] = entry("flank tolerance class A", alias="class")
+    seed: Annotated[Count, Whole("seed")] = entry("seed of the draw; gears of one seed differ by their names", 1)
+    use: Annotated[float, Quantity("share")] = entry("share of the tolerances that the draw uses up", 1.0)
+    parts: tuple[Part, ...] = entry(
+        "drawn deviations: pitch, profile slopes, helix slopes", ("pitch", "profile", "helix")
     )
-    seed: Annotated[Count, Whole("seed")] = Field(
-        default=1, description="seed of the draw; gears of one seed differ by their names"
-    )
-    use: Annotated[float, Quantity("share")] = Field(
-        default=1.0, description="share of the tolerances that the draw uses up"
-    )
-    parts: tuple[Part, ...] = Field(
-        default=("pitch", "profile", "helix"),
-        description="drawn deviations: pitch, profile slopes, helix slopes",
-    )
-    per_tooth: Switch = Field(default=True, description="slopes differ from tooth to tooth; false: one for each flank")
+    per_tooth: Switch = entry("slopes differ from tooth to tooth; false: one for each flank", True)
 
 
 class Eccentricity(Spec):
     """The toothing's axis beside the axis of rotation."""
 
-    amount: Annotated[float, Quantity("eccentricity")] = Field(
-        description="distance of the toothing's axis from the axis of rotation at mid-width"
+    amount: Annotated[float, Quantity("eccentricity")] = entry(
+        "distance of the toothing's axis from the axis of rotation at mid-width"
     )
-    angle: Angle = Field(
-        default=0.0, description="direction of the toothing's axis, from tooth 0 (of a ring: space 0) counter-clockwise"
-    )
+    angle: Angle = entry("direction of the toothing's axis, from tooth 0 (of a ring: space 0) counter-clockwise", 0.0)
 
 
 class Wobble(Spec):
     """The toothing's axis tilted against the axis of rotation."""
 
-    amount: Tilt = Field(description="angle between the two axes; they cross at mid-width")
-    angle: Angle = Field(
-        default=0.0,
-        description="direction towards which the toothing's axis leans at its +z end, from tooth 0 (of a ring: space "
+    amount: Tilt = entry("angle between the two axes; they cross at mid-width")
+    angle: Angle = entry(
+        "direction towards which the toothing's axis leans at its +z end, from tooth 0 (of a ring: space "
         "0) counter-clockwise",
+        0.0,
     )
 
 
 class Toothing(Spec):
     """What every toothed member may say about its teeth; also what is told of a gear that says nothing."""
 
-    tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
-    root_relief: RootRelief | None = Field(default=None, description="root relief; none when the table is absent")
-    profile: ProfileSpec | None = Field(
-        default=None, description="modifications along the profile; none when the table is absent"
+    tip_relief: TipRelief | None = entry("tip relief; none when the table is absent", None)
+    root_relief: RootRelief | None = entry("root relief; none when the table is absent", None)
+    profile: ProfileSpec | None = entry("modifications along the profile; none when the table is absent", None)
+    lead: LeadSpec | None = entry("modifications across the face width; none when the table is absent", None)
+    topography: Text | None = entry(
+        "measured or designed flanks: CSV file (docs/howto-flanks.md), path relative to the stage file", None
     )
-    lead: LeadSpec | None = Field(
-        default=None, description="modifications across the face width; none when the table is absent"
-    )
-    topography: Text | None = Field(
-        default=None,
-        description="measured or designed flanks: CSV file (docs/howto-flanks.md), path relative to the stage file",
-    )
-    index_deviation: dict[Annotated[int, Whole("tooth_number")], Pitch] = Field(
-        default={},
-        description="pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, or a list of all, arc "
+    index_deviation: dict[Annotated[int, Whole("tooth_number")], Pitch] = entry(
+        "pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, or a list of all, arc "
         "on the reference circle, both flanks, positive counter-clockwise",
+        {},
     )
-    pitch_deviation: tuple[Pitch, ...] = Field(
-        default=(),
-        description="single pitch deviations f_pi of all pitches, the first from the last tooth to tooth 0; they are "
+    pitch_deviation: tuple[Pitch, ...] = entry(
+        "single pitch deviations f_pi of all pitches, the first from the last tooth to tooth 0; they are "
         "summed to index deviations",
+        (),
     )
-    deviations: DeviationClass | None = Field(
-        default=None, description="deviations drawn within a tolerance class; none when the table is absent"
+    deviations: DeviationClass | None = entry(
+        "deviations drawn within a tolerance class; none when the table is absent", None
     )
-    eccentricity: Eccentricity | None = Field(
-        default=None, description="toothing beside the axis of rotation; on it when the table is absent"
+    eccentricity: Eccentricity | None = entry(
+        "toothing beside the axis of rotation; on it when the table is absent", None
     )
-    wobble: Wobble | None = Field(
-        default=None, description="toothing tilted against the axis of rotation; not when the table is absent"
-    )
+    wobble: Wobble | None = entry("toothing tilted against the axis of rotation; not when the table is absent", None)
 
     @field_validator("index_deviation", mode="before")
     @classmethod
@@ -212,11 +183,10 @@ class Toothing(Spec):
 
 TOOTHING = frozenset(Toothing.model_fields)
 
-
 Factor = Annotated[float, Quantity("rack_factor")]
-SurfaceCoupling = Literal["averaging", "rigid"]
-
-
+Elements = Annotated[Count, Whole("elements")]
+ElementsTwo = Annotated[Count, Whole("elements_two")]
+CenterDistance = Annotated[float, Quantity("center_distance")]
 Module = Annotated[float, Quantity("module")]
 TipDiameter = Annotated[float, Quantity("tip_diameter")]
 FaceWidth = Annotated[float, Quantity("face_width")]
@@ -232,36 +202,34 @@ ModalDamping = Annotated[float, Quantity("modal_damping")]
 class PairSpec(Spec):
     """The pair as a whole. Module, pressure angle, profile shift and basic rack are those of the normal section."""
 
-    center_distance: Annotated[float, Quantity("center_distance")] = Field(description="centre distance a")
-    normal_module: Module = Field(description="normal module m_n")
-    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
-    helix_angle: HelixAngle = Field(
-        default=0.0,
-        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the pinion is right-handed "
+    center_distance: CenterDistance = entry("centre distance a")
+    normal_module: Module = entry("normal module m_n")
+    pressure_angle: PressureAngle = entry("normal pressure angle of the basic rack")
+    helix_angle: HelixAngle = entry(
+        "helix angle beta at the reference circle, -35 deg to 35 deg; positive: the pinion is right-handed "
         "and the wheel left-handed",
+        0.0,
     )
-    backlash: Backlash = Field(
-        description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
-    )
-    misalignment: Misalignment | None = Field(
-        default=None, description="parallelism errors of the axes; parallel axes when the table is absent"
+    backlash: Backlash = entry("circumferential backlash j_wt of the assembled pair on the working pitch circle")
+    misalignment: Misalignment | None = entry(
+        "parallelism errors of the axes; parallel axes when the table is absent", None
     )
 
 
 class RackSpec(Spec):
     """Basic rack of the tool, in factors of the module (ISO 53)."""
 
-    addendum: Factor = Field(default=1.0, description="addendum of the basic rack, factor of m")
-    dedendum: Factor = Field(default=1.25, description="dedendum of the basic rack, factor of m")
-    fillet_radius: Factor = Field(default=0.38, description="root fillet radius of the basic rack, factor of m")
+    addendum: Factor = entry("addendum of the basic rack, factor of m", 1.0)
+    dedendum: Factor = entry("dedendum of the basic rack, factor of m", 1.25)
+    fillet_radius: Factor = entry("root fillet radius of the basic rack, factor of m", 0.38)
 
 
 class Material(Spec):
     """Linear elastic, isotropic."""
 
-    youngs_modulus: Annotated[float, Quantity("youngs_modulus")] = Field(description="Young's modulus E")
-    poisson_ratio: Annotated[float, Quantity("poisson_ratio")] = Field(description="Poisson's ratio")
-    density: Annotated[float, Quantity("density")] = Field(description="density")
+    youngs_modulus: Annotated[float, Quantity("youngs_modulus")] = entry("Young's modulus E")
+    poisson_ratio: Annotated[float, Quantity("poisson_ratio")] = entry("Poisson's ratio")
+    density: Annotated[float, Quantity("density")] = entry("density")
 
 
 class MeshSpec(Spec):
@@ -271,27 +239,18 @@ class MeshSpec(Spec):
     (docs/decisions/bodies.md).
     """
 
-    flank: Annotated[Count, Whole("elements_two")] = Field(
-        default=20, description="elements along the flank, equal in arc length"
+    flank: ElementsTwo = entry("elements along the flank, equal in arc length", 20)
+    thickness: Elements = entry("elements across half the tooth", 5)
+    root: ElementsTwo = entry("elements along root fillet and half the root land", 6)
+    rim: Elements = entry(
+        "elements from root to bore; more are taken where the rim is too high for the growth below", 4
     )
-    thickness: Annotated[Count, Whole("elements")] = Field(default=5, description="elements across half the tooth")
-    root: Annotated[Count, Whole("elements_two")] = Field(
-        default=6, description="elements along root fillet and half the root land"
+    width: Elements = entry("elements across the face width", 6)
+    thickness_grading: Annotated[float, Quantity("grading")] = entry("growth of elements from the surface inwards", 1.6)
+    rim_grading: Annotated[float, Quantity("rim_grading")] = entry(
+        "largest growth of elements from the root to the bore", 1.5
     )
-    rim: Annotated[Count, Whole("elements")] = Field(
-        default=4,
-        description="elements from root to bore; more are taken where the rim is too high for the growth below",
-    )
-    width: Annotated[Count, Whole("elements")] = Field(default=6, description="elements across the face width")
-    thickness_grading: Annotated[float, Quantity("grading")] = Field(
-        default=1.6, description="growth of elements from the surface inwards"
-    )
-    rim_grading: Annotated[float, Quantity("rim_grading")] = Field(
-        default=1.5, description="largest growth of elements from the root to the bore"
-    )
-    scale: Annotated[float, Quantity("scale")] = Field(
-        default=1.0, description="factor on all counts; the gradings keep their shape"
-    )
+    scale: Annotated[float, Quantity("scale")] = entry("factor on all counts; the gradings keep their shape", 1.0)
 
     def scaled(self, count: int, least: int = 1) -> int:
         """`count` times the scale, rounded."""
@@ -305,42 +264,35 @@ class MeshSpec(Spec):
 class BodySpec(Spec):
     """How the gear's body is meshed and reduced; with geometry and material it decides the reduced body."""
 
-    strip_half_width: Annotated[float, Quantity("strip_half_width")] = Field(
-        description="half-width, in arc length, of the load patch on the flank; at least 1.5 Hertz half-widths"
+    strip_half_width: Annotated[float, Quantity("strip_half_width")] = entry(
+        "half-width, in arc length, of the load patch on the flank; at least 1.5 Hertz half-widths"
     )
-    modes: Annotated[Count, Whole("modes")] = Field(default=400, description="number of elastic modes stored")
-    roll_points: Annotated[Count, Whole("roll_points")] = Field(
-        default=28, description="Chebyshev points along the flank"
-    )
-    width_functions: Annotated[Count, Whole("width_functions")] = Field(
-        default=5, description="Legendre functions across the face width"
-    )
-    mesh: MeshSpec = Field(default_factory=MeshSpec, description="element counts")
+    modes: Annotated[Count, Whole("modes")] = entry("number of elastic modes stored", 400)
+    roll_points: Annotated[Count, Whole("roll_points")] = entry("Chebyshev points along the flank", 28)
+    width_functions: Annotated[Count, Whole("width_functions")] = entry("Legendre functions across the face width", 5)
+    mesh: MeshSpec = entry("element counts", default_factory=MeshSpec)
 
 
 class GearSpec(Toothing):
     """One gear; `name` is also its shaft's name."""
 
-    model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
-
-    name: Name = Field(description="name of gear and shaft")
-    teeth: Teeth = Field(description="number of teeth z")
-    profile_shift: ProfileShift = Field(description="profile shift coefficient x")
-    tip_diameter: TipDiameter = Field(description="tip diameter d_a")
-    face_width: FaceWidth = Field(description="face width b")
-    bore_diameter: Diameter = Field(description="diameter of the bore")
-    bore_coupling: SurfaceCoupling = Field(
-        default="averaging",
-        description="how the bore meets its node: averaging (RBE3, the bore may deform) or rigid (RBE2, a stiff shaft)",
+    name: Name = entry("name of gear and shaft")
+    teeth: Teeth = entry("number of teeth z")
+    profile_shift: ProfileShift = entry("profile shift coefficient x")
+    tip_diameter: TipDiameter = entry("tip diameter d_a")
+    face_width: FaceWidth = entry("face width b")
+    bore_diameter: Diameter = entry("diameter of the bore")
+    bore_coupling: SurfaceCoupling = entry(
+        "how the bore meets its node: averaging (RBE3, the bore may deform) or rigid (RBE2, a stiff shaft)", "averaging"
     )
-    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
-    rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
-    material: Material = Field(description="material")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    bearing: GearBearing = Field(description="bearing")
-    body: BodySpec = Field(description="mesh and reduction")
-    imported: ImportSpec | None = Field(
-        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
+    rack: RackSpec = entry("basic rack", default_factory=RackSpec)
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    bearing: GearBearing = entry("bearing")
+    body: BodySpec = entry("mesh and reduction")
+    imported: ImportSpec | None = entry(
+        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
     )
 
     @model_validator(mode="after")
@@ -358,9 +310,9 @@ class GearSpec(Toothing):
 class ShaftSection(Spec):
     """A cylinder of a shaft."""
 
-    length: Length = Field(description="length along the axis")
-    outer_diameter: Diameter = Field(description="outer diameter")
-    bore_diameter: Annotated[float, Quantity("bore")] = Field(default=0.0, description="diameter of the bore; 0: solid")
+    length: Length = entry("length along the axis")
+    outer_diameter: Diameter = entry("outer diameter")
+    bore_diameter: Annotated[float, Quantity("bore")] = entry("diameter of the bore; 0: solid", 0.0)
 
     @model_validator(mode="after")
     def _hollow(self) -> ShaftSection:
@@ -372,14 +324,12 @@ class ShaftSection(Spec):
 class ShaftBody(Spec):
     """A shaft: a Timoshenko beam of cylinders, from its place in +z."""
 
-    name: Name = Field(description="name of the shaft")
-    kind: Literal["shaft"] = Field(description="kind of body")
-    sections: Annotated[tuple[ShaftSection, ...], Field(min_length=1)] = Field(description="cylinders, in order")
-    material: Material = Field(description="material")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    stored_to: Annotated[float, Quantity("stored_to")] = Field(
-        default=150e3, description="modes below are stored, the others are static"
-    )
+    name: Name = entry("name of the shaft")
+    kind: Literal["shaft"] = entry("kind of body")
+    sections: Annotated[tuple[ShaftSection, ...], Field(min_length=1)] = entry("cylinders, in order")
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    stored_to: Annotated[float, Quantity("stored_to")] = entry("modes below are stored, the others are static", 150e3)
 
     @property
     def length(self) -> float:

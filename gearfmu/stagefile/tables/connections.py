@@ -6,16 +6,17 @@ Bearings are springs under a gear, or rolling bearings by their catalogue number
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, cast
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, SerializerFunctionWrapHandler, Strict, Tag, model_serializer, model_validator
+from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Whole, refuse
+from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Spec, Whole, entry, refuse
 
 CatalogueName = Annotated[str, Strict(), Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,39}$")]
 Clearance = Annotated[float, Quantity("bearing_clearance")]
 ContactAngle = Annotated[float, Quantity("contact_angle")]
 Preload = Annotated[float, Quantity("preload")]
+RollingElements = Annotated[Count, Whole("rolling_elements")]
 Groove = Annotated[float, Quantity("groove")]
 Diameter = Annotated[float, Quantity("diameter")]
 Length = Annotated[float, Quantity("length")]
@@ -24,40 +25,26 @@ Side = Literal["+z", "-z"]
 SPRINGS = ("stiffness", "axial", "tilt")  # of a Bearing
 
 
-class LaterFields(Spec):
-    """A table whose fields named in `later` are left out of its dump where they say nothing: a file without them is
-    what it was before they were known."""
-
-    later: ClassVar[tuple[str, ...]] = ()
-
-    @model_serializer(mode="wrap")
-    def _said(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
-        tables: dict[str, object] = handler(self)
-        return {key: value for key, value in tables.items() if key not in self.later or value not in (None, {}, (), [])}
-
-
 class OperatingSpec(Spec):
     """The load at which bearings are linearised."""
 
-    torque: Annotated[float, Quantity("torque")] = Field(description="torque on the input")
+    torque: Annotated[float, Quantity("torque")] = entry("torque on the input")
 
 
 class BallBearing(Spec):
     """Deep groove or angular contact ball bearing. What a catalogue does not print is proposed when it is absent."""
 
-    kind: Literal["ball"] = Field(description="kind of bearing")
-    bore: Diameter = Field(description="bore d")
-    outside: Diameter = Field(description="outside diameter D")
-    balls: Annotated[Count, Whole("rolling_elements")] | None = Field(default=None, description="number of balls")
-    ball_diameter: Diameter | None = Field(default=None, description="diameter of the balls, 0.3 (D - d) when absent")
-    pitch_diameter: Diameter | None = Field(default=None, description="diameter of their circle, (d + D)/2 when absent")
-    inner_groove: Groove | None = Field(
-        default=None, description="radius of the inner groove over the ball's diameter, 0.52 when absent"
-    )
-    outer_groove: Groove | None = Field(default=None, description="of the outer groove, 0.53 when absent")
-    contact_angle: ContactAngle = Field(default=0.0, description="contact angle; 0 deg: deep groove")
-    clearance: Clearance = Field(default=0.0, description="radial clearance in operation; negative: interference")
-    preload: Preload = Field(default=0.0, description="axial force that presses the rings together without load")
+    kind: Literal["ball"] = entry("kind of bearing")
+    bore: Diameter = entry("bore d")
+    outside: Diameter = entry("outside diameter D")
+    balls: RollingElements | None = entry("number of balls", None)
+    ball_diameter: Diameter | None = entry("diameter of the balls, 0.3 (D - d) when absent", None)
+    pitch_diameter: Diameter | None = entry("diameter of their circle, (d + D)/2 when absent", None)
+    inner_groove: Groove | None = entry("radius of the inner groove over the ball's diameter, 0.52 when absent", None)
+    outer_groove: Groove | None = entry("of the outer groove, 0.53 when absent", None)
+    contact_angle: ContactAngle = entry("contact angle; 0 deg: deep groove", 0.0)
+    clearance: Clearance = entry("radial clearance in operation; negative: interference", 0.0)
+    preload: Preload = entry("axial force that presses the rings together without load", 0.0)
 
     @model_validator(mode="after")
     def _fits(self) -> BallBearing:
@@ -68,23 +55,17 @@ class BallBearing(Spec):
 class RollerBearing(Spec):
     """Cylindrical roller bearing, free along its axis, or with a contact angle a tapered one."""
 
-    kind: Literal["roller"] = Field(description="kind of bearing")
-    bore: Diameter = Field(description="bore d")
-    outside: Diameter = Field(description="outside diameter D")
-    width: Length | None = Field(default=None, description="width B; needed where roller_length is absent")
-    rollers: Annotated[Count, Whole("rolling_elements")] | None = Field(default=None, description="number of rollers")
-    roller_diameter: Diameter | None = Field(
-        default=None, description="diameter of the rollers, 0.27 (D - d) when absent"
-    )
-    roller_length: Length | None = Field(
-        default=None, description="length of the rollers without chamfers, 0.65 B when absent"
-    )
-    pitch_diameter: Diameter | None = Field(default=None, description="diameter of their circle, (d + D)/2 when absent")
-    contact_angle: ContactAngle = Field(default=0.0, description="contact angle of the taper; 0 deg: cylindrical")
-    clearance: Clearance = Field(default=0.0, description="radial clearance in operation; negative: interference")
-    preload: Preload = Field(
-        default=0.0, description="axial force that presses the rings of a tapered bearing together without load"
-    )
+    kind: Literal["roller"] = entry("kind of bearing")
+    bore: Diameter = entry("bore d")
+    outside: Diameter = entry("outside diameter D")
+    width: Length | None = entry("width B; needed where roller_length is absent", None)
+    rollers: RollingElements | None = entry("number of rollers", None)
+    roller_diameter: Diameter | None = entry("diameter of the rollers, 0.27 (D - d) when absent", None)
+    roller_length: Length | None = entry("length of the rollers without chamfers, 0.65 B when absent", None)
+    pitch_diameter: Diameter | None = entry("diameter of their circle, (d + D)/2 when absent", None)
+    contact_angle: ContactAngle = entry("contact angle of the taper; 0 deg: cylindrical", 0.0)
+    clearance: Clearance = entry("radial clearance in operation; negative: interference", 0.0)
+    preload: Preload = entry("axial force that presses the rings of a tapered bearing together without load", 0.0)
 
     @model_validator(mode="after")
     def _fits(self) -> RollerBearing:
@@ -104,14 +85,14 @@ class Bearing(Spec):
     """Bearing between the bore node and the ground, the same in every direction across the axis."""
 
     tag: ClassVar[str] = "springs"
-    stiffness: Annotated[float, Quantity("bearing_stiffness")] = Field(description="radial stiffness")
-    axial: Annotated[float, Quantity("axial_stiffness")] | None = Field(
-        default=None, description="axial stiffness; without it the gear does not move along its axis (spur gears only)"
+    stiffness: Annotated[float, Quantity("bearing_stiffness")] = entry("radial stiffness")
+    axial: Annotated[float, Quantity("axial_stiffness")] | None = entry(
+        "axial stiffness; without it the gear does not move along its axis (spur gears only)", None
     )
-    tilt: Annotated[float, Quantity("tilt_stiffness")] | None = Field(
-        default=None, description="stiffness against tilting; without it the gear does not tilt (spur gears only)"
+    tilt: Annotated[float, Quantity("tilt_stiffness")] | None = entry(
+        "stiffness against tilting; without it the gear does not tilt (spur gears only)", None
     )
-    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
+    damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m_body)", 0.03)
 
 
 class RollingMount(Spec):
@@ -119,16 +100,14 @@ class RollingMount(Spec):
 
     tag: ClassVar[str] = "catalogue"
     key: ClassVar[str] = "rolling"
-    rolling: CatalogueName = Field(description="name of a table [bearings.NAME]")
-    span: Length | None = Field(
-        default=None,
-        description="distance of two such bearings, mirrored, on a stiff piece of shaft; one in the middle when absent",
+    rolling: CatalogueName = entry("name of a table [bearings.NAME]")
+    span: Length | None = entry(
+        "distance of two such bearings, mirrored, on a stiff piece of shaft; one in the middle when absent", None
     )
-    carries: Side | None = Field(
-        default=None,
-        description="axial force of the shaft that an angular contact bearing (of two the left) carries",
+    carries: Side | None = entry(
+        "axial force of the shaft that an angular contact bearing (of two the left) carries", None
     )
-    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
+    damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m_body)", 0.03)
 
     @model_validator(mode="before")
     @classmethod
@@ -167,91 +146,89 @@ Stiffness = Annotated[float, Quantity("torsional_stiffness")]
 Damping = Annotated[float, Quantity("torsional_damping")]
 Inertia = Annotated[float, Quantity("inertia")]
 Cut = Annotated[float, Quantity("cut")]
+Nodes = Annotated[Count, Whole("nodes")]
+Viscosity = Annotated[float, Quantity("oil_viscosity")]
+Slices = Annotated[Count, Whole("slices")]
+ContactDamping = Annotated[float, Quantity("contact_damping")]
 Limits: TypeAlias = tuple[tuple[float | None, str], ...]  # largest values that a stage is made for, with units
 
 
 class NodalSpec(Spec):
     """Nodal contact with a penalty stiffness: flank nodes against the deformed flank of the other gear."""
 
-    along: Annotated[Count, Whole("nodes")] | None = Field(
-        default=None,
-        description="nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent",
+    along: Nodes | None = entry(
+        "nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent", None
     )
-    across: Annotated[Count, Whole("nodes")] | None = Field(
-        default=None,
-        description="nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent",
+    across: Nodes | None = entry(
+        "nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent", None
     )
-    penalty: Annotated[float, Quantity("penalty", words=("hertz",))] = Field(
-        default=cast(Any, "hertz"),  # the assembly puts the stiffness in its place
-        description='stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
+    penalty: Annotated[float, Quantity("penalty", words=("hertz",))] = entry(
+        'stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
+        "hertz",  # the assembly puts the stiffness in its place
     )
-    nodes_of: Literal["both", "a", "b"] = Field(
-        default="both", description="gear whose nodes are in contact; of both each has half of the penalty"
+    nodes_of: Literal["both", "a", "b"] = entry(
+        "gear whose nodes are in contact; of both each has half of the penalty", "both"
     )
 
 
 class FrictionSpec(Spec):
     """Friction of the flanks along the profile."""
 
-    law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
-        default="constant", description="law of the coefficient of friction"
+    law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = entry(
+        "law of the coefficient of friction", "constant"
     )
-    coefficient: Annotated[float, Quantity("friction_coefficient")] = Field(
-        default=0.05, description="coefficient of friction of law constant"
+    coefficient: Annotated[float, Quantity("friction_coefficient")] = entry(
+        "coefficient of friction of law constant", 0.05
     )
-    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
-        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth, of the other laws"
+    viscosity: Viscosity = entry(
+        "dynamic viscosity of the oil at the temperature of the teeth, of the other laws", 0.03
     )
-    roughness: Annotated[float, Quantity("flank_roughness")] = Field(
-        default=0.4e-6, description="mean roughness Ra of both flanks, of the other laws"
+    roughness: Annotated[float, Quantity("flank_roughness")] = entry(
+        "mean roughness Ra of both flanks, of the other laws", 0.4e-6
     )
 
 
 class FilmSpec(Spec):
     """Squeeze film of oil between flanks that approach."""
 
-    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
-        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth"
-    )
-    roughness: Annotated[float, Quantity("film_roughness")] = Field(
-        default=1e-6, description="oil left between flanks that touch by their roughness, added to every gap"
+    viscosity: Viscosity = entry("dynamic viscosity of the oil at the temperature of the teeth", 0.03)
+    roughness: Annotated[float, Quantity("film_roughness")] = entry(
+        "oil left between flanks that touch by their roughness, added to every gap", 1e-6
     )
 
 
 class ContactSpec(Spec):
     """Tooth contact."""
 
-    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
-    damping: Annotated[float, Quantity("contact_damping")] = Field(
-        description="contact damping per metre of face width"
-    )
-    law: Literal["line"] = Field(default="line", description="contact law")
-    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
-    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
-    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
+    slices: Slices = entry("slices across the face width", 5)
+    damping: ContactDamping = entry("contact damping per metre of face width")
+    law: Literal["line"] = entry("contact law", "line")
+    nodal: NodalSpec = entry("nodal contact, for level paper", default_factory=NodalSpec)
+    friction: FrictionSpec | None = entry("friction of the flanks; none when absent", None)
+    film: FilmSpec | None = entry("squeeze film in open gaps; none when absent", None)
 
 
 class ChainSpec(Spec):
     """Inertia, clutch and shaft compiled into a port."""
 
-    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
-    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
-    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
-    shaft_c: Damping = Field(description="damping of that shaft")
+    inertia: Inertia = entry("inertia on the outer side of the clutch, behind the port spring")
+    disc_inertia: Inertia = entry("inertia of the clutch disc")
+    shaft_k: Stiffness = entry("stiffness of the shaft between disc and bore")
+    shaft_c: Damping = entry("damping of that shaft")
 
 
 class PortSpec(Spec):
     """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
 
-    kind: Literal["spring", "torque", "fixed"] = Field(
-        default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed"
+    kind: Literal["spring", "torque", "fixed"] = entry(
+        "spring: motion in, torque out; torque: torque in, motion out; fixed", "spring"
     )
-    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
-    c: Damping | None = Field(default=None, description="damping of the port spring")
-    play: Annotated[float, Quantity("play")] = Field(
-        default=0.0, description="angle through which the port spring is free between both sides, as in a spline"
+    k: Stiffness | None = entry("stiffness of the port spring", None)
+    c: Damping | None = entry("damping of the port spring", None)
+    play: Annotated[float, Quantity("play")] = entry(
+        "angle through which the port spring is free between both sides, as in a spline", 0.0
     )
-    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+    chain: ChainSpec | None = entry("inertia, clutch and shaft inside the FMU", None)
 
     @property
     def side(self) -> float:
@@ -279,8 +256,8 @@ class PortSpec(Spec):
 class LevelSpec(Spec):
     """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
 
-    fast_cut: Cut = Field(default=50e3, description="cut frequency of level fast")
-    standard_cut: Cut = Field(default=120e3, description="cut frequency of level standard")
+    fast_cut: Cut = entry("cut frequency of level fast", 50e3)
+    standard_cut: Cut = entry("cut frequency of level standard", 120e3)
 
     @model_validator(mode="after")
     def _ordered(self) -> LevelSpec:
@@ -301,29 +278,26 @@ class SupportSpec(LaterFields):
 
     later = ("bearing", "span", "carries")
 
-    name: Name = Field(description="name of the support")
-    body: Name = Field(description="body that is held")
-    to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
-    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
-    node: Name | None = Field(
-        default=None, description="node of a carrier: bore, bolt0, bolt1 …; of a housing: name of a seat or foot"
+    name: Name = entry("name of the support")
+    body: Name = entry("body that is held")
+    to: Name | None = entry("body that holds it; the ground when absent", None)
+    at: Place | None = entry("place along the axis; a gear's mid-width when absent", None)
+    node: Name | None = entry("node of a carrier: bore, bolt0, bolt1 …; of a housing: name of a seat or foot", None)
+    radial: RadialSpring | None = entry("stiffness along x and y", None)
+    axial: AxialSpring | None = entry("stiffness along the axis", None)
+    tilt: TiltSpring | None = entry("stiffness against tilting about x and y", None)
+    torsion: TiltSpring | None = entry("stiffness against twist; between bodies of one rotor", None)
+    bearing: CatalogueName | None = entry(
+        "rolling bearing in place of the stiffnesses: name of a table [bearings.NAME]", None
     )
-    radial: RadialSpring | None = Field(default=None, description="stiffness along x and y")
-    axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
-    tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
-    torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
-    bearing: CatalogueName | None = Field(
-        default=None, description="rolling bearing in place of the stiffnesses: name of a table [bearings.NAME]"
+    span: Length | None = entry(
+        "distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent", None
     )
-    span: Length | None = Field(
-        default=None, description="distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent"
+    carries: Side | None = entry(
+        "axial force of the shaft that an angular contact bearing (of two the left) carries", None
     )
-    carries: Side | None = Field(
-        default=None,
-        description="axial force of the shaft that an angular contact bearing (of two the left) carries",
-    )
-    damping_ratio: Ratio = Field(
-        default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
+    damping_ratio: Ratio = entry(
+        "damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia", 0.03
     )
 
     @model_validator(mode="after")

@@ -6,15 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, Strict, model_validator
+from pydantic import Field, Strict, model_validator
 
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Text, Whole, refuse
+from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Text, Whole, entry, refuse
 from gearfmu.stagefile.tables.bodies import Material, ModalDamping
-from gearfmu.stagefile.tables.connections import LaterFields
-from gearfmu.stagefile.tables.imported import FilesSpec, SourceSpec
+from gearfmu.stagefile.tables.imported import FilesSpec, SourceSpec, SurfaceCoupling
 
 Method = Literal["krylov", "rubin", "craig_bampton", "modal"]
-Coupling = Literal["averaging", "rigid"]
 Label = Annotated[int, Strict(), Whole("label")]
 MOST_SENSORS = 85  # three outputs each, of 255
 LONGEST = 20  # characters of a sensor's name, with which its outputs begin
@@ -23,20 +21,16 @@ LONGEST = 20  # characters of a sensor's name, with which its outputs begin
 class HousingImportSpec(FilesSpec):
     """The finite elements of a housing, in the stage's axes: the seats lie on the axes of their shafts."""
 
-    seats: Annotated[dict[Name, Text], Field(min_length=1)] = Field(
-        description="node sets of the bearings' seats, by the names that supports give as node"
+    seats: Annotated[dict[Name, Text], Field(min_length=1)] = entry(
+        "node sets of the bearings' seats, by the names that supports give as node"
     )
-    feet: dict[Name, Text] = Field(default={}, description="node sets of the feet, by the names of their nodes")
-    sensors: dict[Name, Text] = Field(
-        default={}, description="node sets whose mean acceleration is an output, one node each or a patch"
+    feet: dict[Name, Text] = entry("node sets of the feet, by the names of their nodes", {})
+    sensors: dict[Name, Text] = entry("node sets whose mean acceleration is an output, one node each or a patch", {})
+    skin: Text = entry("node set of the outer surface, which radiates; none is stored when absent", "")
+    seat_coupling: SurfaceCoupling = entry(
+        "averaging (RBE3, a seat may deform) or rigid (RBE2) master nodes of the seats", "averaging"
     )
-    skin: Text = Field(
-        default="", description="node set of the outer surface, which radiates; none is stored when absent"
-    )
-    seat_coupling: Coupling = Field(
-        default="averaging", description="averaging (RBE3, a seat may deform) or rigid (RBE2) master nodes of the seats"
-    )
-    foot_coupling: Coupling = Field(default="rigid", description="the same of the feet")
+    foot_coupling: SurfaceCoupling = entry("the same of the feet", "rigid")
 
     @model_validator(mode="after")
     def _named_apart(self) -> HousingImportSpec:
@@ -49,24 +43,22 @@ class HousingReducedSpec(SourceSpec):
     `file` says where its points lie, by GRID cards or *NODE; `unknowns` names the rows, "1001.4" or, of a modal
     coordinate, "7001.0"."""
 
-    seats: Annotated[dict[Name, Label], Field(min_length=1)] = Field(
-        description="points of the bearings' seats, by the names that supports give as node"
+    seats: Annotated[dict[Name, Label], Field(min_length=1)] = entry(
+        "points of the bearings' seats, by the names that supports give as node"
     )
-    feet: dict[Name, Label] = Field(default={}, description="points of the feet, by the names of their nodes")
-    rotations: dict[Name, Label] = Field(
-        default={}, description="points whose displacements are the rotations of a seat or foot (ROT NODE of CalculiX)"
+    feet: dict[Name, Label] = entry("points of the feet, by the names of their nodes", {})
+    rotations: dict[Name, Label] = entry(
+        "points whose displacements are the rotations of a seat or foot (ROT NODE of CalculiX)", {}
     )
-    sensors: dict[Name, Label] = Field(
-        default={}, description="points whose acceleration is an output, of the superelement or of its recovery"
+    sensors: dict[Name, Label] = entry(
+        "points whose acceleration is an output, of the superelement or of its recovery", {}
     )
-    recovery: Text = Field(
-        default="", description="matrix from the unknowns to displacements of further points: .mtx, .npz, .npy or .op4"
-    )
-    recovered: Text = Field(default="", description='point and direction of each row of recovery, lines such as "42.3"')
-    surface: Text = Field(
-        default="",
-        description="mesh of the outer surface, which radiates: .bdf or .vtu; its points are of the superelement or of "
+    recovery: Text = entry("matrix from the unknowns to displacements of further points: .mtx, .npz, .npy or .op4", "")
+    recovered: Text = entry('point and direction of each row of recovery, lines such as "42.3"', "")
+    surface: Text = entry(
+        "mesh of the outer surface, which radiates: .bdf or .vtu; its points are of the superelement or of "
         "its recovery",
+        "",
     )
 
     @model_validator(mode="after")
@@ -94,22 +86,17 @@ def _check_names(seats: Mapping[str, object], feet: Mapping[str, object], sensor
 class HousingBody(LaterFields):
     """A housing that stands: bearings sit on its seats, its feet on the ground ([[supports]])."""
 
-    model_config = ConfigDict(populate_by_name=True)
     later = ("material", "imported", "reduced")
 
-    name: Name = Field(description="name of the housing")
-    kind: Literal["housing"] = Field(description="kind of body")
-    material: Material | None = Field(default=None, description="material; a superelement needs none")
-    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
-    method: Method = Field(default="rubin", description="method of reduction; every one ends in oscillators")
-    modes: Annotated[Count, Whole("carrier_modes")] = Field(default=200, description="number of oscillators stored")
-    dynamic_to: Annotated[float, Quantity("stored_to")] = Field(
-        default=10e3, description="oscillators above are compliance in every run"
-    )
-    imported: HousingImportSpec | None = Field(
-        default=None, alias="import", description="finite elements made elsewhere"
-    )
-    reduced: HousingReducedSpec | None = Field(default=None, description="a superelement made elsewhere")
+    name: Name = entry("name of the housing")
+    kind: Literal["housing"] = entry("kind of body")
+    material: Material | None = entry("material; a superelement needs none", None)
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    method: Method = entry("method of reduction; every one ends in oscillators", "rubin")
+    modes: Annotated[Count, Whole("carrier_modes")] = entry("number of oscillators stored", 200)
+    dynamic_to: Annotated[float, Quantity("stored_to")] = entry("oscillators above are compliance in every run", 10e3)
+    imported: HousingImportSpec | None = entry("finite elements made elsewhere", None, alias="import")
+    reduced: HousingReducedSpec | None = entry("a superelement made elsewhere", None)
 
     @model_validator(mode="after")
     def _made_of_one(self) -> HousingBody:

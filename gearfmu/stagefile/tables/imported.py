@@ -7,12 +7,13 @@ import hashlib
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.stagefile.reading.base import Quantity, Spec, Text, refuse
+from gearfmu.stagefile.reading.base import Quantity, Spec, Text, entry, refuse
 from gearfmu.stagefile.reading.files import Layers
 
+SurfaceCoupling = Literal["averaging", "rigid"]
 FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 
 Files = TypeVar("Files", bound="SourceSpec")
@@ -22,20 +23,18 @@ class SourceSpec(Spec):
     """What every import names: where its nodes lie, its units, and ready-made matrices; paths relative to the file that
     says so."""
 
-    file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
-    length: Annotated[float, Quantity("length_unit")] = Field(
-        description='one length unit of the file, "1 mm" for a mesh in millimetres'
+    file: Text = entry("mesh: .inp, .bdf, .msh or .vtu")
+    length: Annotated[float, Quantity("length_unit")] = entry(
+        'one length unit of the file, "1 mm" for a mesh in millimetres'
     )
-    stiffness: Text = Field(default="", description="ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch")
-    mass: Text = Field(default="", description="ready-made mass matrix, with stiffness")
-    unknowns: Text = Field(
-        default="", description="CalculiX .dof file: node and direction of each row; without it x, y, z node by node"
+    stiffness: Text = entry("ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch", "")
+    mass: Text = entry("ready-made mass matrix, with stiffness", "")
+    unknowns: Text = entry("CalculiX .dof file: node and direction of each row; without it x, y, z node by node", "")
+    force_unit: Annotated[float, Quantity("force_unit")] = entry(
+        'one unit of force of the stiffness matrix, "1 N"', 1.0
     )
-    force_unit: Annotated[float, Quantity("force_unit")] = Field(
-        default=1.0, description='one unit of force of the stiffness matrix, "1 N"'
-    )
-    mass_unit: Annotated[float, Quantity("mass_unit")] = Field(
-        default=1.0, description='one unit of mass of the mass matrix, "1 t" with millimetres, newtons and seconds'
+    mass_unit: Annotated[float, Quantity("mass_unit")] = entry(
+        'one unit of mass of the mass matrix, "1 t" with millimetres, newtons and seconds', 1.0
     )
 
     @model_validator(mode="after")
@@ -57,30 +56,26 @@ class SourceSpec(Spec):
 class FilesSpec(SourceSpec):
     """Mesh of a body, its units, and, where they are ready-made, its matrices."""
 
-    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
-    ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
+    axis: Literal["x", "y", "z"] = entry("axis of the body in the file", "z")
+    ignore: tuple[Text, ...] = entry("node sets of reference nodes that belong to no element", ())
 
 
 class ImportSpec(FilesSpec):
     """The finite elements of a gear; its place, tilt and the angle of its teeth are found by the involute fit."""
 
-    bore: Text = Field(
-        default="", description="node set of the bore; without it the nodes on the stage's bore diameter"
-    )
-    bore_coupling: Literal["averaging", "rigid"] = Field(
-        default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
-    )
-    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
-        default=5e-6, description="largest distance of a corner node from the best involute"
+    bore: Text = entry("node set of the bore; without it the nodes on the stage's bore diameter", "")
+    bore_coupling: SurfaceCoupling = entry("averaging (RBE3) or rigid (RBE2) master node of the bore", "averaging")
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = entry(
+        "largest distance of a corner node from the best involute", 5e-6
     )
 
 
 class RingImportSpec(FilesSpec):
     """The finite elements of a ring, placed by the involute fit of its tooth spaces."""
 
-    rim: Text = Field(default="", description="node set of the rim; without it the nodes on the stage's rim diameter")
-    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
-        default=5e-6, description="largest distance of a corner node from the best involute"
+    rim: Text = entry("node set of the rim; without it the nodes on the stage's rim diameter", "")
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = entry(
+        "largest distance of a corner node from the best involute", 5e-6
     )
 
     @property
@@ -97,8 +92,8 @@ class RingImportSpec(FilesSpec):
 class CarrierImportSpec(FilesSpec):
     """The finite elements of a carrier, in the set's frame: z = 0 at the planets' mid-width, bolt 0 on +x."""
 
-    bore: Text = Field(description="node set of the bore")
-    bolts: tuple[Text, ...] = Field(description="node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
+    bore: Text = entry("node set of the bore")
+    bolts: tuple[Text, ...] = entry("node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
 
 
 def import_inputs(spec: SourceSpec) -> dict[str, Any]:

@@ -15,13 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.errors import SpecError, UnitError
 from gearfmu.quantities import range_of, to_si
-from gearfmu.stagefile.tables.rows import number, read_rows, uneven
+from gearfmu.stagefile.tables.rows import Row, RowReader, number, uneven
 
 UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
 EXAMPLE = "time_[s],torque_[N*m],speed_[rpm]"
-MOST_SHOWN = 20
 _HEADING = re.compile(r"(\w+?)[_ ]*[\[(](.+)[\])]")
 
 
@@ -43,36 +42,16 @@ class Profile:
 def read_profile(path: Path) -> Profile:
     """The profile in a CSV file. SpecError with everything that is wrong with it."""
     reader = _Reader(str(path))
-    try:
-        rows = read_rows(path)
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise SpecError([Problem(str(path), "", "", f"the profile cannot be read ({why}): name a CSV file")]) from None
-    found = reader.read(rows)
+    rows = reader.rows(path, "the profile cannot be read ({why}): name a CSV file")
+    found = None if rows is None else reader.read(rows)
     if reader.problems:
         raise SpecError(reader.shown)
     assert found is not None, "no profile and no problem"
     return found
 
 
-class _Reader:
-    """Rows of one file, and what is wrong with them."""
-
-    def __init__(self, file: str):
-        self.file = file
-        self.problems: list[Problem] = []
-
-    def refuse(self, where: str, value: str, remedy: str) -> None:
-        self.problems.append(Problem(self.file, where, value, remedy))
-
-    @property
-    def shown(self) -> list[Problem]:
-        """The problems, of many the first."""
-        left = len(self.problems) - MOST_SHOWN
-        rest = [Problem(self.file, "", "", f"and {left} more problems: correct these first")] if left > 0 else []
-        return self.problems[:MOST_SHOWN] + rest
-
-    def read(self, rows: list[tuple[str, list[str]]]) -> Profile | None:
+class _Reader(RowReader):
+    def read(self, rows: list[Row]) -> Profile | None:
         if not rows:
             self.refuse("", "", f"the file holds no rows: give a head {EXAMPLE} and points")
             return None
@@ -123,10 +102,7 @@ class _Reader:
             return {}
         found = {}
         for (name, scale), cell in zip(scales, cells, strict=True):
-            try:
-                value = number(cell)
-            except ValueError:
-                value = np.nan
+            value = number(cell) if _is_number(cell) else np.nan
             if name and not np.isfinite(value):
                 self.refuse(f"{where}, {name}", cell, "expected a finite number")
             elif name and (refusal := range_of(name).refusal(scale * value)):
@@ -143,7 +119,7 @@ class _Reader:
             self.refuse(places[k], f"{time[k]:g} s", why)
 
 
-def with_units(rows: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
+def with_units(rows: list[Row]) -> list[Row]:
     """The rows with the units of a second row, which has no number, in the head."""
     if len(rows) < 2 or not rows[1][1] or any(_is_number(cell) for cell in rows[1][1]):
         return rows

@@ -19,11 +19,10 @@ from scipy.interpolate import make_interp_spline
 
 from gearfmu.errors import Problem, UnitError
 from gearfmu.quantities import to_si
-from gearfmu.stagefile.tables.rows import number, read_rows, uneven
+from gearfmu.stagefile.tables.rows import Row, RowReader, number, uneven
 
 FLANKS = ("left", "right")  # index 0: sg = +1, index 1: sg = −1
 _LARGEST = 1e-3  # m
-_MOST_SHOWN = 20
 _QUANTITIES = ("roll", "diameter", "z", "deviation")
 
 Key = tuple[int | None, int]  # tooth (None: all), flank
@@ -81,40 +80,23 @@ def _spline(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
 def read_topography(path: Path, teeth: int, shape: Any) -> tuple[Topography | None, list[Problem]]:
     """The topography of a gear of `teeth` teeth, or None and everything that is wrong with its file. shape : r_b,
     s_form and s_tip (m) of the gear; where the file gives diameters, rolls follow from r_b."""
-    try:
-        rows = read_rows(path)
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        remedy = f"{path} cannot be read ({why}): write the path relative to the stage file"
-        return None, [Problem(str(path), "", "", remedy)]
     reader = _Reader(str(path), teeth, shape)
-    reader.read(rows)
-    if reader.problems:
-        return None, reader.shown()
-    patches = {key: patch for key, points in reader.points.items() if (patch := reader.patch(key, points)) is not None}
-    return (None, reader.shown()) if reader.problems else (Topography(patches), [])
+    rows = reader.rows(path, f"{path} cannot be read ({{why}}): write the path relative to the stage file")
+    if rows is not None:
+        reader.read(rows)
+    found = {} if reader.problems else {key: reader.patch(key, points) for key, points in reader.points.items()}
+    patches = {key: patch for key, patch in found.items() if patch is not None}
+    return (None, reader.shown) if reader.problems else (Topography(patches), [])
 
 
-class _Reader:
-    """Rows of one file, and what is wrong with them."""
-
+class _Reader(RowReader):
     def __init__(self, file: str, teeth: int, shape: Any):
-        self.file, self.teeth, self.shape = file, teeth, shape
-        self.problems: list[Problem] = []
+        super().__init__(file)
+        self.teeth, self.shape = teeth, shape
         self.columns: dict[str, tuple[int, float]] = {}  # name: place, SI size of its unit
         self.points: dict[Key, dict[tuple[float, float], float]] = {}
 
-    def refuse(self, where: str, value: str, remedy: str) -> None:
-        self.problems.append(Problem(self.file, where, value, remedy))
-
-    def shown(self) -> list[Problem]:
-        """The problems, of many the first."""
-        if len(self.problems) <= _MOST_SHOWN:
-            return self.problems
-        rest = Problem(self.file, "", "", f"and {len(self.problems) - _MOST_SHOWN} more problems: correct these first")
-        return [*self.problems[:_MOST_SHOWN], rest]
-
-    def read(self, rows: list[tuple[str, list[str]]]) -> None:
+    def read(self, rows: list[Row]) -> None:
         if not rows:
             return self.refuse("", "", "the file holds no rows: give a head roll_mm,z_mm,deviation_um and points")
         where, names = rows[0]
