@@ -14,7 +14,7 @@ KINDS = {
     "deep groove": Rolling((Row(DEEP),)),
     "angular": Rolling((Row(ANGULAR),)),
     "mirrored, beside the centre": Rolling((Row(ANGULAR, 20e-3, -1, 5e-6),)),
-    "two in O arrangement": Rolling((Row(ANGULAR, -30e-3, 1, 8e-6), Row(ANGULAR, 30e-3, -1, 8e-6))).spread(4),
+    "two in O arrangement": Rolling((Row(ANGULAR, -30e-3, 1, 8e-6), Row(ANGULAR, 30e-3, -1, 8e-6)), 4),
     "roller": Rolling((Row(ROLLERS),)),
     "taper": Rolling((Row(TAPER),)),
 }
