@@ -12,7 +12,7 @@ import pytest
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.assembly.blob import change_gear, read_blob, write_blob
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
@@ -125,7 +125,8 @@ def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: Stage, bodies: list[
     spur = assemble(with_bearings(relief_spec), bodies)
     blobs = dict(read_blob(spur.blob))
     for g, hand in enumerate((1, -1)):
-        blobs[f"gear{g}"] = change_gear(np.array(blobs[f"gear{g}"], float), helix=hand * 1e-10)
+        blobs[f"gear{g}"] = np.array(blobs[f"gear{g}"], float)
+        blobs[f"gear{g}"][GEAR_NUMBERS.index("helix")] = hand * 1e-10
     found = []
     for blob in (spur.blob, write_blob(blobs)):
         kernel = Kernel(blob, {"level": 0.0})

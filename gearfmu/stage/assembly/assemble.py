@@ -38,12 +38,7 @@ PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
 
-def assemble(
-    stage: Stage,
-    bodies: Sequence[Body],
-    rolls: int = ROLLS,
-    observe: Sequence[str] = (),
-) -> StageModel:
+def assemble(stage: Stage, bodies: Sequence[Body], rolls: int = ROLLS, observe: Sequence[str] = ()) -> StageModel:
     """The general model of a stage. bodies: reduced, in the order of `stage.files`; rolls: of the even grid along a
     flank; observe: names of gears whose rigid motion and modal amplitudes are outputs.
 
@@ -259,12 +254,7 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
 
 
 def _gear_sections(
-    stage: Stage,
-    index: int,
-    body: Body,
-    groups: Sequence[Group],
-    nodes: Sequence[tuple[int, int]],
-    degrees: np.ndarray,
+    stage: Stage, index: int, body: Body, groups: Sequence[Group], nodes: Sequence[tuple[int, int]], degrees: np.ndarray
 ) -> dict[str, Any]:
     """Sections of gear `index`, of its scope and in every set of ground oscillators."""
     flank = groups[0].layout.bodies[index].flank

@@ -217,18 +217,7 @@ def _pad(contents: bytearray, start: int) -> None:
 
 
 TABLE = Path(__file__).parents[2] / "kernel" / "src" / "model" / "gk_fields.inc"
-COUNTS = (
-    "version",
-    "slices",
-    "rotors",
-    "gears",
-    "engagements",
-    "ports",
-    "supports",
-    "functions",
-    "rolls",
-    "sets",
-)
+COUNTS = ("version", "slices", "rotors", "gears", "engagements", "ports", "supports", "functions", "rolls", "sets")
 SIZES = ("rotor", "z", "modes", "reads", "both_flanks", "points", "low", "mirrored")
 FLANK_SIZES = ("flank_teeth", "flank_places", "flank_rolls")
 GEAR_NUMBERS = (
@@ -247,18 +236,6 @@ GEAR_NUMBERS = (
     "corner_angle",
     "z_mid",
     "helix",
-)
-ENGAGEMENT_NUMBERS = (
-    "x_a",
-    "y_a",
-    "x_b",
-    "y_b",
-    "backlash",
-    "nominal_backlash",
-    "damping",
-    "force_max",
-    "tilt_x",
-    "tilt_y",
 )
 _LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}
@@ -282,11 +259,6 @@ def gear_numbers(values: Mapping[str, float]) -> np.ndarray:
     """The section "gear" of GEAR_NUMBERS by name."""
     assert set(values) == set(GEAR_NUMBERS), set(values) ^ set(GEAR_NUMBERS)
     return np.array([float(values[name]) for name in GEAR_NUMBERS])
-
-
-def change_gear(section: np.ndarray, **values: float) -> np.ndarray:
-    """The section "gear" with some of GEAR_NUMBERS changed."""
-    return gear_numbers(dict(zip(GEAR_NUMBERS, section, strict=True)) | values)
 
 
 @cache
