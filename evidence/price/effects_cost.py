@@ -151,7 +151,7 @@ class Bench:
         plain = self.turning if effect.carried else getattr(self, others.get(effect.name, "plain"))
         with_it = self.own.get(effect.name, plain)
         plain = with_it if effect.off_setting else plain  # the switch is there where the data are
-        whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
+        whole, lacking, torque = self.library("nothing"), self.library(effect.name), LIGHT.get(effect.name, TORQUE)
         on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
         off = self.count(whole, plain, {**BASE, **effect.off_setting}, torque)
         without = self.count(lacking, plain, {**BASE, **effect.off_setting}, torque)

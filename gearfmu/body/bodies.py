@@ -47,14 +47,9 @@ def load_bodies(stage: Stage, folder: Folder = None) -> list[Body]:
     return [_load_current(stage, name, folder) for name in stage.files]
 
 
-def is_current(stage: Stage, name: str, folder: Folder = None) -> bool:
-    """Is the stored body sound and made from these numbers?"""
-    return _current(stage, name, folder) is not None
-
-
 def current_bodies(stage: Stage, folder: Folder = None) -> set[str]:
     """Names of the bodies that `reduce_bodies` would read and not make."""
-    return {name for name in stage.files if is_current(stage, name, folder)}
+    return {name for name in stage.files if _current(stage, name, folder) is not None}
 
 
 def reduce_bodies(

@@ -37,19 +37,19 @@ LINES = 60  # of the frequencies at which the error of a housing is measured
 
 def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> Body:
     """The carrier of a set, reduced as its file says. Raises MeshError."""
-    started = time.process_time()
-    _tell(progress, "carrier: mesh and finite elements", 0.0)
+    started, tell = time.process_time(), progress or (lambda what, share: None)
+    tell("carrier: mesh and finite elements", 0.0)
     if carrier.imported is None:
         need = carrier_need(carrier)
         require_memory(need, lower_counts(carrier.mesh, "carrier.mesh"))
-        _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
+        tell(f"carrier: error of the mesh, {need.text}", 0.0)
         facts = _carrier_facts(carrier)
-        _tell(progress, "carrier: finite elements", 0.3)
+        tell("carrier: finite elements", 0.3)
         full = carrier_full_order(carrier)
         mesh = {**facts, "dof_body": full.size}
     else:
         full, mesh = imported_carrier_order(carrier)
-    _tell(progress, f"carrier: {carrier.method}", 0.5)
+    tell(f"carrier: {carrier.method}", 0.5)
     how = How.of(carrier, carrier.method, mesh)
     body = whole_body(full, how, Size(carrier.modes), Judging.over(damping_ratio=carrier.modal_damping))
     return replace(body, how=how.since(started))
@@ -111,11 +111,6 @@ def _carrier_facts(carrier: CarrierBody) -> dict[str, Any]:
     facts = mesh_report(carrier_sector(carrier_geometry(carrier), carrier.mesh))
     counts, error = carrier.mesh.model_dump(), carrier_mesh_error(carrier)
     return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
-
-
-def _tell(progress: Progress | None, what: str, share: float) -> None:
-    if progress:
-        progress(what, share)
 
 
 def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> Body:

@@ -55,7 +55,7 @@ def train_by_elements():
     mesh's row."""
     stiffness, mass, where, start = [], [], {}, 0
     for s, shaft in enumerate(SHAFTS):
-        ends = shaft.ends(shaft.length / 12)
+        ends = shaft.ends(shaft.steps[-1] / 12)
         planes = [bending_matrices(shaft, ends)] * 2 + [rod_matrices(shaft, ends, turning) for turning in (True, False)]
         for (k, m), names in zip(planes, ((0, 4), (1, 3), (5,), (2,)), strict=True):
             stiffness.append(k)
