@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,7 @@ from gearfmu.kernel.binding import (
     aligned,
     load,
 )
-
-if TYPE_CHECKING:
-    from gearfmu.kernel.linear import LinearModel
+from gearfmu.kernel.linear import LinearInfo, LinearModel, linear_model, room_for
 
 PLACES = 8
 SLICES = 20
@@ -262,8 +259,6 @@ class Kernel:
     def linearise(self) -> LinearModel:
         """The stage linearised at the equilibrium that `transmission` or `initialize` found last, with the ports as the
         model has them and clutches closed. SimulationError(bad_call) once a step has been made."""
-        from gearfmu.kernel.linear import LinearInfo, linear_model, room_for
-
         info = LinearInfo()
         self.check(self._lib.gk_linearise_room(self._model, self._setup, ctypes.byref(info)))
         arrays = room_for(info)

@@ -23,11 +23,10 @@ class Effect:
     """One effect. title: in words; formula and equation: what it computes, and where docs/theory.md derives it.
 
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
-    turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
-    the stage decide; test: the test by hand calculation; carried: a planetary set has it, a spur pair does not;
-    of_data: its parameter is there where the stage file gives it something to do; kept: why a plan (gearfmu/planning)
-    never leaves it out, "" where the error budget decides. A kernel without its code is built with
-    -DGK_WITHOUT=<name>.
+    turn it off; off_setting: the kernel's parameters that do so, empty where the data of the stage decide; test: the
+    test by hand calculation; carried: a planetary set has it, a spur pair does not; of_data: its parameter is there
+    where the stage file gives it something to do; kept: why a plan (gearfmu/planning) never leaves it out, "" where the
+    error budget decides. -DGK_WITHOUT=<name> builds a kernel that has no code for it.
     """
 
     name: str
@@ -40,7 +39,6 @@ class Effect:
     switch: str
     test: str
     off_setting: Mapping[str, float]
-    on_setting: Mapping[str, float]
     carried: bool = False
     of_data: bool = False
     kept: str = ""
@@ -76,7 +74,6 @@ def _switched(name: str, **others: Any) -> Effect:
         name=name,
         switch=f"variable `{variable}`; in a scene `[stage.effects] {name} = false`; `--set {variable}=false`",
         off_setting={variable: 0.0},
-        on_setting={variable: 1.0},
         **{"test": f"tests/stage/test_effects.py::test_{name}"} | others,
     )
 
@@ -105,7 +102,6 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
         off_setting={"level": 0.0},
-        on_setting={"level": 1.0},
         test="tests/stage/test_effects.py::test_modes",
     ),
     Effect(
@@ -118,7 +114,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
         switch="level `paper` alone",
         off_setting={"level": 4.0, "integrator": 1.0},
-        on_setting={"level": 3.0, "integrator": 1.0},
         test="tests/stage/test_effects.py::test_residual",
         kept="it is a static part of the stiffness",
     ),
@@ -141,7 +136,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_strips.c, gk_row_contact.c (gk_row_contact_list)",
         switch="parameter `slices` (1 … 20); `[contact] slices` in stage.toml, `[stage] slices` in a scene",
         off_setting={"slices": 1.0},
-        on_setting={"slices": 5.0},
         test="tests/stage/test_effects.py::test_slices",
     ),
     _switched(
@@ -238,7 +232,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_flank.c (misplace)",
         switch="data of the stage: `gears.X.index_deviation` in stage.toml",
         off_setting={},
-        on_setting={},
         test="tests/stage/test_pitch_errors.py::test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh",
     ),
     _switched(
