@@ -17,7 +17,7 @@ import numpy as np
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage import assemble
-from gearfmu.stage.assembly.blob import GEAR_NUMBERS, change_gear, read_blob, write_blob
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, gear_numbers, read_blob, write_blob
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.bodies import GearSpec
@@ -97,7 +97,8 @@ class FreePair:
         free = start.load == 0.0 and start.play > 0
         back = (0.5 * start.play - start.offset) / shapes[0].r_b if free else 0.0
         for name, angle in (("gear0", turn / shapes[0].z - back), ("gear1", -turn / shapes[1].z)):
-            sections[name] = change_gear(sections[name], phase=_numbers(sections[name])["phase"] + angle)
+            numbers = _numbers(sections[name])
+            sections[name] = gear_numbers(numbers | {"phase": numbers["phase"] + angle})
         return write_blob(sections)
 
     def _pairs(self) -> Iterator[tuple[GearSpec, Any]]:

@@ -38,6 +38,11 @@ STAGE, SPEED = "fzg_c/stage_relief", 2000 * math.pi / 30
 TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else off is another motion
 PERIOD, PERIOD_OF_SET = Period(10, 38, 50e-6), Period(4, 10, 50e-6)  # 38 steps are one mesh period
 BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
+ON = {  # settings beside `Effect.off_setting`, where they are not true
+    "modes": {"level": 1.0},
+    "residual": {"level": 3.0, "integrator": 1.0},
+    "slices": {"slices": 5.0},
+}
 OWN_DATA: dict[str, dict[str, Any]] = {  # of the pinion, where the stage does not have them
     "pitch_errors": {"index_deviation": {0: 5e-6}},
     "flank_deviations": {"profile": ProfileSpec(slope=2e-6, crowning=2e-6)},
@@ -116,8 +121,8 @@ class Bench:
         plain = shipped(SET if effect.carried else OTHERS.get(effect.name, STAGE))
         with_it = self.own.get(effect.name, plain)
         plain = with_it if effect.off_setting else plain  # the switch is there where the data are
-        whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
-        on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
+        whole, lacking, torque = self.library("nothing"), self.library(effect.name), LIGHT.get(effect.name, TORQUE)
+        on = self.count(whole, with_it, {**BASE, **ON.get(effect.name, dict.fromkeys(effect.off_setting, 1.0))}, torque)
         off = self.count(whole, plain, {**BASE, **effect.off_setting}, torque)
         without = self.count(lacking, plain, {**BASE, **effect.off_setting}, torque)
         cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)

@@ -11,53 +11,44 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
-from gearfmu.bearing.law import Balls
-from gearfmu.bearing.rollers import Rollers
+from gearfmu.bearing.law import Balls, Law, Rollers
 
-Kind = TypeVar("Kind", Balls, Rollers)
 GROOVES = (0.52, 0.53)  # radii of inner and outer groove over the ball's diameter
 _FILLED = math.radians(186)  # of the circle, by balls that are put in between eccentric rings
 _CAGED = {"balls": 0.87, "rollers": 0.8}  # share of the pitch circle that rolling elements fill beside the cage
 
 
 @dataclass(frozen=True)
-class Filled(Generic[Kind]):
+class Filled:
     """A law with all its numbers. proposed: names of those that no one has given, in the terms of a stage file."""
 
-    law: Kind
+    law: Law
     proposed: tuple[str, ...]
 
 
-def filled_ball(bore: float, outside: float, known: Mapping[str, float | int | None], **fixed: float) -> Filled[Balls]:
+def filled_ball(bore: float, outside: float, known: Mapping[str, float | int | None], **fixed: float) -> Filled:
     """A ball bearing of that bore and outside diameter, m. known: balls, ball_diameter, pitch_diameter, inner_groove,
     outer_groove (over the ball's diameter), None where unknown; fixed: contact_angle, rad, and clearance, m."""
-    diameter = _or(known, "ball_diameter", 0.3 * (outside - bore))
-    pitch = _or(known, "pitch_diameter", 0.5 * (bore + outside))
+    given = {name: value for name, value in known.items() if value is not None}
+    diameter = given.get("ball_diameter", 0.3 * (outside - bore))
+    pitch = given.get("pitch_diameter", 0.5 * (bore + outside))
     share = math.asin(min(diameter / pitch, 1.0))
     angular = fixed.get("contact_angle", 0.0) > 0.0
     count = math.floor(_CAGED["balls"] * math.pi / share) if angular else 1 + round(_FILLED / (2 * share))
-    grooves = _or(known, "inner_groove", GROOVES[0]), _or(known, "outer_groove", GROOVES[1])
-    law = Balls(int(_or(known, "balls", count)), diameter, pitch, grooves, **fixed)
-    return Filled(law, tuple(name for name, value in known.items() if value is None))
+    grooves = given.get("inner_groove", GROOVES[0]), given.get("outer_groove", GROOVES[1])
+    law = Balls(int(given.get("balls", count)), diameter, pitch, grooves, **fixed)
+    return Filled(law, tuple(name for name in known if name not in given))
 
 
-def filled_roller(
-    bore: float, outside: float, known: Mapping[str, float | int | None], **fixed: float
-) -> Filled[Rollers]:
+def filled_roller(bore: float, outside: float, known: Mapping[str, float | int | None], **fixed: float) -> Filled:
     """A cylindrical or tapered roller bearing of that bore and outside diameter, m. known: rollers, roller_diameter,
     roller_length, pitch_diameter, None where unknown, and the width of the bearing; fixed: contact_angle, rad, and
     clearance, m."""
-    diameter = _or(known, "roller_diameter", 0.27 * (outside - bore))
-    pitch = _or(known, "pitch_diameter", 0.5 * (bore + outside))
+    given = {name: value for name, value in known.items() if value is not None}
+    diameter = given.get("roller_diameter", 0.27 * (outside - bore))
+    pitch = given.get("pitch_diameter", 0.5 * (bore + outside))
     count = math.floor(_CAGED["rollers"] * math.pi / math.asin(min(diameter / pitch, 1.0)))
-    length = _or(known, "roller_length", 0.65 * float(known["width"] or 0.0))
-    law = Rollers(int(_or(known, "rollers", count)), diameter, pitch, length, **fixed)
-    return Filled(law, tuple(name for name, value in known.items() if value is None and name != "width"))
-
-
-def _or(known: Mapping[str, float | int | None], name: str, proposed: float) -> float:
-    """The number that is known, else the proposed one."""
-    value = known.get(name)
-    return float(proposed if value is None else value)
+    length = given.get("roller_length", 0.65 * given.get("width", 0.0))
+    law = Rollers(int(given.get("rollers", count)), diameter, pitch, length, **fixed)
+    return Filled(law, tuple(name for name in known if name not in given and name != "width"))

@@ -57,9 +57,9 @@ def point_stiffness(inner: Point, outer: Point, modulus: float = YOUNGS_MODULUS)
     return _POINT * modulus / (1 - POISSON_RATIO**2) * (inner.approach + outer.approach) ** -1.5
 
 
-def line_pressure(load: float, radius: float, modulus: float = YOUNGS_MODULUS) -> float:
+def line_pressure(load: float, radius: float) -> float:
     """Largest pressure, Pa, of a line contact under a load in N/m. radius: relative radius of curvature, m."""
-    return math.sqrt(max(load, 0.0) * modulus / (2 * (1 - POISSON_RATIO**2) * math.pi * radius))
+    return math.sqrt(max(load, 0.0) * YOUNGS_MODULUS / (2 * (1 - POISSON_RATIO**2) * math.pi * radius))
 
 
 def _integrals(axes: float) -> tuple[float, float]:

@@ -11,22 +11,33 @@ clearance s_r,
 
     ρ = A cos α − ½ s_r + x c + y s,    ζ = A sin α + z + R (θx s − θy c),    δ = (√(ρ² + ζ²) − A)₊,    u = ⅖ c_P δ^5/2
 
-with ζ₊ for ζ in an angular contact bearing, which has a shoulder on one side only.
-Rollers: `rollers.py`. The mean over positions of the cage is a potential too: `Rolling.spread`.
+with ζ₊ for ζ in an angular contact bearing, which has a shoulder on one side only. Rollers are cut in slices (ISO/TS
+16281:2008, 5.3). Of slice k of roller j, at x_k along the roller, with the profile P of the standard,
+
+    δ_jk = (x c + y s + x_k (θy c − θx s) − ½ s_r − 2 P(x_k))₊,    u = 9/19 c_L δ^19/9 / n_s
+    c_L = 35948 L^8/9    (N, mm)
+
+of cylindrical rollers. A taper has the contact angle α; its slices lie at x_k cos α along the axis and at the radius
+r_k = ½ D_pw − x_k sin α, and press along (cos α, sin α) in the axial section. Flanges are left out.
+
+The mean over positions of the cage is a potential too: `Rolling.positions`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
-from gearfmu.bearing.hertz import YOUNGS_MODULUS, Point, point, point_stiffness
+from gearfmu.bearing.hertz import YOUNGS_MODULUS, Point, line_pressure, point, point_stiffness
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry")
+SLICES = 30  # the standard asks for at least as many
+_LINE = 35948.0  # N/mm^(10/9) of a roller 1 mm long, steel
+_MM = 1e-3
+_SHORT = 2.5  # length over diameter up to which the whole roller is profiled
 
 
 @dataclass(frozen=True)
@@ -39,35 +50,6 @@ class Elements:
     slope: np.ndarray
     curl: np.ndarray | None
     energy: float
-
-
-class Law(Protocol):
-    """What balls and rollers offer."""
-
-    @property
-    def count(self) -> int:
-        """Rolling elements."""
-
-    @property
-    def diameter(self) -> float:
-        """m, of a rolling element."""
-
-    @property
-    def pitch_diameter(self) -> float:
-        """m, of their circle."""
-
-    @property
-    def contact_angle(self) -> float:
-        """rad."""
-
-    def springs(self, d: np.ndarray, angles: np.ndarray, push: float) -> Elements:
-        """The springs at rolling elements at these angles (k,) rad; push: m, towards the side that carries."""
-
-    def loads(self, springs: Elements) -> np.ndarray:
-        """(k,) N: load of each rolling element."""
-
-    def pressure(self, springs: Elements) -> float:
-        """Largest contact pressure, Pa."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +89,7 @@ class Balls:
         return self.pitch_diameter / 2 + (self.grooves[0] - 0.5) * self.diameter * math.cos(self.contact_angle)
 
     def springs(self, d: np.ndarray, angles: np.ndarray, push: float) -> Elements:
-        """See `Law`. One spring an element."""
+        """One spring at each of the angles (k,) rad; push: m, towards the side that carries."""
         c, s, null = np.cos(angles), np.sin(angles), np.zeros_like(angles)
         across = np.stack([c, s, null, null, null], axis=1)
         along = np.stack([null, null, null + 1, self.radius * s, -self.radius * c], axis=1)
@@ -130,13 +112,78 @@ class Balls:
         )
 
     def loads(self, springs: Elements) -> np.ndarray:
-        """See `Law`."""
+        """(k,) N: load of each rolling element."""
         return springs.load
 
     def pressure(self, springs: Elements) -> float:
-        """See `Law`."""
+        """Largest contact pressure, Pa."""
         most = float(springs.load.max(initial=0.0))
         return max(own.pressure(most, self.modulus) for own in self.points)
+
+
+@dataclass(frozen=True)
+class Rollers:
+    """Law of cylindrical and tapered roller bearings. diameter, length: of the rollers, m, at their middle and without
+    their chamfers; pitch_diameter: m; clearance: radial, in operation, m, negative: interference; contact_angle: rad,
+    0: cylindrical, carries across the axis only."""
+
+    count: int
+    diameter: float
+    pitch_diameter: float
+    length: float
+    clearance: float = 0.0
+    contact_angle: float = 0.0
+
+    @property
+    def stiffness(self) -> float:
+        """c_L, N/m^(10/9)."""
+        return _LINE * (self.length / _MM) ** (8 / 9) / _MM ** (10 / 9)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """(n_s,) m: middles of the slices along the roller."""
+        return self.length * ((np.arange(SLICES) + 0.5) / SLICES - 0.5)
+
+    @cached_property
+    def profile(self) -> np.ndarray:
+        """(n_s,) m: P, how far the roller's surface lies below its cylinder."""
+        straight = max(self.length - _SHORT * self.diameter, 0.0)
+        part = np.maximum(2 * np.abs(self.places) - straight, 0.0) / (self.length - straight)
+        factor = 0.0005 if straight else 0.00035
+        return -factor * self.diameter * np.log(1 - part**2)
+
+    def springs(self, d: np.ndarray, angles: np.ndarray, push: float) -> Elements:
+        """The springs as of `Balls`, n_s an element, the slices of one side by side."""
+        c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+        of_slices = np.zeros((angles.size, SLICES, 5))
+        cosine, sine = math.cos(self.contact_angle), math.sin(self.contact_angle)
+        arm = self.places - self.pitch_diameter / 2 * sine
+        of_slices[..., 0], of_slices[..., 1], of_slices[..., 2] = cosine * c, cosine * s, sine
+        of_slices[..., 3], of_slices[..., 4] = -arm * s, arm * c
+        slope = of_slices.reshape(-1, 5)
+        lost = np.tile(self.clearance / 2 * cosine + 2 * self.profile - push * sine, angles.size)
+        delta = np.maximum(slope @ d - lost, 0.0)
+        c_slice = self.stiffness / SLICES
+        return Elements(
+            load=c_slice * delta ** (10 / 9),
+            rate=10 / 9 * c_slice * delta ** (1 / 9),
+            slope=slope,
+            curl=None,
+            energy=float(9 / 19 * c_slice * (delta ** (19 / 9)).sum()),
+        )
+
+    def loads(self, springs: Elements) -> np.ndarray:
+        """(k,) N: load of each rolling element."""
+        return springs.load.reshape(-1, SLICES).sum(axis=1)
+
+    def pressure(self, springs: Elements) -> float:
+        """Largest contact pressure, Pa: on the inner ring, where the relative radius is smaller."""
+        gamma = self.diameter * math.cos(self.contact_angle) / self.pitch_diameter
+        most = float(springs.load.max(initial=0.0)) * SLICES / self.length
+        return line_pressure(most, self.diameter / 2 * (1 - gamma))
+
+
+Law: TypeAlias = Balls | Rollers
 
 
 @dataclass(frozen=True)
@@ -167,19 +214,17 @@ class Rolling:
     positions: int = 1
     cage: float = 0.0
 
-    def spread(self, positions: int) -> Rolling:
-        """The same bearing, averaged over so many positions of the cage."""
-        return replace(self, positions=positions)
-
-    def at(self, cage: float) -> Rolling:
-        """The same bearing with its cage at that angle, rad."""
-        return replace(self, cage=cage)
-
     @property
     def directions(self) -> tuple[int, ...]:
         """Those of x, y, z, θx, θy in which it can carry."""
         along = any(isinstance(row.law, Balls) or row.law.contact_angle > 0.0 for row in self.rows)
         return (0, 1, 2, 3, 4) if along else (0, 1, 3, 4)
+
+    def placed(self, part: np.ndarray) -> np.ndarray:
+        """(5,): a displacement in `directions` (k,) as one in all."""
+        d = np.zeros(5)
+        d[list(self.directions)] = part
+        return d
 
     def energy(self, d: np.ndarray) -> float:
         """U, J. d (5,): m, rad."""

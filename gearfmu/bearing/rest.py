@@ -43,16 +43,12 @@ def rest(bearing: Rolling, load: np.ndarray) -> Rest:
     scale = scales(bearing)
     if np.abs(np.delete(wanted, free)).max(initial=0.0) > _LEAST_LOAD:
         raise NoRestError("the bearing carries nothing along its axis")
-    whole = np.zeros(5)
-
-    def placed(part: np.ndarray) -> np.ndarray:
-        return np.insert(part, 2, 0.0) if len(free) < 5 else part
-
+    placed = bearing.placed
     found = least(
         lambda d: bearing.energy(placed(d)) - wanted[free] @ d,
         lambda d: (bearing.force(placed(d)) - wanted)[free],
         lambda d: bearing.stiffness(placed(d))[np.ix_(free, free)],
-        whole[free],
+        np.zeros(len(free)),
         scale[free],
         float(np.abs(wanted[free] * scale[free]).max()),
     )
@@ -134,6 +130,5 @@ def pass_swing(bearing: Rolling, load: np.ndarray) -> np.ndarray:
     """(5,) m, rad, peak to peak: motion of the inner ring under a constant load (5,) while rolling elements pass.
     NoRestError: `rest`."""
     count = bearing.rows[0].law.count
-    alone = bearing.spread(1)
     angles = 2 * math.pi / count * np.arange(_ANGLES) / _ANGLES
-    return np.ptp([rest(alone.at(angle), load).displacement for angle in angles], axis=0)
+    return np.ptp([rest(replace(bearing, positions=1, cage=angle), load).displacement for angle in angles], axis=0)

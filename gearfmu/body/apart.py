@@ -23,7 +23,7 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.memory import Need, available_memory
 from gearfmu.stagefile.forms.general import Stage
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float], None]  # what is being done, share done of it
 Job = tuple[Stage, str, Path]  # a stage, the name of the gear, the file of its body
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -76,24 +76,18 @@ class Shaft:
     material: Steel
     places: Sequence[float]
 
-    @property
-    def length(self) -> float:
-        """m."""
-        return sum(section.length for section in self.sections)
+    @cached_property
+    def steps(self) -> np.ndarray:
+        """Ends of the sections, m."""
+        return np.cumsum([section.length for section in self.sections])
 
     def section_at(self, z: float) -> Section:
         """The section that z, no step, lies in."""
-        end = 0.0
-        for section in self.sections:
-            end += section.length
-            if z < end:
-                return section
-        return self.sections[-1]
+        return self.sections[int(np.searchsorted(self.steps[:-1], z, "right"))]
 
     def ends(self, longest: float) -> np.ndarray:
         """Element ends: all steps and interfaces, and between them so many that no element is longer than `longest`."""
-        steps = np.concatenate([[0.0], np.cumsum([section.length for section in self.sections]), self.places])
-        steps = np.sort(steps)
+        steps = np.sort(np.concatenate([[0.0], self.steps, self.places]))
         steps = steps[np.concatenate([[True], np.diff(steps) > FINEST])]
         parts = [np.linspace(a, b, max(1, math.ceil((b - a) / longest)) + 1)[:-1] for a, b in pairwise(steps)]
         return np.append(np.concatenate(parts), steps[-1])
@@ -106,7 +100,7 @@ def reduce_shaft(
 
     longest: element, m; the 12th part of the length when None. Nothing is stored: a beam is made in milliseconds.
     """
-    ends = shaft.ends(longest or shaft.length / ELEMENTS)
+    ends = shaft.ends(longest or float(shaft.steps[-1]) / ELEMENTS)
     at = np.array([ORDER * int(np.abs(ends - place).argmin()) for place in shaft.places])
     bending = _solve(*bending_matrices(shaft, ends), rigid=2)
     torsion, extension = (_solve(*rod_matrices(shaft, ends, turning), rigid=1) for turning in (True, False))
@@ -136,7 +130,8 @@ def reduce_shaft(
     order = np.argsort(omega, kind="stable")
     centre, mass = rigid_mass(shaft)
     about_x, about_y = np.concatenate([tilts[0], np.concatenate(tilts[1:], axis=2)[..., order]], axis=2)
-    turning = about_x.T @ rotary_matrix(shaft, ends) @ about_y
+    rotary = bending_matrices(shaft, ends)[1][1::2, 1::2]  # ∫ ρI θ_i θ_j of the rotations of the nodes, kg·m²
+    turning = about_x.T @ rotary @ about_y
     modes, omega = np.concatenate(rows, axis=2)[..., order].reshape(6 * len(at), -1), omega[order]
     points = [np.array([0.0, 0.0, place]) for place in np.asarray(shaft.places) - centre]
     return Body(
@@ -154,8 +149,7 @@ def reduce_shaft(
 
 def rigid_mass(shaft: Shaft) -> tuple[float, np.ndarray]:
     """z of the centre of mass, m, and (6, 6) mass about it."""
-    ends = np.cumsum([section.length for section in shaft.sections])
-    middles = ends - [section.length / 2 for section in shaft.sections]
+    middles = shaft.steps - [section.length / 2 for section in shaft.sections]
     rho = shaft.material.density
     masses = np.array([rho * section.area * section.length for section in shaft.sections])
     polar = sum(2 * rho * section.second_moment * section.length for section in shaft.sections)
@@ -170,11 +164,6 @@ def rigid_mass(shaft: Shaft) -> tuple[float, np.ndarray]:
 def bending_matrices(shaft: Shaft, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """K, M of one plane: unknowns w, θ at every node, θ = w′ without shear."""
     return _assemble(shaft, ends, _bending_element, 2)
-
-
-def rotary_matrix(shaft: Shaft, ends: np.ndarray) -> np.ndarray:
-    """∫ ρI θ_i θ_j of the rotations of the nodes, kg·m²."""
-    return bending_matrices(shaft, ends)[1][1::2, 1::2]
 
 
 def rod_matrices(shaft: Shaft, ends: np.ndarray, turning: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -218,15 +207,11 @@ def _shape_functions() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Values and slopes (ORDER + 1, ORDER + 1) of the Lagrange polynomials at the Gauss points of −1 … 1, and the
     weights of these."""
     points, weights = np.polynomial.legendre.leggauss(ORDER + 1)
-    basis = np.linalg.inv(np.vander(element_nodes(), increasing=True))
+    inner = np.polynomial.legendre.Legendre.basis(ORDER).deriv().roots()
+    nodes = np.concatenate([[-1.0], np.sort(inner.real), [1.0]])  # Gauss–Lobatto points
+    basis = np.linalg.inv(np.vander(nodes, increasing=True))
     powers = np.arange(1, ORDER + 1) * np.vander(points, ORDER, increasing=True)
     return np.vander(points, ORDER + 1, increasing=True) @ basis, powers @ basis[1:], weights
-
-
-def element_nodes() -> np.ndarray:
-    """(ORDER + 1,): Gauss–Lobatto points, −1 … 1."""
-    inner = np.polynomial.legendre.Legendre.basis(ORDER).deriv().roots()
-    return np.concatenate([[-1.0], np.sort(inner.real), [1.0]])
 
 
 def _bending_element(section: Section, material: Steel, n: _Products) -> tuple[np.ndarray, np.ndarray]:

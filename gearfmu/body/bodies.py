@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
+from gearfmu.body.apart import Progress, Work, reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
 from gearfmu.body.layout import FORMAT_VERSION
 from gearfmu.body.sound import make_radiation, sound_path
 from gearfmu.body.store import load_body, save_body
-from gearfmu.body.toothed import gear_work, reduced_gear
+from gearfmu.body.toothed import gear_work, named, reduced_gear
 from gearfmu.body.whole import reduced_carrier, reduced_housing
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.files import format_of
@@ -28,7 +28,6 @@ from gearfmu.stagefile.stored import ALGORITHMS, expected_hash
 from gearfmu.stagefile.tables.housing import HousingBody
 
 Folder: TypeAlias = "str | os.PathLike[str] | None"
-Progress = Callable[[str, float], None]
 
 
 def body_hashes(stage: Stage) -> tuple[str, ...]:
@@ -47,14 +46,9 @@ def load_bodies(stage: Stage, folder: Folder = None) -> list[Body]:
     return [_load_current(stage, name, folder) for name in stage.files]
 
 
-def is_current(stage: Stage, name: str, folder: Folder = None) -> bool:
-    """Is the stored body sound and made from these numbers?"""
-    return _current(stage, name, folder) is not None
-
-
 def current_bodies(stage: Stage, folder: Folder = None) -> set[str]:
     """Names of the bodies that `reduce_bodies` would read and not make."""
-    return {name for name in stage.files if is_current(stage, name, folder)}
+    return {name for name in stage.files if _current(stage, name, folder) is not None}
 
 
 def reduce_bodies(
@@ -101,8 +95,7 @@ def make_body(stage: Stage, name: str, path: Path, progress: Progress | None = N
     body = reduce_body(stage, name, progress)
     save_body(body, path)
     if body.skin is not None:
-        if progress is not None:
-            progress(f"{name}: radiation matrix of the skin", 0.9)
+        named(progress, name)("radiation matrix of the skin", 0.9)
         make_radiation(body, sound_path(path))
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from gearfmu.body.apart import Work
+from gearfmu.body.apart import Progress, Work
 from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Tangent
 from gearfmu.body.former import GEAR_METHOD
 from gearfmu.body.imported import read_gear
@@ -35,7 +34,6 @@ ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 _SHARES = ((0.1, 0.6), (0.6, 0.8), (0.8, 1.0))  # of the work: modes, static tables, error
 _OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ def gear_work(gear: ToothedBody) -> Work | None:
 
 def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     """The reduced body of an external or internal gear. Raises MeshError."""
-    started, report = time.process_time(), _named(progress, gear.name)
+    started, report = time.process_time(), named(progress, gear.name)
     report("mesh and finite elements", 0.0)
     made = _meshed_here(gear, report) if gear.imported is None else _meshed_elsewhere(gear, report)
     flank = flank_of(gear.teeth, tooth_flank(gear_shape(gear), gear), made.modes, made.statics)
@@ -85,7 +83,8 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     )
 
 
-def _named(progress: Progress | None, name: str) -> Progress:
+def named(progress: Progress | None, name: str) -> Progress:
+    """Progress of the body `name`, also where no one asks for it."""
     return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
 
 

@@ -4,15 +4,17 @@ sensors and a skin."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.body.apart import Progress
 from gearfmu.body.body import Body, How, Node, Sensors, Skin
 from gearfmu.body.imported import imported_carrier_order
+from gearfmu.body.toothed import named
 from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.basis import Size
@@ -31,25 +33,24 @@ from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.tables.housing import HousingBody
 
-Progress = Callable[[str, float], None]
 LINES = 60  # of the frequencies at which the error of a housing is measured
 
 
 def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> Body:
     """The carrier of a set, reduced as its file says. Raises MeshError."""
-    started = time.process_time()
-    _tell(progress, "carrier: mesh and finite elements", 0.0)
+    started, tell = time.process_time(), named(progress, "carrier")
+    tell("mesh and finite elements", 0.0)
     if carrier.imported is None:
         need = carrier_need(carrier)
         require_memory(need, lower_counts(carrier.mesh, "carrier.mesh"))
-        _tell(progress, f"carrier: error of the mesh, {need.text}", 0.0)
+        tell(f"error of the mesh, {need.text}", 0.0)
         facts = _carrier_facts(carrier)
-        _tell(progress, "carrier: finite elements", 0.3)
+        tell("finite elements", 0.3)
         full = carrier_full_order(carrier)
         mesh = {**facts, "dof_body": full.size}
     else:
         full, mesh = imported_carrier_order(carrier)
-    _tell(progress, f"carrier: {carrier.method}", 0.5)
+    tell(carrier.method, 0.5)
     how = How.of(carrier, carrier.method, mesh)
     body = whole_body(full, how, Size(carrier.modes), Judging.over(damping_ratio=carrier.modal_damping))
     return replace(body, how=how.since(started))
@@ -113,18 +114,13 @@ def _carrier_facts(carrier: CarrierBody) -> dict[str, Any]:
     return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
 
 
-def _tell(progress: Progress | None, what: str, share: float) -> None:
-    if progress:
-        progress(what, share)
-
-
 def reduced_housing(housing: HousingBody, progress: Progress | None = None) -> Body:
     """The housing of a stage, reduced as its file says. Raises MeshError and BodyError."""
-    started, tell = time.process_time(), progress or (lambda what, share: None)
-    tell(f"{housing.name}: mesh and finite elements", 0.0)
+    started, tell = time.process_time(), named(progress, housing.name)
+    tell("mesh and finite elements", 0.0)
     found = housing_order(housing)
     method = "modal" if housing.reduced else housing.method  # all modes of a superelement, which are not many
-    tell(f"{housing.name}: {method}, {found.full.size} unknowns", 0.1)
+    tell(f"{method}, {found.full.size} unknowns", 0.1)
     surface = found.surface
     mesh = found.facts | ({} if surface is None else {"holes_of_the_skin": surface.holes})
     how = How.of(housing, method, mesh)

@@ -135,8 +135,3 @@ def aligned(size: int) -> tuple[ctypes.Array, int]:
     own = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
     memory = (ctypes.c_char * max(size, 1)).from_buffer(mmap.mmap(-1, max(size, 1), **own))
     return memory, ctypes.addressof(memory)
-
-
-def blank_message() -> ctypes.Array:
-    """Room for one message of the kernel."""
-    return ctypes.create_string_buffer(MESSAGE)

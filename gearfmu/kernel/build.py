@@ -162,11 +162,10 @@ def build_library(
         parts = [Path(work) / str(k) / target.name for k in range(len(commands))]
         flags = [*FLAGS, *_variant_flags(sanitize, pattern, real)]
         link = ["-shared", *_link_flags(name, sanitize), *own_flags]
-        folders = [f"-I{fmi_headers()}", f"-I{HERE / 'src'}"]
         compiled = [p for p in files if p.suffix == ".c"]
         for command, part in zip(commands, parts, strict=True):
             part.parent.mkdir()
-            line = [*command, *flags, *_position(name), *folders]
+            line = [*command, *flags, *([] if name == "win64" else ["-fPIC"]), *_folders()]
             objects = _objects(line, [f for f in own_flags if not f.startswith(_LINKER)], compiled, part.parent)
             _run([*command, *flags, *link, "-o", str(part), *map(str, objects), *_libraries(name)])
         made = parts[0] if len(parts) == 1 else _universal(parts, Path(work) / target.name)
@@ -189,19 +188,8 @@ def compile_program(source: Path, out: Path, platform: str = "host", sanitize: b
 
     Raises BuildError with the compiler's messages."""
     name = _platform_name(platform)
-    _run(
-        [
-            *_compilers(name, sanitize)[0],
-            *FLAGS,
-            *_variant_flags(sanitize, pattern=False, real="float"),
-            f"-I{fmi_headers()}",
-            f"-I{HERE / 'src'}",
-            "-o",
-            str(out),
-            str(source),
-            *_libraries(name),
-        ]
-    )
+    line = [*_compilers(name, sanitize)[0], *FLAGS, *_variant_flags(sanitize, pattern=False, real="float"), *_folders()]
+    _run([*line, "-o", str(out), str(source), *_libraries(name)])
     return out
 
 
@@ -213,6 +201,10 @@ def fmi_headers() -> Path:
             if (folder / "fmi2Functions.h").is_file():
                 return folder
     raise BuildError("the FMI 2 headers come with the package fmpy, which is not installed here: pip install fmpy")
+
+
+def _folders() -> list[str]:
+    return [f"-I{fmi_headers()}", f"-I{HERE / 'src'}"]
 
 
 def _platform_name(platform: str) -> str:
@@ -328,11 +320,6 @@ def _link_flags(name: str, sanitize: bool) -> list[str]:
     if name == "darwin64":
         return ["-Wl,-install_name,@rpath/gearfmu_kernel.dylib"]
     return ["-Wl,-Bsymbolic", *([] if sanitize else ["-Wl,--no-undefined", "-Wl,-s"])]
-
-
-def _position(name: str) -> list[str]:
-    """Code of a shared library, which on Windows needs no flag."""
-    return [] if name == "win64" else ["-fPIC"]
 
 
 def _libraries(name: str) -> list[str]:

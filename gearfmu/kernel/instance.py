@@ -7,25 +7,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel.binding import (
     CAUSALITIES,
+    MESSAGE,
     OUTCOMES,
     REFUSALS,
     TYPES,
     RecordingInfo,
     VariableInfo,
     aligned,
-    blank_message,
     load,
 )
-
-if TYPE_CHECKING:
-    from gearfmu.kernel.linear import LinearModel
+from gearfmu.kernel.linear import LinearInfo, LinearModel, linear_model, room_for
 
 PLACES = 8
 SLICES = 20
@@ -77,7 +74,7 @@ def _opened(blob: bytes, library: Path | None) -> _Opened:
     blob_keep, address = aligned(len(blob))
     ctypes.memmove(address, blob, len(blob))
     model_keep, model = aligned(kernel.gk_model_size())
-    message = blank_message()
+    message = ctypes.create_string_buffer(MESSAGE)
     if kernel.gk_model_open(model, address, len(blob), message):
         raise ModelError(message.value.decode(errors="replace"))
     return _Opened(model, (blob_keep, model_keep))
@@ -128,21 +125,10 @@ class Kernel:
         for i in range(self._lib.gk_variable_count(self._model)):
             info = VariableInfo()
             self._lib.gk_variable(self._model, i, ctypes.byref(info))
+            name, unit, description = (text.decode() for text in (info.name, info.unit, info.description))
             items = tuple(info.items.decode().split("|")) if info.items else ()
-            found.append(
-                Variable(
-                    info.reference,
-                    info.name.decode(),
-                    TYPES[info.type],
-                    CAUSALITIES[info.causality],
-                    info.unit.decode(),
-                    items,
-                    info.description.decode(),
-                    info.start,
-                    info.minimum,
-                    info.maximum,
-                )
-            )
+            kind, limits = (TYPES[info.type], CAUSALITIES[info.causality]), (info.start, info.minimum, info.maximum)
+            found.append(Variable(info.reference, name, *kind, unit, items, description, *limits))
         return found
 
     def _reference(self, name: str) -> int:
@@ -184,7 +170,7 @@ class Kernel:
     def prepare(self) -> None:
         """Fix level, effects and step. ModelError when the wished h is too large; `warning` holds what the kernel
         wants said."""
-        message = blank_message()
+        message = ctypes.create_string_buffer(MESSAGE)
         outcome = self._lib.gk_prepare(self._model, self._data, self._setup, self._work, message)
         self.warning = message.value.decode(errors="replace")
         if outcome:
@@ -198,9 +184,7 @@ class Kernel:
     def step(self, time: float, h: float) -> None:
         """One communication step from `time` over `h` (s). SimulationError with the named outcome; the state then
         stands at `self.time`."""
-        outcome = self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
-        if outcome:
-            self.check(outcome)
+        self.check(self.try_step(time, h))
 
     def try_step(self, time: float, h: float) -> int:
         """Fast path: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call
@@ -275,8 +259,6 @@ class Kernel:
     def linearise(self) -> LinearModel:
         """The stage linearised at the equilibrium that `transmission` or `initialize` found last, with the ports as the
         model has them and clutches closed. SimulationError(bad_call) once a step has been made."""
-        from gearfmu.kernel.linear import LinearInfo, linear_model, room_for
-
         info = LinearInfo()
         self.check(self._lib.gk_linearise_room(self._model, self._setup, ctypes.byref(info)))
         arrays = room_for(info)

@@ -4,38 +4,18 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_int32
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
-ARRAYS = {  # in the order of gk_linear: type, shape by the names of the counts
-    "group": (np.int32, "coordinates"),
-    "number": (np.int32, "coordinates"),
-    "mass": (np.float64, "coordinates"),
-    "omega": (np.float64, "coordinates"),
-    "zeta": (np.float64, "coordinates"),
-    "label": (np.int32, "room label"),
-    "force": (np.float64, "room"),
-    "dashpot": (np.float64, "room"),
-    "te": (np.float64, "room"),
-    "rows": (np.float64, "room coordinates"),
-    "residual": (np.float64, "room room"),
-    "own": (np.float64, "room room"),
-    "support_compliance": (np.float64, "supports"),
-    "support_rows": (np.float64, "supports coordinates"),
-    "support_forces": (np.float64, "supports room"),
-    "support_damping": (np.float64, "supports coordinates"),
-    "damper": (np.float64, "supports"),
-    "damper_rows": (np.float64, "supports coordinates"),
-}
 COUNTS = ("coordinates", "room", "supports", "engagements", "found")
 SPIN, GROUND, FIRST_GEAR = -1, 0, 1  # values of `group`
 
 
-class LinearInfo(ctypes.Structure):
-    """gk_linear."""
-
-    _fields_ = [(name, c_int32) for name in COUNTS] + [(name, ctypes.c_void_p) for name in ARRAYS]
+def _array(shape: str, kind: type = np.float64) -> Any:
+    """A field of `LinearModel` that is an array of gk_linear, in its order: shape by the names of the counts, type."""
+    return field(metadata={"array": (kind, shape.split())})
 
 
 @dataclass(frozen=True)
@@ -52,42 +32,52 @@ class LinearModel:
     elongation. engagements: of the stage.
     """
 
-    group: np.ndarray
-    number: np.ndarray
-    mass: np.ndarray
-    omega: np.ndarray
-    zeta: np.ndarray
-    label: np.ndarray
-    force: np.ndarray
-    dashpot: np.ndarray
-    te: np.ndarray
-    rows: np.ndarray
-    residual: np.ndarray
-    own: np.ndarray
-    support_compliance: np.ndarray
-    support_rows: np.ndarray
-    support_forces: np.ndarray
-    support_damping: np.ndarray
-    damper: np.ndarray
-    damper_rows: np.ndarray
     engagements: int
+    group: np.ndarray = _array("coordinates", np.int32)
+    number: np.ndarray = _array("coordinates", np.int32)
+    mass: np.ndarray = _array("coordinates")
+    omega: np.ndarray = _array("coordinates")
+    zeta: np.ndarray = _array("coordinates")
+    label: np.ndarray = _array("room label", np.int32)
+    force: np.ndarray = _array("room")
+    dashpot: np.ndarray = _array("room")
+    te: np.ndarray = _array("room")
+    rows: np.ndarray = _array("room coordinates")
+    residual: np.ndarray = _array("room room")
+    own: np.ndarray = _array("room room")
+    support_compliance: np.ndarray = _array("supports")
+    support_rows: np.ndarray = _array("supports coordinates")
+    support_forces: np.ndarray = _array("supports room")
+    support_damping: np.ndarray = _array("supports coordinates")
+    damper: np.ndarray = _array("supports")
+    damper_rows: np.ndarray = _array("supports coordinates")
+
+
+ARRAYS: dict[str, tuple[type, list[str]]] = {
+    own.name: own.metadata["array"] for own in fields(LinearModel) if own.metadata
+}
+
+
+class LinearInfo(ctypes.Structure):
+    """gk_linear."""
+
+    _fields_ = [(name, c_int32) for name in COUNTS] + [(name, ctypes.c_void_p) for name in ARRAYS]
 
 
 def room_for(info: LinearInfo) -> dict[str, np.ndarray]:
     """Zeroed arrays for the counts of `info`, which is told where they are."""
     counts = {name: getattr(info, name) for name in COUNTS} | {"label": 4}
-    arrays = {name: np.zeros([counts[c] for c in shape.split()], kind) for name, (kind, shape) in ARRAYS.items()}
-    for name, array in arrays.items():
-        setattr(info, name, array.ctypes.data)
+    arrays: dict[str, np.ndarray] = {}
+    for name, (kind, shape) in ARRAYS.items():
+        arrays[name] = np.zeros([counts[c] for c in shape], kind)
+        setattr(info, name, arrays[name].ctypes.data)
     return arrays
 
 
 def linear_model(info: LinearInfo, arrays: dict[str, np.ndarray]) -> LinearModel:
     """The model with the rows that were found, without the spins of rotors that stand."""
-    shapes = {name: shape.split() for name, (_, shape) in ARRAYS.items()}
-    cut = {name: tuple(slice(info.found if c == "room" else None) for c in shape) for name, shape in shapes.items()}
-    moves = np.isfinite(arrays["mass"])
-    found = {name: array[cut[name]] for name, array in arrays.items()}
-    for name, shape in shapes.items():
-        found[name] = np.compress(moves, found[name], axis=-1) if shape[-1] == "coordinates" else found[name].copy()
+    moves, found = np.isfinite(arrays["mass"]), {}
+    for name, (_, shape) in ARRAYS.items():
+        part = arrays[name][tuple(slice(info.found if c == "room" else None) for c in shape)]
+        found[name] = np.compress(moves, part, axis=-1) if shape[-1] == "coordinates" else part.copy()
     return LinearModel(**found, engagements=info.engagements)

@@ -1,8 +1,8 @@
 """Expected error of each effect left out, before anything is run: relative errors in the band.
 
 They choose where the search begins, and are listed beside the measured errors; only trial runs decide. An effect
-names its formula in the table of effects (`Effect.indicator`). One that names none is solved for quasi-statically:
-transmission error over a pitch with and without it, relative to its alternating part.
+without a formula in `FORMULAS` is solved for quasi-statically: transmission error over a pitch with and without it,
+relative to its alternating part.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def predicted(knob: Knob, choice: Choice, known: Conditions) -> float:
         return known.budgets(_modes(choice.level, known))
     if knob.effect is None:
         return UNKNOWN
-    if knob.effect.indicator in FORMULAS:
-        return known.budgets(FORMULAS[knob.effect.indicator](known))
+    if knob.name in FORMULAS:
+        return known.budgets(FORMULAS[knob.name](known))
     settings = {"slices": float(choice.slices)} if knob.name == SLICED else dict(knob.effect.off_setting)
     return known.budgets(_quasi_static(settings, known))
 

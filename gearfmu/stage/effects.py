@@ -9,6 +9,7 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.place import place_of
@@ -22,12 +23,10 @@ class Effect:
     """One effect. title: in words; formula and equation: what it computes, and where docs/theory.md derives it.
 
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
-    turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
-    the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
+    turn it off; off_setting: the kernel's parameters that do so, empty where the data of the stage decide; test: the
     test by hand calculation; carried: a planetary set has it, a spur pair does not; of_data: its parameter is there
     where the stage file gives it something to do; kept: why a plan (gearfmu/planning) never leaves it out, "" where the
-    error budget decides; indicator: formula in gearfmu/planning/formulas.py for the relative error without it, "" for
-    the quasi-static one that serves any effect.
+    error budget decides. -DGK_WITHOUT=<name> builds a kernel that has no code for it.
     """
 
     name: str
@@ -40,12 +39,9 @@ class Effect:
     switch: str
     test: str
     off_setting: Mapping[str, float]
-    on_setting: Mapping[str, float]
-    build: str = ""
     carried: bool = False
     of_data: bool = False
     kept: str = ""
-    indicator: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,19 +67,14 @@ class Cost:
 DISSIPATION = "it dissipates: no short window shows slow growth without it"
 
 
-def _switched(name: str, test: str = "", carried: bool = False, of_data: bool = False, **words: str) -> Effect:
+def _switched(name: str, **others: Any) -> Effect:
     """An effect with a boolean parameter of its own, effect.<name>."""
     variable = f"effect.{name}"
     return Effect(
         name=name,
         switch=f"variable `{variable}`; in a scene `[stage.effects] {name} = false`; `--set {variable}=false`",
         off_setting={variable: 0.0},
-        on_setting={variable: 1.0},
-        build=name,
-        test=test or f"tests/stage/test_effects.py::test_{name}",
-        carried=carried,
-        of_data=of_data,
-        **words,
+        **{"test": f"tests/stage/test_effects.py::test_{name}"} | others,
     )
 
 
@@ -111,10 +102,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
         off_setting={"level": 0.0},
-        on_setting={"level": 1.0},
-        build="modes",
         test="tests/stage/test_effects.py::test_modes",
-        indicator="modes",
     ),
     Effect(
         name="residual",
@@ -126,8 +114,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
         switch="level `paper` alone",
         off_setting={"level": 4.0, "integrator": 1.0},
-        on_setting={"level": 3.0, "integrator": 1.0},
-        build="residual",
         test="tests/stage/test_effects.py::test_residual",
         kept="it is a static part of the stiffness",
     ),
@@ -150,8 +136,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_strips.c, gk_row_contact.c (gk_row_contact_list)",
         switch="parameter `slices` (1 … 20); `[contact] slices` in stage.toml, `[stage] slices` in a scene",
         off_setting={"slices": 1.0},
-        on_setting={"slices": 5.0},
-        build="slices",
         test="tests/stage/test_effects.py::test_slices",
     ),
     _switched(
@@ -163,7 +147,6 @@ EFFECTS: tuple[Effect, ...] = (
         matters="rattle, reversal, engagement, every start; not where drive flanks stay closed",
         off="teeth pass through the backlash",
         code="gk_flank.c (gk_flank_find), gk_kinematics.c (gk_kinematics_carrying)",
-        indicator="coast_flank",
     ),
     _switched(
         "contact_damping",
@@ -249,8 +232,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_flank.c (misplace)",
         switch="data of the stage: `gears.X.index_deviation` in stage.toml",
         off_setting={},
-        on_setting={},
-        build="pitch_errors",
         test="tests/stage/test_pitch_errors.py::test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh",
     ),
     _switched(
@@ -285,7 +266,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_frame.c (gk_frame_turn)",
         test="tests/stage/test_planetary_theory.py::test_a_sun_in_free_flight_moves_straight_on",
         carried=True,
-        indicator="coriolis",
     ),
     _switched(
         "centrifugal",
@@ -297,7 +277,6 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
         test="tests/stage/test_planetary_motion.py::test_pins_hold_the_planets_against_their_centrifugal_load",
         carried=True,
-        indicator="centrifugal",
     ),
     _switched(
         "gyroscopic",
@@ -311,7 +290,6 @@ EFFECTS: tuple[Effect, ...] = (
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_predict)",
         test="tests/kernel/test_gyroscopic.py::test_a_kicked_pair_whirls_as_its_linear_system",
-        indicator="gyroscopic",
     ),
     _switched(
         "friction",

@@ -22,7 +22,7 @@ KINDS = {
     "deep groove": Rolling((Row(DEEP),)),
     "angular": Rolling((Row(ANGULAR),)),
     "mirrored, beside the centre": Rolling((Row(ANGULAR, 20e-3, -1, 5e-6),)),
-    "two in O arrangement": Rolling((Row(ANGULAR, -30e-3, 1, 8e-6), Row(ANGULAR, 30e-3, -1, 8e-6))).spread(4),
+    "two in O arrangement": Rolling((Row(ANGULAR, -30e-3, 1, 8e-6), Row(ANGULAR, 30e-3, -1, 8e-6)), 4),
     "roller": Rolling((Row(ROLLERS),)),
     "taper": Rolling((Row(TAPER),)),
 }
@@ -103,26 +103,26 @@ def test_integrals_of_load_distribution(epsilon: float) -> None:
     alpha, most, turned = ANGULAR.contact_angle, 1e-9, 2 * epsilon - 1
     across = most / math.cos(alpha) / (1 + turned)
     d = load(across, 0, turned * across / math.tan(alpha))
-    bearing = row(ANGULAR).spread(200)
+    bearing = replace(row(ANGULAR), positions=200)
     force, largest = bearing.force(d), bearing.loads(d).max() * ANGULAR.count
     assert force[0] / largest / math.cos(alpha) == pytest.approx(radial, abs=1e-4)
     assert force[2] / largest / math.sin(alpha) == pytest.approx(axial, abs=1e-4)
     taper, alpha = Straight(17, 8e-3, 46e-3, 10e-3, 0.0, math.radians(20.0)), math.radians(20.0)
     across = 1e-5 / (1 + turned)
-    bearing, d = row(taper).spread(200), load(across, 0, turned * across / math.tan(alpha))
+    bearing, d = replace(row(taper), positions=200), load(across, 0, turned * across / math.tan(alpha))
     force, largest = bearing.force(d), bearing.loads(d).max() * taper.count
     assert force[0] / largest / math.cos(alpha) == pytest.approx(of_line, abs=1e-4)
     assert force[2] / largest / math.sin(alpha) == pytest.approx(along_line, abs=1e-4)
-    line = row(Straight(12, 8e-3, 46e-3, 10e-3, -2 * turned * across)).spread(200)
+    line = replace(row(Straight(12, 8e-3, 46e-3, 10e-3, -2 * turned * across)), positions=200)
     d = load(across)
     assert line.force(d)[0] / line.loads(d).max() / 12 == pytest.approx(of_line, abs=1e-4)
 
 
 def test_largest_load_without_clearance() -> None:
     """4.37 F/Z of balls, 4.08 F/Z of rollers (NSK, cat. E728g, eqs. 4 and 5), to the digits that are printed."""
-    balls = row(replace(DEEP, clearance=0.0)).spread(64)
+    balls = replace(row(replace(DEEP, clearance=0.0)), positions=64)
     assert rest(balls, load(300)).loads.max() * DEEP.count / 300 == pytest.approx(4.37, abs=5e-3)
-    rollers = row(Straight(13, 8e-3, 46e-3, 10e-3)).spread(64)
+    rollers = replace(row(Straight(13, 8e-3, 46e-3, 10e-3)), positions=64)
     assert rest(rollers, load(3000)).loads.max() * 13 / 3000 == pytest.approx(4.08, abs=5e-3)
 
 
@@ -175,7 +175,7 @@ def test_load_and_displacement_turn_together(law: Balls | Rollers) -> None:
         plane = np.array([[c, -s], [s, c]])
         whole = np.zeros((5, 5))
         whole[:2, :2], whole[2, 2], whole[3:, 3:] = plane, 1.0, plane
-        bearing = row(law).spread(positions)
+        bearing = replace(row(law), positions=positions)
         one, other = (rest(bearing, of).displacement for of in (force, whole @ force))
         assert other == pytest.approx(whole @ one, rel=1e-7, abs=1e-13)
 

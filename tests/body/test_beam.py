@@ -40,7 +40,7 @@ def statics(body, held, force):
 def simply_supported(shaft, load_at, bending):
     """Deflection under a unit load between supports at both ends of the shaft, by the unit-load integral of bending and
     shear."""
-    length, r = shaft.length, (shaft.length - load_at) / shaft.length
+    length, r = shaft.steps[-1], (shaft.steps[-1] - load_at) / shaft.steps[-1]
     total, start = 0.0, 0.0
     for section in shaft.sections:
         cuts = sorted({start, start + section.length, min(max(load_at, start), start + section.length)})

@@ -1,5 +1,5 @@
 """The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once,
-and the same verdict as the Python reader on random damage."""
+and the same verdict as the rules in Python on random damage."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import struct
 
 import numpy as np
 import pytest
+from checked_blob import checked_blob
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mutations import mutated
 from probes import Probes
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.assembly.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, read_blob, seal, write_blob
+from gearfmu.stage.assembly.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, seal, write_blob
 
 BAD_BLOB = 1
 SAMPLE = {
@@ -104,7 +105,15 @@ def test_each_rule(probes: Probes, damage: bytes, words: str) -> None:
     outcome, message, _, sections = probes.blob_open(damage)
     assert outcome == BAD_BLOB and words in message and sections == 0
     with pytest.raises(ModelError, match=words.replace("kernel", "package").replace("(", r"\(")):
-        read_blob(damage)
+        checked_blob(damage)
+
+
+def test_every_changed_byte_and_every_other_length_is_noticed(probes: Probes) -> None:
+    changed = [BLOB[:i] + bytes([BLOB[i] ^ 0x40]) + BLOB[i + 1 :] for i in range(len(BLOB))]
+    for damage in (*changed, *(BLOB[:i] for i in range(len(BLOB))), BLOB + b"\0"):
+        assert probes.blob_open(damage)[0] == BAD_BLOB
+        with pytest.raises(ModelError):
+            checked_blob(damage)
 
 
 def test_a_section_that_repeats_another_has_its_contents(probes: Probes) -> None:
@@ -131,7 +140,7 @@ def test_what_repeats_no_earlier_section_is_refused(probes: Probes, place: int, 
     outcome, message, _, _ = probes.blob_open(damage)
     assert outcome == BAD_BLOB and "does not repeat an earlier one" in message
     with pytest.raises(ModelError, match="does not repeat an earlier one"):
-        read_blob(damage)
+        checked_blob(damage)
 
 
 @settings(max_examples=300)
@@ -166,7 +175,7 @@ def test_kernel_and_python_agree_on_random_damage(probes: Probes, blob: bytes) -
     for _ in range(3000):
         damage = mutated(blob, rng)
         try:
-            read_blob(damage)
+            checked_blob(damage)
             expected = 0
         except ModelError:
             expected = BAD_BLOB

@@ -11,7 +11,7 @@ import pytest
 from inner import Inner, Place
 from small_model import BASE, PSI, TEETH, TIP, WORKING, _coast_shift, pair_blob
 
-from gearfmu.stage.assembly.blob import change_gear, read_blob, write_blob
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, gear_numbers, read_blob, write_blob
 
 REFERENCE = json.loads((Path(__file__).parent.parent / "reference" / "hertz_line.json").read_text())
 DRIVE, COAST = 0, 1
@@ -168,9 +168,9 @@ def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(
     sections = read_blob(pair_blob())
     for g in (0, 1):
         local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"])
-        sections[f"gear{g}"] = change_gear(
-            sections[f"gear{g}"], local=local, face_width=case["L"], strip_half_width=1e-3
-        )
+        own = dict(zip(GEAR_NUMBERS, sections[f"gear{g}"], strict=True))
+        own |= {"local": local, "face_width": case["L"], "strip_half_width": 1e-3}
+        sections[f"gear{g}"] = gear_numbers(own)
     inner = Inner(inner_library, write_blob(sections), {"slices": 1})
     curvature = 1 / case["R1"] + 1 / case["R2"]
     local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"] * case["L"])

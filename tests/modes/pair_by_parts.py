@@ -13,7 +13,7 @@ from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import Body
 from gearfmu.kernel import Kernel
-from gearfmu.stage.assembly.teeth import excited_modes, resampling, symmetric_functions
+from gearfmu.stage.assembly.teeth import excited_modes, resampling
 from gearfmu.stagefile.forms.general import Stage
 
 DRIVE, BORE = 0, (0, 1, 5)  # flank; directions of the bore: x, y and spin
@@ -61,8 +61,8 @@ class Gear:
 def gear_at(spec: Stage, bodies: Sequence[Body], index: int, position: float, contacts: Sequence[Contact]) -> Gear:
     pair, body = spec.written.geometry, bodies[index]
     shape, side = pair.gears[index], (1.0, -1.0)[index]
-    degrees = symmetric_functions(min(b.flank.width_functions for b in bodies))
-    chosen = excited_modes(body, degrees)
+    degrees = np.arange(0, min(b.flank.width_functions for b in bodies), 2)
+    chosen = excited_modes(body, degrees, even=True)
     angle = (0.0, pair.wheel_phase)[index] + side * 2 * math.pi * position / shape.z
     direction = math.pi / 2 - pair.alpha_wt - angle  # of the line of action in the body's frame
     rigid = np.array([side * math.cos(direction), side * math.sin(direction), shape.r_b])

@@ -162,7 +162,7 @@ def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:
         Steel(m.youngs_modulus, m.poisson_ratio, m.density),
         [place - origin for place in places],
     )
-    ends = beam.ends(beam.length / FINE)
+    ends = beam.ends(beam.steps[-1] / FINE)
     planes = [bending_matrices(beam, ends)] * 2 + [rod_matrices(beam, ends, turning) for turning in (False, True)]
     stiffness, mass = (sl.block_diag(*[plane[i] for plane in planes]) for i in (0, 1))
     starts = np.cumsum([0, *(len(plane[0]) for plane in planes)])

@@ -140,7 +140,7 @@ def planet_in_ring() -> tuple[tuple[Shape, Shape], tuple[float, float], RingMesh
         z=10, m=ring.m, alpha=ring.alpha, x=0.0, beta=BETA, r_a=0.015, r_bore=0.004, tip_edge=1e-4,
         h_fp=1.25 * ring.m, rho_fp=0.3 * ring.m,
     )  # fmt: skip
-    mesh = RingMesh(planet, ring, ring.r - planet.r + 1e-4, 0.0)
+    mesh = RingMesh((planet, ring), ring.r - planet.r + 1e-4, 0.0)
     return (planet, ring), (0.0, mesh.ring_phase(0.0, 0.0)), mesh
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flank_reader import full_tables
+from flank_rows import flank_rows, flank_supports
 
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble
@@ -39,7 +40,7 @@ def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
             sections |= residual_sections(g, of_points.residual, sections["degrees"])
             sections[f"size{g}"][SIZES.index("mirrored")] = 0
         found, read = full_tables(sections, g, ROLLS, number=1), sections[f"ground_list{g}_1"]
-        want = (flank.turning, group.flank_rows(g)[..., read], group.flank_supports(g), flank.residual)
+        want = (flank.turning, flank_rows(group, g)[..., read], flank_supports(group, g), flank.residual)
         have = (found.rows, found.ground, found.supports, found.residual)
         errors = [np.abs(a - b).max() / np.abs(b).max() for a, b in zip(have, want, strict=True)]
         print(f"gear {g}, mirrored {mirrored}:", " ".join(f"{error:.1e}" for error in errors))

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from checked_blob import checked_blob
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
 from evidence.sources import rounded_hash
 from gearfmu.errors import ModelError
-from gearfmu.stage.assembly.blob import ENTRY, read_blob, seal, write_blob
+from gearfmu.stage.assembly.blob import ENTRY, read_blob, write_blob
 
 SAMPLE = {
     "name": "fzg_c µm",
@@ -37,8 +38,9 @@ values = st.one_of(
 @given(st.dictionaries(names, values, max_size=8))
 def test_what_is_written_is_read_back(sections: dict) -> None:
     blob = write_blob(sections)
-    back = read_blob(blob)
+    back = checked_blob(blob)
     assert list(back) == list(sections)
+    assert str(read_blob(blob)) == str(back)
     for name, value in sections.items():
         if isinstance(value, str):
             assert back[name] == value
@@ -78,26 +80,6 @@ def test_all_problems_of_a_write_at_once() -> None:
         "'nul': text contains NUL",
     ):
         assert part in str(caught.value)
-
-
-def test_every_changed_byte_is_noticed() -> None:
-    blob = write_blob(SAMPLE)
-    for i in range(len(blob)):
-        with pytest.raises(ModelError):
-            read_blob(blob[:i] + bytes([blob[i] ^ 0x40]) + blob[i + 1 :])
-
-
-def test_every_length_but_the_right_one_is_refused() -> None:
-    blob = write_blob(SAMPLE)
-    for length in (*range(len(blob)), len(blob) + 1):
-        with pytest.raises(ModelError):
-            read_blob((blob + b"\0")[:length])
-
-
-def test_another_version_names_the_remedy() -> None:
-    blob = write_blob(SAMPLE)
-    with pytest.raises(ModelError, match="version 9, this package reads version 2: assemble the stage again"):
-        read_blob(seal(blob[:4] + b"\x09\0\0\0" + blob[8:]))
 
 
 def test_a_rounded_hash_sees_what_a_stage_changes_and_no_rounding() -> None:

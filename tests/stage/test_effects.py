@@ -319,7 +319,7 @@ def test_the_table_has_every_switch_of_the_kernel(plain: StageModel) -> None:
 def test_builds_leave_out_the_effects_of_the_kernels_table() -> None:
     table = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_effects.inc").read_text(encoding="utf-8")
     names = re.findall(r"^GK_(?:EFFECT|PART)\((\w+)", table, re.MULTILINE)
-    assert sorted(names) == sorted(effect.build for effect in EFFECTS)
+    assert sorted(names) == sorted(effect.name for effect in EFFECTS)
 
 
 def test_what_is_off_costs_nothing() -> None:

@@ -10,25 +10,25 @@ import numpy as np
 import pytest
 
 from gearfmu.stage import StageModel, simulate
-from gearfmu.stage.assembly.blob import ENGAGEMENT_NUMBERS, GEAR_NUMBERS, change_gear, read_blob, write_blob
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob, write_blob
 
 H, DURATION = 60e-6, 4e-3
 GEARS = (0, 1)
+ENGAGEMENT_NUMBERS = ("x_a", "y_a", "x_b", "y_b", "backlash", "nominal_backlash", "damping")  # the first ones
 Sections = dict[str, np.ndarray]
 
 
 def of_gears(name: str, factor: float) -> Callable[[Sections], None]:
     def change(sections: Sections) -> None:
         for g in GEARS:
-            value = factor * sections[f"gear{g}"][GEAR_NUMBERS.index(name)]
-            sections[f"gear{g}"] = change_gear(sections[f"gear{g}"], **{name: value})
+            sections[f"gear{g}"][GEAR_NUMBERS.index(name)] *= factor
 
     return change
 
 
 def of_pair(name: str, factor: float) -> Callable[[Sections], None]:
     def change(sections: Sections) -> None:
-        sections["engagement"].reshape(-1, len(ENGAGEMENT_NUMBERS))[0, ENGAGEMENT_NUMBERS.index(name)] *= factor
+        sections["engagement"][ENGAGEMENT_NUMBERS.index(name)] *= factor
 
     return change
 

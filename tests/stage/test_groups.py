@@ -7,12 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from flank_rows import flank_rows, flank_supports
 from scipy.optimize import brentq
 
 from gearfmu.stage.assembly.ground_part import read_tables
 from gearfmu.stage.assembly.groups import SPIN, mount
 from gearfmu.stage.assembly.layout import stage_layout
-from gearfmu.stage.assembly.teeth import OFFSETS, blend, resampling, symmetric_functions
+from gearfmu.stage.assembly.teeth import OFFSETS, blend, resampling
 
 LOADS = [
     (0, 0, 5, 0),
@@ -63,7 +64,7 @@ class Direct:
 
     def __init__(self, body, shape, loads, angle, compliance):
         self.angle = angle
-        degrees = symmetric_functions(5)
+        degrees = np.arange(0, 5, 2)
         grid = resampling(body.flank.roll, shape.s_form, shape.s_tip)
         step = 2 * np.pi / body.flank.teeth
         static = blend(grid, blend(grid, body.flank.static[..., degrees, :][..., degrees], 3), 4)
@@ -98,7 +99,7 @@ class Grouped:
 
     def __init__(self, body, shape, group, index, loads, angle):
         step, flank = 2 * np.pi / body.flank.teeth, group.layout.bodies[index].flank
-        rows, supports = group.flank_rows(index), group.flank_supports(index)
+        rows, supports = flank_rows(group, index), flank_supports(group, index)
         node, n = flank.node[0], len(loads)
         self.w, c_s, c_p = [], [], []
         for j, f, p, a in loads:

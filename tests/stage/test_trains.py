@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.linalg as sl
+from flank_rows import flank_rows, flank_supports
 from handmade import on_axis
 
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
@@ -54,7 +55,7 @@ def train_by_elements():
     mesh's row."""
     stiffness, mass, where, start = [], [], {}, 0
     for s, shaft in enumerate(SHAFTS):
-        ends = shaft.ends(shaft.length / 12)
+        ends = shaft.ends(shaft.steps[-1] / 12)
         planes = [bending_matrices(shaft, ends)] * 2 + [rod_matrices(shaft, ends, turning) for turning in (True, False)]
         for (k, m), names in zip(planes, ((0, 4), (1, 3), (5,), (2,)), strict=True):
             stiffness.append(k)
@@ -173,7 +174,7 @@ def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair
     rigid = np.array([load_rows(shape, body, load, angle + load[0] * step) for load in LOADS])
     c_ll = np.zeros((len(LOADS), len(LOADS)))
     c_ln, e, c_fs, residual = np.zeros((len(LOADS), 6)), [], [], np.zeros_like(c_ll)
-    rows, to_supports = group.flank_rows(1), group.flank_supports(1)
+    rows, to_supports = flank_rows(group, 1), flank_supports(group, 1)
     for i, (j, f, p, a) in enumerate(LOADS):
         e.append(read_tables(rows[:, f, p, a], angle + j * step))
         c_fs.append(read_tables(to_supports[:, f, p, a], angle + j * step))

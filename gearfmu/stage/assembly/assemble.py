@@ -17,7 +17,7 @@ from gearfmu.stage.assembly.blob import order_sections, origin, with_guid, write
 from gearfmu.stage.assembly.compact import far_sections, flank_tables, ground_tables, is_mirrored, smeared, smeared_tip
 from gearfmu.stage.assembly.ground_part import PartFlank, turn_rates, whirl_rows
 from gearfmu.stage.assembly.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
-from gearfmu.stage.assembly.housed import Sensed, sensor_sections, widened
+from gearfmu.stage.assembly.housed import sensor_sections, widened
 from gearfmu.stage.assembly.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.assembly.levels import FAST, RIGID, SHARED_BELOW, STANDARD
 from gearfmu.stage.assembly.meshes import film_starts, friction_starts, nodal_sections, stage_sections, tooth_phases
@@ -38,12 +38,7 @@ PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
 
-def assemble(
-    stage: Stage,
-    bodies: Sequence[Body],
-    rolls: int = ROLLS,
-    observe: Sequence[str] = (),
-) -> StageModel:
+def assemble(stage: Stage, bodies: Sequence[Body], rolls: int = ROLLS, observe: Sequence[str] = ()) -> StageModel:
     """The general model of a stage. bodies: reduced, in the order of `stage.files`; rolls: of the even grid along a
     flank; observe: names of gears whose rigid motion and modal amplitudes are outputs.
 
@@ -115,8 +110,8 @@ def general_sections(
     for s, group in enumerate(groups):
         found = set_sections(s, group, nodes)
         sections |= widened(found, s, len(layout.support_names())) if stage.housings else found
-    if stage.housings:
-        sections |= sensor_sections(_sensed(stage, carriers, layout), groups[0])
+    for housing in stage.housings:
+        sections |= sensor_sections(carriers[housing.name].sensors, groups[0])
     lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
@@ -207,14 +202,6 @@ def mount_sets(layout: Layout, bare: Layout | None = None) -> list[Group]:
     return groups + ([] if bare is None else [mount(bare)])
 
 
-def _sensed(stage: Stage, carriers: Mapping[str, Body], layout: Layout) -> Sensed | None:
-    for housing in stage.housings:
-        if (sensors := carriers[housing.name].sensors) is not None:
-            body = len(layout.bodies) - 1
-            return Sensed(body, len(layout.bodies[body].nodes) - len(sensors.names), sensors.names)
-    return None
-
-
 def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Kinds, numbers and static compliances of the ports, in the order of the stage."""
     rotors = list(stage.rotors)
@@ -259,12 +246,7 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
 
 
 def _gear_sections(
-    stage: Stage,
-    index: int,
-    body: Body,
-    groups: Sequence[Group],
-    nodes: Sequence[tuple[int, int]],
-    degrees: np.ndarray,
+    stage: Stage, index: int, body: Body, groups: Sequence[Group], nodes: Sequence[tuple[int, int]], degrees: np.ndarray
 ) -> dict[str, Any]:
     """Sections of gear `index`, of its scope and in every set of ground oscillators."""
     flank = groups[0].layout.bodies[index].flank

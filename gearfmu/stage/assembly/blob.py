@@ -1,8 +1,8 @@
 """The model blob: named constant arrays in one checked block of bytes, read in place by the kernel (layout:
 docs/file-formats.md, "Model blob").
 
-The rules of the bytes are checked here and in gearfmu/kernel/src/base/gk_blob.c; one content has exactly one sequence
-of bytes. Which arrays a model holds says the table gearfmu/kernel/src/model/gk_fields.inc: it is read here, gives their
+The rules of the bytes are checked in gearfmu/kernel/src/base/gk_blob.c; one content has exactly one sequence of bytes.
+Which arrays a model holds says the table gearfmu/kernel/src/model/gk_fields.inc: it is read here, gives their
 order, and finds those that are missing or of a wrong shape."""
 
 from __future__ import annotations
@@ -92,30 +92,13 @@ def origin(*what: object) -> str:
 
 
 def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:
-    """Sections of a blob: one-dimensional read-only arrays (float64, float32, int32) and text, in stored order.
-
-    Raises ModelError at the first rule that is broken: nothing after it can be trusted.
-    """
-    count = _check_header(blob)
+    """Sections of a blob that `write_blob` made or the kernel has opened, which checks the bytes: one-dimensional
+    read-only arrays (float64, float32, int32) and text, in stored order."""
     sections: dict[str, np.ndarray | str] = {}
-    end = HEADER.size + count * ENTRY.size
-    entries = [_entry(blob, i) for i in range(count)]
-    for i, (name, kind, repeated, size, offset) in enumerate(entries):
-        if name in sections:
-            raise ModelError(f"model blob: section '{name}' is there twice")
-        if repeated:
-            first = entries[repeated - 1] if repeated <= i else None
-            if first is None or first[1:] != (kind, 0, size, offset):
-                raise ModelError(f"model blob: section '{name}' does not repeat an earlier one")
-        else:
-            if offset != _aligned(end):
-                raise ModelError(f"model blob: section '{name}' does not begin where the one before it ends")
-            end = offset + size * DTYPE[kind].itemsize
-            if end > len(blob):
-                raise ModelError(f"model blob: section '{name}' reaches beyond the end")
-        sections[name] = _decode(name, kind, np.frombuffer(blob, DTYPE[kind], size, offset))
-    if _aligned(end) != len(blob):
-        raise ModelError(f"model blob: sections end at {end}, the blob at {len(blob)}")
+    for i in range(HEADER.unpack_from(blob)[4]):
+        name, kind, _, size, offset = ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)
+        values = np.frombuffer(blob, DTYPE[kind], size, offset)
+        sections[name.rstrip(b"\0").decode()] = values.tobytes()[:-1].decode() if kind == TEXT else values
     return sections
 
 
@@ -153,56 +136,6 @@ def _encode_text(name: str, value: str, problems: list[str]) -> np.ndarray:
     return np.frombuffer(data + b"\0", DTYPE[TEXT])
 
 
-def _decode(name: str, kind: int, values: np.ndarray) -> np.ndarray | str:
-    if kind in (F64, F32) and not np.all(np.isfinite(values)):
-        raise ModelError(f"model blob: section '{name}' holds a value that is not finite")
-    if kind != TEXT:
-        return values
-    data = values.tobytes()
-    try:
-        text = data.decode()
-    except UnicodeDecodeError:
-        text = ""
-    if text.find("\0") != len(text) - 1 or not text:
-        raise ModelError(f"model blob: section '{name}' is not UTF-8 text that ends with NUL")
-    return text[:-1]
-
-
-def _check_header(blob: bytes) -> int:
-    """Number of sections of a blob whose header and hash are right."""
-    if len(blob) < HEADER.size:
-        raise ModelError(f"model blob: {len(blob)} bytes are too few for a header of {HEADER.size}")
-    magic, version, digest, size, count = HEADER.unpack_from(blob)
-    if magic != MAGIC:
-        raise ModelError("model blob: does not begin with GFMB, this is not a gearfmu model")
-    if version != FORMAT:
-        raise ModelError(
-            f"model blob: format version {version}, this package reads version {FORMAT}: assemble the stage again"
-        )
-    if size != len(blob):
-        raise ModelError(
-            f"model blob: header says {size} bytes, there are {len(blob)}: the blob is cut short or padded"
-        )
-    if count > MOST_SECTIONS or HEADER.size + count * ENTRY.size > size:
-        raise ModelError(f"model blob: {count} sections do not fit")
-    if any(blob[52 : HEADER.size]):
-        raise ModelError("model blob: reserved bytes of the header are not zero")
-    if digest != hashlib.sha256(blob[HASHED_FROM:]).digest():
-        raise ModelError("model blob: contents do not match their SHA-256, the blob is damaged")
-    return count
-
-
-def _entry(blob: bytes, i: int) -> tuple[str, int, int, int, int]:
-    """Name, type, 1 + number of the section it repeats or 0, number of elements and offset of section i."""
-    raw, kind, repeated, size, offset = ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)
-    name = raw.rstrip(b"\0").decode("latin-1")
-    if not _name_is_good(name):
-        raise ModelError(f"model blob: the name of section {i} is not 1 to {LONGEST_NAME} printable characters")
-    if kind not in DTYPE:
-        raise ModelError(f"model blob: section '{name}' is of unknown type {kind}")
-    return name, kind, repeated, size, offset
-
-
 def _name_is_good(name: str) -> bool:
     return 0 < len(name) <= LONGEST_NAME and all(" " < c <= "~" for c in name)
 
@@ -217,18 +150,7 @@ def _pad(contents: bytearray, start: int) -> None:
 
 
 TABLE = Path(__file__).parents[2] / "kernel" / "src" / "model" / "gk_fields.inc"
-COUNTS = (
-    "version",
-    "slices",
-    "rotors",
-    "gears",
-    "engagements",
-    "ports",
-    "supports",
-    "functions",
-    "rolls",
-    "sets",
-)
+COUNTS = ("version", "slices", "rotors", "gears", "engagements", "ports", "supports", "functions", "rolls", "sets")
 SIZES = ("rotor", "z", "modes", "reads", "both_flanks", "points", "low", "mirrored")
 FLANK_SIZES = ("flank_teeth", "flank_places", "flank_rolls")
 GEAR_NUMBERS = (
@@ -247,18 +169,6 @@ GEAR_NUMBERS = (
     "corner_angle",
     "z_mid",
     "helix",
-)
-ENGAGEMENT_NUMBERS = (
-    "x_a",
-    "y_a",
-    "x_b",
-    "y_b",
-    "backlash",
-    "nominal_backlash",
-    "damping",
-    "force_max",
-    "tilt_x",
-    "tilt_y",
 )
 _LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}
@@ -282,11 +192,6 @@ def gear_numbers(values: Mapping[str, float]) -> np.ndarray:
     """The section "gear" of GEAR_NUMBERS by name."""
     assert set(values) == set(GEAR_NUMBERS), set(values) ^ set(GEAR_NUMBERS)
     return np.array([float(values[name]) for name in GEAR_NUMBERS])
-
-
-def change_gear(section: np.ndarray, **values: float) -> np.ndarray:
-    """The section "gear" with some of GEAR_NUMBERS changed."""
-    return gear_numbers(dict(zip(GEAR_NUMBERS, section, strict=True)) | values)
 
 
 @cache

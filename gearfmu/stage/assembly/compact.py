@@ -26,9 +26,9 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from scipy.linalg import eigh
 
-from gearfmu.stage.assembly.ground_part import PartFlank, products, read_tables, turn_tables
+from gearfmu.stage.assembly.ground_part import PartFlank, read_tables, turn_tables
 from gearfmu.stage.assembly.groups import Group, node_directions
-from gearfmu.stage.assembly.teeth import OFFSETS, blend
+from gearfmu.stage.assembly.teeth import OFFSETS, blend, products
 from gearfmu.stagefile.forms.general import RingBody
 from gearfmu.stagefile.forms.shapes import GearShape
 from gearfmu.stagefile.tables.bodies import GearSpec

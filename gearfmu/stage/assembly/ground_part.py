@@ -33,7 +33,7 @@ import scipy.linalg as sl
 from gearfmu.body.body import Body, Flank, Node
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.levels import lowest_levels
-from gearfmu.stage.assembly.teeth import OFFSETS, blend
+from gearfmu.stage.assembly.teeth import OFFSETS, blend, products
 from gearfmu.stagefile.tables.connections import LevelSpec
 
 if TYPE_CHECKING:
@@ -246,15 +246,6 @@ def _check_node(body: Body, turning: np.ndarray) -> None:
             f"body '{body.name}': modes of nodal diameter 2 and more move its bore, so it is no ring of equal sectors; "
             "reduce it again, an imported gear with equal sectors"
         )
-
-
-def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """left (…, n) · right (m, n)ᵀ, summed in one order whatever the memory (`blend`)."""
-    total = np.zeros((*left.shape[:-1], right.shape[0]))
-    part = np.empty_like(total)
-    for k in range(right.shape[1]):
-        total += np.multiply(left[..., k, None], right[:, k], out=part)
-    return total
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:

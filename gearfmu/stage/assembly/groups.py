@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sl
@@ -31,6 +32,7 @@ from scipy.sparse.csgraph import connected_components
 
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.ground_part import GroundPart
+from gearfmu.stage.assembly.teeth import products
 
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -177,19 +179,6 @@ class Group:
         rows[freedoms] = self.shapes[self.at[body]][: len(freedoms)]
         return rows
 
-    def flank_rows(self, body: int) -> np.ndarray:
-        """(3, 2, P, A, n): e, as c₀, c_c, c_s."""
-        flank, freedoms = self.layout.bodies[body].flank, self.layout.freedoms(body)
-        assert flank is not None
-        elastic = self.shapes[self.at[body]][len(freedoms) :]
-        return _times(flank.patterns, elastic) - _times(self.flank_supports(body) @ self.kappa, self.support_rows)
-
-    def flank_supports(self, body: int) -> np.ndarray:
-        """(3, 2, P, A, s): C_fs."""
-        flank = self.layout.bodies[body].flank
-        assert flank is not None
-        return _times(flank.node, node_directions(self.layout, body).T)
-
     def node_rows(self, body: int, node: int, direction: int) -> np.ndarray:
         """(n,): motion of a node, less the spin."""
         raw = _node_row(self.layout, body, node, direction)
@@ -218,7 +207,7 @@ def mount(layout: Layout) -> Group:
     squared, shapes, owner = _eigenproblem(layout, at, rows.T @ kappa @ rows + np.diag(omega_zeta[0] ** 2), mass)
     omega = np.sqrt(squared)
     loss = (omega_zeta[0] * omega_zeta[1]) @ shapes**2
-    support_rows = _times(rows, shapes)
+    support_rows = products(rows, shapes.T)
     return Group(
         layout=layout,
         omega=omega,
@@ -228,7 +217,7 @@ def mount(layout: Layout) -> Group:
         kappa=kappa,
         support_rows=support_rows,
         support_compliance=own,
-        damper_rows=_times(own @ kappa, support_rows),
+        damper_rows=products(own @ kappa, support_rows.T),
         damper=np.concatenate([s.damping for s in layout.supports]),
         at=at,
         owner=owner,
@@ -356,25 +345,21 @@ def _clean(matrix: np.ndarray) -> np.ndarray:
     return np.where(np.abs(matrix) > UNCOUPLED * np.outer(scale, scale), matrix, 0.0)
 
 
+def _clusters(values: np.ndarray) -> list[slice]:
+    """Runs of ascending values that are equal but for rounding."""
+    ends = [i for i in range(1, len(values)) if values[i] - values[i - 1] > EQUAL * abs(values[i])]
+    return [slice(a, b) for a, b in pairwise([0, *ends, len(values)])]
+
+
 def _level(values: np.ndarray) -> np.ndarray:
     """Ascending values with those of a cluster made equal, so that their order does not depend on rounding."""
-    result, start = values.copy(), 0
-    for i in range(1, len(values) + 1):
-        if i == len(values) or values[i] - values[i - 1] > EQUAL * abs(values[i]):
-            result[start:i] = values[start:i].mean()
-            start = i
-    return result
+    return np.concatenate([np.full(values[own].size, values[own].mean()) for own in _clusters(values)])
 
 
 def _turn_clusters(squared: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """The same eigenvectors (n, k), those of one value turned so that they are reproducible: each zero in the unknown
     that leads another of the cluster, and positive in its own."""
-    result, start = vectors.copy(), 0
-    for i in range(1, len(squared) + 1):
-        if i == len(squared) or squared[i] - squared[i - 1] > EQUAL * abs(squared[i]):
-            result[:, start:i] = _turn_cluster(vectors[:, start:i])
-            start = i
-    return result
+    return np.hstack([_turn_cluster(vectors[:, own]) for own in _clusters(squared)])
 
 
 def _turn_cluster(vectors: np.ndarray) -> np.ndarray:
@@ -387,13 +372,3 @@ def _turn_cluster(vectors: np.ndarray) -> np.ndarray:
         result.append(left[:, 0] * np.sign(left[lead, 0]))
         left = left[:, 1:]
     return np.stack(result, axis=1)
-
-
-def _times(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """left (…, m) · right (m, n), summed in one order whatever the memory: equal inputs must give an equal blob."""
-    total = np.zeros((*left.shape[:-1], right.shape[1]))
-    for k in range(right.shape[0]):
-        column = left[..., k, None]
-        if np.any(column):
-            total += column * right[k]
-    return total

@@ -116,24 +116,18 @@ def _with_sensors(part: GroundPart, sensors: Sensors, arms: np.ndarray) -> Groun
     )
 
 
-@dataclass(frozen=True)
-class Sensed:
-    """Sensors of a layout: number of the housing among its bodies, of its first sensor among its nodes, and names."""
-
-    body: int
-    first: int
-    names: tuple[str, ...]
-
-
-def sensor_sections(sensed: Sensed | None, group: Group) -> dict[str, object]:
-    """Sections of the blob that make sensors outputs; of the first set of ground oscillators."""
-    if sensed is None:
+def sensor_sections(sensors: Sensors | None, group: Group) -> dict[str, object]:
+    """Sections of the blob that make outputs of the sensors of a housing, the last body of the first set of ground
+    oscillators, whose last nodes they are."""
+    if sensors is None:
         return {}
-    own = [(sensed.first + k, d) for k in range(len(sensed.names)) for d in range(3)]
+    housing = len(group.layout.bodies) - 1
+    first = len(group.layout.bodies[housing].nodes) - len(sensors.names)
+    own = [(first + k, d) for k in range(len(sensors.names)) for d in range(3)]
     return {
         "sensed": np.array([d for _, d in own], np.int32),
-        "sensor_names": "|".join(f"sensor.{name}.a{axis}" for name in sensed.names for axis in AXES),
-        "sensor_rows0": np.array([group.node_rows(sensed.body, node, d) for node, d in own]),
+        "sensor_names": "|".join(f"sensor.{name}.a{axis}" for name in sensors.names for axis in AXES),
+        "sensor_rows0": np.array([group.node_rows(housing, node, d) for node, d in own]),
     }
 
 

@@ -16,7 +16,7 @@ from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.assembly.groups import Layout, Support
 from gearfmu.stage.assembly.housed import housing_part, meetings
-from gearfmu.stage.assembly.teeth import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
+from gearfmu.stage.assembly.teeth import MOST_FUNCTIONS, ROLLS, excited_modes, resampling
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.tables.bodies import ShaftBody
@@ -26,7 +26,6 @@ from gearfmu.stagefile.tables.housing import HousingBody
 SAME_PLACE = 1e-9  # m
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
-SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
 _KEPT = 4  # ways to read a body that are remembered
 _READ: WeakKeyDictionary[Body, dict[Hashable, GroundPart]] = WeakKeyDictionary()
 
@@ -79,7 +78,7 @@ def width_degrees(stage: Stage, bodies: Sequence[Body]) -> np.ndarray:
     """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width.
     ModelError where bodies have more of them than the kernel takes."""
     count = min(body.toothed.width_functions for body in bodies)
-    degrees = symmetric_functions(count) if stage.even else np.arange(count)
+    degrees = np.arange(0, count, 2 if stage.even else 1)
     if degrees.size > MOST_FUNCTIONS:
         most = 2 * MOST_FUNCTIONS if stage.even else MOST_FUNCTIONS
         raise ModelError(
@@ -124,15 +123,9 @@ def stage_layout(
             if rotor.carried_by is not None
         },
     )
-    supports = _feet_last(stage)
-    springs = [_springs(bare, nodes.numbers[s.body], s, tangents.get(s.name)) for s in supports]
-    return replace(bare, supports=[_support(stage, nodes, *of) for of in zip(supports, springs, strict=True)])
-
-
-def _feet_last(stage: Stage) -> list[SupportSpec]:
-    """The supports in order, those of a housing behind the others: without it they are as if it were not there."""
-    standing = {housing.name for housing in stage.housings}
-    return sorted(stage.supports, key=lambda support: support.body in standing)
+    # feet last: without its housing a stage has the supports that it would have if there were none
+    supports = sorted(stage.supports, key=lambda support: _is_foot(stage, support))
+    return replace(bare, supports=[_support(stage, nodes, bare, s, tangents.get(s.name)) for s in supports])
 
 
 def even_grids(stage: Stage, bodies: Sequence[Body], rolls: int) -> list[np.ndarray]:
@@ -143,7 +136,7 @@ def even_grids(stage: Stage, bodies: Sequence[Body], rolls: int) -> list[np.ndar
 
 def _gear(stage: Stage, body: Body, degrees: np.ndarray, weights: np.ndarray) -> GroundPart:
     """Remembered: only its body, the form of its flank and the levels decide it."""
-    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
+    chosen = excited_modes(body, degrees, stage.even)
     key = (chosen.tobytes(), degrees.tobytes(), weights.tobytes(), stage.levels)
     known = _READ.setdefault(body, {})
     if key not in known:
@@ -151,16 +144,6 @@ def _gear(stage: Stage, body: Body, degrees: np.ndarray, weights: np.ndarray) ->
             known.pop(next(iter(known)))
         known[key] = ground_part(body, Reading(chosen, degrees, weights, stage.levels))
     return known[key]
-
-
-def _all_modes(body: Body, degrees: np.ndarray) -> np.ndarray:
-    """Modes that flanks or bore see, pairs whole."""
-    flank, node = body.toothed, np.abs(body.rows)
-    rows = np.abs(flank.rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(flank.rows).max()
-    seen = (rows > SEEN) | (node > SEEN * node.max(axis=1, keepdims=True)).any(axis=0)
-    second = np.flatnonzero(flank.part == 2)
-    seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
-    return np.flatnonzero(seen)
 
 
 def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> GroundPart:
@@ -171,22 +154,15 @@ def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> GroundPar
     return ground_part(reduce_shaft(whole, shaft.stored_to, None, shaft.name, shaft.modal_damping))
 
 
-@dataclass(frozen=True)
-class _Springs:
-    """directions (d,); compliance (d, d), m/N …; damping (d,), N·s/m …: of a support."""
-
-    directions: tuple[int, ...]
-    compliance: np.ndarray
-    damping: np.ndarray
-
-
-def _springs(layout: Layout, body: int, support: SupportSpec, tangent: np.ndarray | None) -> _Springs:
-    """The springs that a stage file gives, or the tangent (d, d) of a rolling bearing, whose dashpots follow its
-    diagonal."""
+def _springs(
+    layout: Layout, body: int, support: SupportSpec, tangent: np.ndarray | None
+) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
+    """The last fields of a `Support`: the springs that a stage file gives, or the tangent (d, d) of a rolling bearing,
+    whose dashpots follow its diagonal."""
     if tangent is not None:
         held = ROLLING[len(tangent)]
         masses = np.array([layout.mass(body, direction) for direction in held])
-        return _Springs(held, _inverse(tangent), 2 * support.damping_ratio * np.sqrt(np.diag(tangent) * masses))
+        return held, _inverse(tangent), 2 * support.damping_ratio * np.sqrt(np.diag(tangent) * masses)
     assert support.bearing is None, f"{support.name}: a rolling bearing has a stiffness at a load only"
     directions, compliance, damping = [], [], []
     for field, own in STIFFNESS.items():
@@ -199,7 +175,7 @@ def _springs(layout: Layout, body: int, support: SupportSpec, tangent: np.ndarra
             directions.append(direction)
             compliance.append(0.0 if rigid else 1 / stiffness)
             damping.append(0.0 if rigid else 2 * support.damping_ratio * math.sqrt(stiffness * mass))
-    return _Springs(tuple(directions), np.diag(compliance), np.array(damping))
+    return tuple(directions), np.diag(compliance), np.array(damping)
 
 
 def _inverse(stiffness: np.ndarray) -> np.ndarray:
@@ -209,21 +185,17 @@ def _inverse(stiffness: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * (inverse + inverse.T))
 
 
-def _support(stage: Stage, nodes: Nodes, support: SupportSpec, springs: _Springs) -> Support:
+def _support(stage: Stage, nodes: Nodes, layout: Layout, support: SupportSpec, tangent: np.ndarray | None) -> Support:
     at = None if _is_foot(stage, support) else place_of(stage, support)
 
     def end(body: str, node: str | None) -> tuple[int, int]:
         housed = isinstance(stage.bodies[body], HousingBody)
         return nodes.find(stage, body, at, support.name if housed else node)
 
-    return Support(
-        name=f"{_kind(stage, support)}.{support.name}",
-        first=end(support.body, support.node if support.to is None else None),
-        second=None if support.to is None else end(support.to, support.node),
-        directions=springs.directions,
-        compliance=springs.compliance,
-        damping=springs.damping,
-    )
+    name = f"{_kind(stage, support)}.{support.name}"
+    first = end(support.body, support.node if support.to is None else None)
+    second = None if support.to is None else end(support.to, support.node)
+    return Support(name, first, second, *_springs(layout, first[0], support, tangent))
 
 
 def _is_foot(stage: Stage, support: SupportSpec) -> bool:

@@ -29,12 +29,6 @@ def mesh_axes(stage: Stage, mesh: EngagementSpec) -> tuple[tuple[float, float], 
     return a, b
 
 
-def _axes_as_they_are(stage: Stage, mesh: EngagementSpec) -> list[float]:
-    """`mesh_axes` one after the other, with the deviations of the axes."""
-    rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
-    return [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
-
-
 def tooth_phases(stage: Stage) -> dict[str, float]:
     """Angle (rad) of tooth 0 of every gear at φ = 0: in every engagement the drive flanks of tooth 0 of both gears
     touch; of a ring it is the flanks of space 0.
@@ -101,7 +95,8 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
         pair, (a, b) = mesh_shape(stage, mesh), mesh_axes(stage, mesh)
         engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
-        place = _axes_as_they_are(stage, mesh)
+        rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
+        place = [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
         numbers.append([*place, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
         directions.append(direction_of(pair, a, b))
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))

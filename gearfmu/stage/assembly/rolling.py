@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sl
 
-from gearfmu.bearing import Balls, Filled, NoRestError, Rest, Rollers, Rolling, Row, filled_ball, filled_roller
+from gearfmu.bearing import Filled, NoRestError, Rest, Rolling, Row, filled_ball, filled_roller
 from gearfmu.bearing.rest import least, preloaded, scales, state
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
@@ -73,7 +73,7 @@ class Settled:
     iterations: int
 
 
-def filled(spec: BallBearing | RollerBearing) -> Filled[Balls] | Filled[Rollers]:
+def filled(spec: BallBearing | RollerBearing) -> Filled:
     """The law of a bearing of a stage file, and which of its numbers are proposed."""
     fixed = {"contact_angle": spec.contact_angle, "clearance": spec.clearance}
     if isinstance(spec, BallBearing):
@@ -83,13 +83,8 @@ def filled(spec: BallBearing | RollerBearing) -> Filled[Balls] | Filled[Rollers]
     return filled_roller(spec.bore, spec.outside, known, **fixed)
 
 
-def rolling_bearings(stage: Stage) -> dict[str, Rolling]:
-    """The rolling bearings of a stage by the names of their supports. ModelError for a preload that one cannot bear."""
-    held = [support for support in stage.supports if support.bearing is not None]
-    return {support.name: _bearing(stage, support) for support in held}
-
-
 def _bearing(stage: Stage, support: SupportSpec) -> Rolling:
+    """ModelError for a preload that it cannot bear."""
     spec = stage.bearings[str(support.bearing)]
     law, side = filled(spec).law, -1 if support.carries == "-z" else 1
     places = [(0.0, side)] if support.span is None else [(-support.span / 2, side), (support.span / 2, -side)]
@@ -97,13 +92,13 @@ def _bearing(stage: Stage, support: SupportSpec) -> Rolling:
         rows = tuple(preloaded(Row(law, offset, way), spec.preload) for offset, way in places)
     except NoRestError as error:
         raise ModelError(f"bearing {support.bearing} of {support.name}: {error}") from error
-    return Rolling(rows).spread(_CAGE)
+    return Rolling(rows, _CAGE)
 
 
 def settle(stage: Stage, torque: float, statics_with: Callable[[Tangents], Statics]) -> Settled:
     """The bearings of a stage under a torque on its input, N·m. statics_with: of the stage with these tangents.
     ModelError where a bearing cannot carry its load, or no stiffness is found."""
-    bearings = rolling_bearings(stage)
+    bearings = {support.name: _bearing(stage, support) for support in stage.supports if support.bearing is not None}
     tangents = {name: _floored(bearing, _tight(bearing)) for name, bearing in bearings.items()}
     rests: dict[str, Rest] = {}
     for iteration in range(1, _ITERATIONS + 1):
@@ -121,7 +116,7 @@ def settle(stage: Stage, torque: float, statics_with: Callable[[Tangents], Stati
 
 def _tight(bearing: Rolling) -> np.ndarray:
     """(5, 5): stiffness with a little interference all round, before a load is known."""
-    rows = tuple(replace(row, law=replace(row.law, clearance=-_FIRST)) for row in bearing.rows)  # type: ignore[type-var]
+    rows = tuple(replace(row, law=replace(row.law, clearance=-_FIRST)) for row in bearing.rows)
     return replace(bearing, rows=rows).stiffness(np.zeros(5))
 
 
@@ -159,7 +154,7 @@ def _loaded(
     ends = np.cumsum([0, *(len(part) for part in own)])
 
     def each(e: np.ndarray) -> list[tuple[Rolling, np.ndarray]]:
-        return [(b, _whole(b, e[i:j])) for b, i, j in zip(bearings.values(), ends, ends[1:], strict=False)]
+        return [(b, b.placed(e[i:j])) for b, i, j in zip(bearings.values(), ends, ends[1:], strict=False)]
 
     def carried(e: np.ndarray) -> np.ndarray:
         return np.concatenate([b.force(d)[list(b.directions)] for b, d in each(e)])
@@ -182,13 +177,6 @@ def _loaded(
             "does not carry, or nothing holds a shaft along its axis"
         ) from error
     return {name: state(b, d) for name, (b, d) in zip(bearings, each(found), strict=True)}
-
-
-def _whole(bearing: Rolling, part: np.ndarray) -> np.ndarray:
-    """(5,): a displacement in all directions."""
-    d = np.zeros(5)
-    d[list(bearing.directions)] = part
-    return d
 
 
 def support_forces(stage: Stage, blob: bytes, torque: float) -> np.ndarray:

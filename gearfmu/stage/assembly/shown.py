@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH = 100  # columns of a terminal
@@ -87,16 +86,12 @@ def plot_over(
     figure = figure or plt.figure(figsize=(9.0, 1.2 + 2.0 * len(panels)), layout="constrained")
     axes: np.ndarray = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (label, curves) in zip(axes, panels.items(), strict=True):
-        _draw(axis, label, across[1], curves)
+        for name, values in curves.items():
+            axis.plot(across[1], values, lw=0.9, label=name)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+        axis.margins(x=0)
+        if len(curves) > 1 or not any(label.startswith(name) for name in curves):
+            axis.legend(loc="upper right", fontsize="small")
     axes[-1].set_xlabel(across[0])
     return axes
-
-
-def _draw(axis: Axes, label: str, across: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
-    for name, values in curves.items():
-        axis.plot(across, values, lw=0.9, label=name)
-    axis.set_ylabel(label)
-    axis.grid(alpha=0.3)
-    axis.margins(x=0)
-    if len(curves) > 1 or not any(label.startswith(name) for name in curves):
-        axis.legend(loc="upper right", fontsize="small")

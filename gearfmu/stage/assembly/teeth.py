@@ -82,6 +82,7 @@ def mismatches(gear: GearSpec | RingBody, shape: GearShape, flank: Flank) -> lis
 
 ROLLS = 48  # error and price of the grid: docs/decisions.md
 MOST_FUNCTIONS = 6
+SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
 OFFSETS = range(-3, 4)
 
 
@@ -113,38 +114,37 @@ def stored_points(body: Body, s_form: float, s_tip: float, rolls: int) -> tuple[
 
 
 def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
-    """`values` with `axis` (R,) replaced by (rolls,): Σ_r weights[:, r]·values[r], summed in the order of r.
-
-    Element by element on purpose: matrix products may sum in another order from call to call, and equal inputs must
-    give an equal blob.
-    """
+    """`values` with `axis` (R,) replaced by (rolls,): Σ_r weights[:, r]·values[r], summed in the order of r."""
     moved = np.moveaxis(values, axis, 0)
     if np.array_equal(weights, np.eye(len(moved))):
         return values.astype(float)
     flat = np.ascontiguousarray(moved, float).reshape(len(moved), -1)
-    total = np.zeros((weights.shape[0], flat.shape[1]))
-    part = np.empty_like(total)
-    for weight, value in zip(weights.T, flat, strict=True):
-        total += np.multiply(weight[:, None], value, out=part)
-    return np.moveaxis(total.reshape(-1, *moved.shape[1:]), 0, axis)
+    return np.moveaxis(products(weights, flat.T).reshape(-1, *moved.shape[1:]), 0, axis)
 
 
-def symmetric_functions(count: int) -> np.ndarray:
-    """Degrees of the Legendre functions that a load symmetric about mid-width can excite.
+def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """left (…, n) · right (m, n)ᵀ, summed in the order of n.
 
-    A spur pair without lead modification loads its slices symmetrically: odd functions and antisymmetric modes stay
-    at rest exactly.
+    Element by element on purpose: matrix products may sum in another order from call to call, and equal inputs must
+    give an equal blob.
     """
-    return np.arange(0, count, 2)
+    total = np.zeros((*left.shape[:-1], right.shape[0]))
+    part = np.empty_like(total)
+    for k in range(right.shape[1]):
+        total += np.multiply(left[..., k, None], right[:, k], out=part)
+    return total
 
 
-def excited_modes(body: Body, degrees: np.ndarray) -> np.ndarray:
-    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay
-    together. Of modes of no parity (imported bodies without a mirror at mid-width) the rows of the chosen functions
-    count."""
-    flank = body.toothed
-    rows = np.abs(flank.rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(flank.rows).max()
-    seen = (rows > 1e-9) & (flank.parity >= 0)
+def excited_modes(body: Body, degrees: np.ndarray, even: bool) -> np.ndarray:
+    """Indices of the modes with a row in the chosen width functions, or also, unless `even`, in the motion of the bore;
+    pairs stay together.
+
+    even: slices are loaded symmetrically, so antisymmetric modes stay at rest exactly. Of modes of no parity (imported
+    bodies without a mirror at mid-width) the rows of the chosen functions count.
+    """
+    flank, node = body.toothed, np.abs(body.rows)
+    seen = np.abs(flank.rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(flank.rows).max() > SEEN
+    seen = seen & (flank.parity >= 0) if even else seen | (node > SEEN * node.max(axis=1, keepdims=True)).any(axis=0)
     second = np.flatnonzero(flank.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)

@@ -55,10 +55,6 @@ def matlab_names(names: Sequence[str]) -> list[str]:
     return found
 
 
-def _csv(trace: Trace, path: Path, names: Sequence[str]) -> None:
-    trace.to_csv(path, names)
-
-
 def _matlab(trace: Trace, path: Path, names: Sequence[str]) -> None:
     from scipy.io import savemat
 
@@ -137,7 +133,7 @@ def _line(text: str, columns: int = UFF_LINE) -> str:
 
 
 WRITERS: dict[str, Callable[[Trace, Path, Sequence[str]], None]] = {
-    ".csv": _csv,
+    ".csv": Trace.to_csv,
     ".mat": _matlab,
     ".mf4": _mdf,
     ".parquet": _parquet,

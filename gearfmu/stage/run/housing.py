@@ -78,9 +78,3 @@ class HousingAlone:
             state = flow @ state + pushed @ force[k]
             found[k] = state[n:]
         return HousingMotion(trace.time, found @ group.shapes.T)
-
-    def sensor_speed(self, motion: HousingMotion) -> np.ndarray:
-        """(T, 3S) m/s: of the body's sensors, x, y, z of each, by what is dynamic."""
-        assert self.body.sensors is not None, "a body with sensors"
-        rows = np.hstack([self.body.sensors.rigid_rows, self.body.sensors.rows])
-        return np.asarray(motion.velocity @ rows[:, : motion.velocity.shape[1]].T)

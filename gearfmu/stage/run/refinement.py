@@ -46,11 +46,7 @@ class Change:
 
 
 def left_of_slices(
-    model: StageModel,
-    torques: Sequence[float],
-    slices: int | None = None,
-    mesh: str | None = None,
-    **parameters: float,
+    model: StageModel, torques: Sequence[float], slices: int | None = None, mesh: str | None = None, **parameters: float
 ) -> Change | None:
     """Under these torques (N·m on the input), of the stage's own number of slices or another; None for spur stages, and
     where a torque has no equilibrium. Mesh and parameters as `loaded_te` takes them."""

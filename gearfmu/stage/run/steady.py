@@ -133,11 +133,7 @@ def steady_run(
         trace = simulate(model, inputs, case.length, case.step, settings, progress)
     trace.meta["warnings"] = [*beyond_limits(model, most, fastest), *trace.meta["warnings"]]
     trace.meta.update(
-        settle=case.settle,
-        scene=case.scene,
-        torque=case.torque,
-        speed=case.speed,
-        end_speed=case.end_speed,
+        settle=case.settle, scene=case.scene, torque=case.torque, speed=case.speed, end_speed=case.end_speed
     )
     return trace
 

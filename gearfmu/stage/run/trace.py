@@ -173,7 +173,11 @@ class Trace(Shown):
     def load(path: str | os.PathLike[str]) -> Trace:
         """Read a file written by `save`; raises TraceError when it is missing, damaged or of another kind."""
         with reading(path, FILE) as file:
-            return _read(file)
+            channels = {
+                name: Channel(dataset[()], str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
+                for name, dataset in file["channels"].items()
+            }
+            return Trace(file["time"][()], channels, json.loads(file.attrs["meta"]))
 
     def to_csv(self, path: str | os.PathLike[str], names: Iterable[str] | None = None) -> None:
         """Write time and the channels `names` (all when None) as CSV with one header row "name_[unit]"."""
@@ -232,11 +236,3 @@ def _write(group: h5py.Group, name: str, channel: Channel) -> None:
     dataset = group.create_dataset(name, data=channel.values, **options)
     dataset.attrs["unit"] = channel.unit
     dataset.attrs["description"] = channel.description
-
-
-def _read(file: h5py.File) -> Trace:
-    channels = {
-        name: Channel(dataset[()], str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
-        for name, dataset in file["channels"].items()
-    }
-    return Trace(file["time"][()], channels, json.loads(file.attrs["meta"]))
