@@ -72,7 +72,7 @@ def surface() -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
     """The outside of the box: points, faces of four corners, and the rows of their displacement."""
     nodes, cells = mesh()
     outside = np.flatnonzero(np.any(np.abs(np.abs(nodes) - np.array(SIZE) / 2) < 1e-9, axis=1))
-    faces = faces_within(cells, outside)[:, :4]
+    faces = faces_within(cells, outside).corners
     used, numbers = np.unique(faces, return_inverse=True)
     dofs = (3 * used[:, None] + np.arange(3)).ravel()
     rows = sp.csr_array((np.ones(dofs.size), (np.arange(dofs.size), dofs)), (dofs.size, nodes.size))

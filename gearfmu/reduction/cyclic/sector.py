@@ -35,7 +35,7 @@ class SectorBody:
         self.stiffness, self.internal = stiffness, "rim" in mesh.sets
         sector = Sector(
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
-            bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
+            bool(flank.base_helix_angle), self._held_faces.nodes if rigid_bore else None,
         )  # fmt: skip
         self.material, self.spaces = material, sector_spaces(sector)
         self.load_matrix = self._all_loads()
@@ -85,7 +85,7 @@ class SectorBody:
         return self.flank_count + len(self.patch_rows)
 
     @property
-    def _held_faces(self) -> np.ndarray:
+    def _held_faces(self) -> surface.Faces:
         return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
 
     @cached_property

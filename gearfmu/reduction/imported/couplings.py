@@ -13,8 +13,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
-from gearfmu.fem import patches, solids
-from gearfmu.fem.coupling import rigid_fields
+from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows, rigid_fields
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement
 from gearfmu.reduction.couplings import full_order as coupled
@@ -61,7 +62,7 @@ def full_order(
     return coupled(mesh.source.stem, body, couplings, Judgement(ground, reach))
 
 
-def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface, name: str = "") -> Coupling:
+def set_coupling(mesh: ImportedMesh, faces: Faces, interface: SetInterface, name: str = "") -> Coupling:
     """The coupling of a node set to its master, called `name` or like the set. faces : the boundary of the mesh.
     MeshError as `full_order`."""
     if interface.kind not in KINDS:
@@ -72,8 +73,8 @@ def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterfac
     rows = None
     if interface.kind == "averaging":
         own, about = faces.within(members), mesh.nodes - point
-        if len(own.quads) + len(own.triangles):
-            rows = sp.csr_array(patches.averaging_rows(about, own))
+        if len(own):
+            rows = sp.csr_array(averaging_rows(about, own))
     return Coupling(name or interface.node_set, interface.kind, members, point, rows)
 
 

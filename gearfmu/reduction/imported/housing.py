@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, elimination, full_order
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
@@ -75,7 +76,7 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
     )
 
 
-def _seats(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+def _seats(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[Coupling]:
     found = []
     for name, node_set in source.seats.items():
         nodes = mesh.nodes[mesh.node_set(node_set)]
@@ -88,14 +89,14 @@ def _seats(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -
     return found
 
 
-def _feet(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+def _feet(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[Coupling]:
     return [
         set_coupling(mesh, faces, SetInterface(node_set, source.foot_coupling), name)
         for name, node_set in source.feet.items()
     ]
 
 
-def _sensor(mesh: ImportedMesh, faces: solids.Faces, name: str, node_set: str) -> Coupling:
+def _sensor(mesh: ImportedMesh, faces: Faces, name: str, node_set: str) -> Coupling:
     """One node moves as itself, more as their mean."""
     members = mesh.node_set(node_set)
     if len(members) == 1:

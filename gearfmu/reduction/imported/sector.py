@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows, surface_moments
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
-from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
@@ -69,7 +69,7 @@ class ImportedSector(SectorBody):
     @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
         """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
-        moments, gram = patch_moments(self.cut.nodes, self.faces.within(self.bore))
+        moments, gram = surface_moments(self.cut.nodes, self.faces.within(self.bore))
         return moments, self.turned_sum(gram)
 
 
