@@ -42,20 +42,6 @@ class ImportedMesh:
     source: Path
     raised: int = 0
 
-    @property
-    def cells(self) -> np.ndarray:
-        """(E, 20) node indices of every element, −1 where it has fewer nodes."""
-        rows = [
-            np.pad(block, ((0, 0), (0, 20 - block.shape[1])), constant_values=-1) for block in self.elements.values()
-        ]
-        return np.concatenate(rows)
-
-    @property
-    def repeated_cells(self) -> np.ndarray:
-        """(E, 20) node indices of every element; one of fewer nodes repeats its first."""
-        cells = self.cells
-        return np.where(cells >= 0, cells, cells[:, :1])
-
     def node_set(self, name: str) -> np.ndarray:
         """Node indices of a set, capitals or not. MeshError names the sets there are."""
         for own, nodes in self.sets.items():
@@ -65,6 +51,11 @@ class ImportedMesh:
                 return nodes
         there = ", ".join(sorted(self.sets)) or "none"
         raise MeshError(f"{self.source}: there is no node set '{name}'; sets in the file: {there}")
+
+
+def repeated_cells(elements: dict[str, np.ndarray]) -> np.ndarray:
+    """(E, 20) node indices of elements of every kind; one of fewer nodes repeats its first."""
+    return np.concatenate([np.hstack([b, np.repeat(b[:, :1], 20 - b.shape[1], axis=1)]) for b in elements.values()])
 
 
 def read_mesh(path: str | Path, length: float, ignore: tuple[str, ...] = ()) -> ImportedMesh:

@@ -18,7 +18,7 @@ from gearfmu.body import load_body
 from gearfmu.fem import solids
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.matrices import read_matrix, read_unknowns
-from gearfmu.femesh.imported import read_mesh
+from gearfmu.femesh.imported import read_mesh, repeated_cells
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stage import Trace
@@ -98,7 +98,8 @@ def test_with_calculix_matrices_our_frequencies_are_calculix_own(tmp_path: Path)
     unknowns = read_unknowns(tmp_path / "pinion.dof")
     stiffness, mass = (1e3 * read_matrix(tmp_path / f"pinion.{s}", unknowns, mesh.labels) for s in ("sti", "mas"))
     of_dof = np.repeat(np.arange(len(mesh.nodes)), 3)
-    free = FullOrder("sector", stiffness, mass, rigid_modes(mesh.nodes), (), (), 1.0, mesh.cells, of_dof)
+    cells = repeated_cells(mesh.elements)
+    free = FullOrder("sector", stiffness, mass, rigid_modes(mesh.nodes), (), (), 1.0, cells, of_dof)
     bore = (3 * mesh.node_set("BORE")[:, None] + np.arange(3)).ravel()
     held = free.held(sp.csr_array(sp.eye_array(free.size, format="csr")[bore]))
     off = {}

@@ -12,9 +12,11 @@ from decks import STEEL, brick, write_deck
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.femesh.imported import read_mesh
+from gearfmu.femesh.imported import ImportedMesh, read_mesh
+from gearfmu.reduction.couplings import Judgement, full_order
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported.couplings import elements_of, set_coupling
 
 MM = 1e-3
 
@@ -25,15 +27,18 @@ def frequencies(nodes, elements, stiffness, mass, count=6) -> np.ndarray:
     return np.sqrt(squared) / (2 * np.pi)
 
 
+def coupled(mesh: ImportedMesh, interfaces: list[tuple[str, str]]) -> FullOrder:
+    """The free body of a mesh with node sets and their kinds as interfaces."""
+    faces = solids.boundary(mesh.elements)
+    couplings = [set_coupling(mesh, faces, name, kind) for name, kind in interfaces]
+    return full_order("b", elements_of(mesh, None, STEEL), couplings, Judgement((), 0.05))
+
+
 def test_a_deck_gives_the_frequencies_of_our_own_elements(tmp_path: Path) -> None:
     nodes, hexes = brick("hexahedron20")
     ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": hexes}, ends), MM)
-    body = full_order(
-        mesh,
-        Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL)),
-        [SetInterface("left", "rigid"), SetInterface("RIGHT")],
-    )
+    body = coupled(mesh, [("left", "rigid"), ("RIGHT", "averaging")])
     own = hex20.assemble(MM * nodes, hexes, STEEL)
     found = frequencies(mesh.nodes, mesh.elements, *solids.assemble(mesh.nodes, mesh.elements, STEEL))
     assert found == pytest.approx(frequencies(MM * nodes, {"": hexes}, *own), rel=1e-12)
@@ -50,10 +55,9 @@ def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) ->
     nodes, cells = brick(kind, (8, 2, 2))
     ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {kind: cells}, ends), MM)
-    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
     stretch = {}
     for coupling in ("averaging", "rigid"):
-        body = full_order(mesh, matrices, [SetInterface("LEFT", coupling), SetInterface("RIGHT", coupling)])
+        body = coupled(mesh, [("LEFT", coupling), ("RIGHT", coupling)])
         assert np.abs(body.stiffness @ body.rigid).max() < 1e-8 * np.abs(body.stiffness).max()
         pull = body.rows("RIGHT")[[0]] - body.rows("LEFT")[[0]]
         stretch[coupling] = float((pull @ Elastic(body.held(body.rows("LEFT"))).flexibility(pull.T.toarray()))[0, 0])
@@ -62,15 +66,12 @@ def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) ->
     assert 0.95 * exact < stretch["rigid"] < stretch["averaging"]
 
 
-def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+def test_a_set_in_one_line_is_refused(tmp_path: Path) -> None:
     nodes, cells = brick("hexahedron20")
     edge = {"EDGE": np.flatnonzero((nodes[:, 1] == 0) & (nodes[:, 2] == 0))}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": cells}, edge), MM)
-    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
     with pytest.raises(MeshError, match="'edge' lie in one line"):
-        full_order(mesh, matrices, [SetInterface("edge")])
-    with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
-        full_order(mesh, matrices, [SetInterface("edge", "welded")])
+        coupled(mesh, [("edge", "averaging")])
 
 
 def test_a_byte_order_mark_and_line_ends_change_no_deck(tmp_path: Path) -> None:
