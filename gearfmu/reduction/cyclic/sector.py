@@ -14,6 +14,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.femesh.mesh import FeMesh
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
@@ -154,7 +155,6 @@ class SectorBody:
         """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
         total = np.zeros((6, 6))
         for angle in 2 * np.pi * np.arange(self.teeth) / self.teeth:
-            c, s = np.cos(angle), np.sin(angle)
-            turn = np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+            turn = np.kron(np.eye(2), about_z(angle))
             total += turn @ matrix @ turn.T
         return total

@@ -19,6 +19,7 @@ from gearfmu.fem import surface
 from gearfmu.fem.surface import Faces
 from gearfmu.geometry import involute
 from gearfmu.geometry.involute_fit import FitError, FlankPoints, InvoluteFit, fit_involute, flank_faces
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
 
 _STEEP = 0.3  # largest axial component of a flank face's normal
@@ -138,8 +139,7 @@ def tooth_loads(
     nodes (N, 3) m in the frame of the gear. tooth_angle : rad, where the tooth stands. direction : as of
     `flank.flank_loads`. MeshError when the faces do not cover the flank from form circle to tip over the face width.
     """
-    c, s = np.cos(tooth_angle), np.sin(tooth_angle)
-    back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    back = about_z(tooth_angle)
     local = nodes @ back
     direction = direction or flank.normal
     parts = [_flank_part(local, faces, flank, side) for side in (0, 1)]
@@ -154,8 +154,7 @@ def middle_node(nodes: np.ndarray, faces: Faces, flank: ToothFlank, tooth_angle:
 
     nodes (N, 3) m in the frame of the gear. MeshError without a face on the flank.
     """
-    c, s = np.cos(tooth_angle), np.sin(tooth_angle)
-    local = nodes @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    local = nodes @ about_z(tooth_angle)
     own = _flank_part(local, faces, flank, 0).nodes
     if len(own) == 0:
         raise MeshError("there is no face on one of the flanks")

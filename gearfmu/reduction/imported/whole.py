@@ -15,6 +15,7 @@ from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.mesh import mount_spaces
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.couplings import Coupling, Judgement, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
@@ -84,8 +85,7 @@ def unfolded_matrix(matrix: sp.csr_array, cut: CyclicCut, teeth: int) -> sp.csr_
     nodes, numbers = _numbers(cut, teeth)
     whole = sp.csr_array((nodes.size, nodes.size))
     for tooth, number in enumerate(numbers):
-        c, s = np.cos(2 * np.pi * tooth / teeth), np.sin(2 * np.pi * tooth / teeth)
-        turn = sp.kron(sp.identity(len(number)), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), format="csr")
+        turn = sp.kron(sp.identity(len(number)), about_z(2 * np.pi * tooth / teeth), format="csr")
         dofs = (3 * number[:, None] + np.arange(3)).ravel()
         turned = sp.coo_array(turn @ matrix @ turn.T)
         row, column = turned.coords
