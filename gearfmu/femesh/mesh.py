@@ -10,6 +10,17 @@ from gearfmu.geometry.plane import about_z
 
 
 @dataclass(frozen=True)
+class LabelledMesh:
+    """A mesh in the node numbers of its file: labels (N,), ascending, and nodes (N, 3) in its unit of length; cells:
+    kind (names of meshio) → (E, k) labels in VTK order; sets: name → labels."""
+
+    labels: np.ndarray
+    nodes: np.ndarray
+    cells: dict[str, np.ndarray]
+    sets: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
 class FlankGrid:
     """One flank of tooth 0 between root form and tip form point, as element faces.
 
