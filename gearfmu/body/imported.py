@@ -23,7 +23,7 @@ from gearfmu.reduction.imported.gear import (
     hinge_problem,
     imported_gear,
 )
-from gearfmu.reduction.imported.whole import Held, imported_gear_order
+from gearfmu.reduction.imported.whole import imported_gear_order
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec
 from gearfmu.stagefile.forms.shapes import gear_shape
@@ -59,9 +59,8 @@ def imported_full_order(gear: ToothedBody, mounts: MountsSpec | None = None) -> 
     """The whole imported gear or ring before reduction, for every method: interfaces tooth0 … and bore, or on its
     mounts. Raises MeshError."""
     found, wanted, files = check_gear(gear), _wanted(gear), _files(gear)
-    held = Held(gear.name, gear_shape(gear).r, files.bore_coupling, mounts)
     try:
-        return imported_gear_order(found, wanted, held)
+        return imported_gear_order(found, wanted, gear.name, gear_shape(gear).r, files.bore_coupling, mounts)
     except MeshError as error:
         raise MeshError(f"{files.file}: {error}") from error
 
@@ -84,13 +83,13 @@ def imported_sector_mesh(gear: ToothedBody) -> FeMesh:
 
 def imported_carrier_order(carrier: CarrierBody) -> tuple[FullOrder, dict[str, Any]]:
     """The imported carrier of a planetary set before reduction, known to be one solid, and plain facts. MeshError."""
-    found, source = imported_carrier(carrier), carrier.imported
+    (full, facts), source = imported_carrier(carrier), carrier.imported
     assert source is not None
-    problem, space = None, elastic(found.full)
+    problem, space = None, elastic(full)
     try:
         problem = hinge_problem(space, float(space.modes(1)[0][0]))
     except (FactorError, ModesError) as error:
         problem = f"the stiffness matrix cannot be factorised ({error}): it is not of one free solid body"
     if problem:
         raise MeshError(f"{source.file}: {problem}")
-    return found.full, found.facts
+    return full, facts

@@ -56,7 +56,7 @@ def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> di
     if isinstance(table, CarrierBody):
         if not options["bore"] or len(options["bolts"]) != (planets := len(table.bolts)):
             raise click.UsageError(f"a carrier needs --bore and {planets} times --bolt, each a node set")
-        return imported_carrier(table.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})).facts
+        return imported_carrier(table.model_copy(update={"imported": CarrierImportSpec(file=file, **options)}))[1]
     if not isinstance(table, GearBody | RingBody):
         raise click.UsageError(f"{name} is a housing: write its node sets into the stage file, then gearfmu reduce")
     ring = isinstance(table, RingBody)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TypeAlias
-
 import numpy as np
 
+from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-
-Basis: TypeAlias = Callable[[np.ndarray], np.ndarray]
-Part: TypeAlias = tuple[np.ndarray, Basis, Basis, tuple[np.ndarray, np.ndarray]]
+from gearfmu.fem.surface import Faces
 
 
 def rigid_fields(positions: np.ndarray) -> np.ndarray:
@@ -32,41 +28,40 @@ def rigid_modes(nodes: np.ndarray) -> np.ndarray:
     return rigid_fields(nodes).reshape(-1, 6)
 
 
-def surface_moments(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def surface_moments(nodes: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
     """Moments of a surface's displacement field, by exact surface integration.
 
-    With A(x) the rigid fields at a point, returns b = ∫ Aᵀ N dA, (6, 3N), and g = ∫ Aᵀ A dA, (6, 6), over the
-    8-node faces (F, 8). Both add up over the parts of a surface.
+    With A(x) the rigid fields at a point, returns b = ∫ Aᵀ N dA, (6, 3N), and g = ∫ Aᵀ A dA, (6, 6). Both add up over
+    the parts of a surface.
     """
-    return moments_of(nodes, [(faces, surface.shape, surface.shape_gradient, surface.gauss_quad())])
-
-
-def moments_of(nodes: np.ndarray, parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray]:
-    """`surface_moments` of faces of any form: faces (F, k), their shape functions, derivatives and Gauss rule."""
     moments, gram = np.zeros((len(nodes), 3, 6)), np.zeros((6, 6))
-    for faces, shape, slope, (xi, weight) in parts:
-        if len(faces) == 0:
+    quads = faces.quads, surface.shape, surface.shape_gradient, surface.gauss_quad()
+    triangles = faces.triangles, surface.triangle_shape, surface.triangle_gradient, surface.gauss_triangle()
+    for own, shape, slope, (xi, weight) in (quads, triangles):
+        if len(own) == 0:
             continue
         values = shape(xi)
-        measure = surface.surface_measure(nodes[faces], slope(xi)) * weight
-        fields = rigid_fields(np.einsum("pn,qnc->qpc", values, nodes[faces]))
-        np.add.at(moments, faces, np.einsum("qp,pn,qpcr->qncr", measure, values, fields, optimize=True))
+        measure = surface.surface_measure(nodes[own], slope(xi)) * weight
+        fields = rigid_fields(np.einsum("pn,qnc->qpc", values, nodes[own]))
+        np.add.at(moments, own, np.einsum("qp,pn,qpcr->qncr", measure, values, fields, optimize=True))
         gram += np.einsum("qp,qpcr,qpcs->rs", measure, fields, fields, optimize=True)
     return moments.reshape(-1, 6).T, gram
 
 
-def averaging_rows(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def averaging_rows(nodes: np.ndarray, faces: Faces) -> np.ndarray:
     """Averaging node of a surface (RBE3 with the surface itself as weight).
 
     The rigid motion (u, θ) about the origin that fits the surface's displacement best in the mean square,
     min ∫ |u(x) − t − θ × x|² dA: rows (6, 3N) for mean ux, uy, uz (m) and rotation rx, ry, rz (rad). Their transpose
-    spreads a force and a moment on the averaging node over the surface. `faces` (F, 8) as of `surface.faces_within`.
+    spreads a force and a moment on the averaging node over the surface. MeshError for a patch without faces.
     """
     moments, gram = surface_moments(nodes, faces)
+    if np.linalg.matrix_rank(gram) < 6:
+        raise MeshError("these nodes span no surface: the set must hold all nodes of the faces it stands for")
     return np.linalg.solve(gram, moments)
 
 
-def averaging_rows_at(nodes: np.ndarray, faces: np.ndarray, point: np.ndarray) -> np.ndarray:
+def averaging_rows_at(nodes: np.ndarray, faces: Faces, point: np.ndarray) -> np.ndarray:
     """`averaging_rows` with the mean displacement taken at `point` (3,), m, instead of the origin: (6, 3N)."""
     return moved(averaging_rows(nodes, faces), point)
 

@@ -27,6 +27,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem.coupling import rigid_fields, rigid_modes
 from gearfmu.fem.factor import CondensedFactor
 from gearfmu.fem.harmonic import Harmonic
+from gearfmu.geometry.plane import about_z
 
 _MATCH = 1e-7  # of the mesh's size: nodes that should coincide
 
@@ -152,10 +153,9 @@ def _cells(elements: np.ndarray, mirror: np.ndarray, kept: np.ndarray) -> np.nda
 
 
 def _check_cuts(sector: Sector) -> None:
-    angle = 2 * np.pi / sector.teeth
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     if len(sector.cut_minus) != len(sector.cut_plus):
         raise MeshError(f"cut faces have {len(sector.cut_minus)} and {len(sector.cut_plus)} nodes; they must match")
+    turn = about_z(2 * np.pi / sector.teeth)
     gap = sector.nodes[sector.cut_plus] - sector.nodes[sector.cut_minus] @ turn.T
     if np.abs(gap).max(initial=0.0) > _MATCH * np.ptp(sector.nodes, axis=0).max():
         raise MeshError(f"cut faces differ by up to {np.abs(gap).max():.3g} m after a turn by 2π/{sector.teeth}")

@@ -59,36 +59,11 @@ class CholeskyFront:
         return replace(self, triangle=triangle, rest=rest)
 
 
-class Factor:
-    """Factorisation of a real symmetric positive definite matrix (n, n).
-
-    cells : (E, k) node numbers of each element, −1 for none; node_of_dof : (n,) the node of each unknown. Two unknowns
-    may be coupled only if their nodes share an element. Raises FactorError.
-    """
-
-    def __init__(self, matrix: sp.sparray, cells: np.ndarray, node_of_dof: np.ndarray):
-        self.shape = matrix.shape
-        groups = dof_groups(nested_dissection(cells), node_of_dof)
-        self._order = np.concatenate(groups)
-        self._fronts = eliminated(sp.csr_array(matrix), groups, _eliminate)
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """A⁻¹ rhs for real or complex rhs (n, k)."""
-        if np.iscomplexobj(rhs):
-            return self.solve(np.ascontiguousarray(rhs).view(float)).view(complex)
-        result = np.empty(rhs.shape)
-        for first in range(0, rhs.shape[1], _COLUMNS):
-            columns = slice(first, first + _COLUMNS)
-            work = np.ascontiguousarray(rhs[self._order, columns], dtype=float)
-            substitute(self._fronts, work)
-            result[self._order, columns] = work
-        return result
-
-
 class CondensedFactor:
     """The first n unknowns of a real symmetric matrix (n + b, n + b) factorised and condensed onto the others.
 
-    cells, node_of_dof : as of `Factor`, of the first n unknowns. eliminate : how their fronts are eliminated; by
+    cells : (E, k) node numbers of each element, −1 for none; node_of_dof : (n,) the node of each of these unknowns. Two
+    of them may be coupled only if their nodes share an element. eliminate : how their fronts are eliminated; by
     Cholesky their block must be positive definite. number : precision in which the factor is kept and solves.
     schur : (b, b) S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination leaves. Raises FactorError.
     """
@@ -116,9 +91,6 @@ class CondensedFactor:
     def forward(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Loads f on the first unknowns, (n, k) → y = L⁻¹ f (n, k), in the order of elimination, and −A_BI A_II⁻¹ f
         (b, k). Of two loads yᵀ y' is fᵀ A_II⁻¹ f'."""
-        if np.iscomplexobj(loads):
-            parts = self.forward(np.ascontiguousarray(loads).view(float))
-            return parts[0].view(complex), parts[1].view(complex)
         inner, passed = (np.empty((rows, loads.shape[1]), self._number) for rows in (self.inner, len(self.schur)))
         for columns in _blocks(loads.shape[1]):
             work = np.concatenate([loads[self._order, columns], np.zeros_like(passed[:, columns])], dtype=self._number)
@@ -129,9 +101,6 @@ class CondensedFactor:
 
     def backward(self, inner: np.ndarray, border: np.ndarray) -> np.ndarray:
         """y of `forward` and displacement u_B (b, k) of the others → A_II⁻¹ (f − A_IB u_B) (n, k)."""
-        if np.iscomplexobj(inner) or np.iscomplexobj(border):
-            both = (np.ascontiguousarray(part, dtype=complex).view(float) for part in (inner, border))
-            return self.backward(*both).view(complex)
         result = np.empty(inner.shape)
         for columns in _blocks(inner.shape[1]):
             work = np.concatenate([inner[:, columns], border[:, columns]], dtype=self._number)
@@ -141,16 +110,20 @@ class CondensedFactor:
         return result
 
 
+class Factor(CondensedFactor):
+    """Factorisation of a whole matrix (n, n), by Cholesky of a positive definite one; arguments and errors as of
+    `CondensedFactor`."""
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """A⁻¹ rhs, rhs (n, k) real."""
+        result = np.empty(rhs.shape)
+        for columns in _blocks(rhs.shape[1]):
+            result[:, columns] = self.backward(*self.forward(np.ascontiguousarray(rhs[:, columns])))
+        return result
+
+
 def _blocks(columns: int) -> list[slice]:
     return [slice(first, min(first + _COLUMNS, columns)) for first in range(0, columns, _COLUMNS)]
-
-
-def substitute(fronts: list[Any], work: np.ndarray) -> None:
-    """Forward and back substitution in place; (n, k) in C order, so that a group's rows are one block."""
-    for front in fronts:
-        front.forward(work)
-    for front in reversed(fronts):
-        front.backward(work)
 
 
 def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.ndarray]:
@@ -211,22 +184,22 @@ class Workspace:
     def __init__(self) -> None:
         self._memory = np.empty(0)
 
-    def square(self, size: int, dtype: np.dtype) -> np.ndarray:
+    def square(self, size: int) -> np.ndarray:
         """(size, size) zeros in Fortran order; valid until the next call."""
         if self._memory.size < size * size:
-            self._memory = np.empty(size * size, dtype)
+            self._memory = np.empty(size * size)
         dense = self._memory[: size * size].reshape(size, size, order="F")
         dense.fill(0)
         return dense
 
 
 def gathered(own: Entries, rows: range, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
-    """Lower triangle of a front (complex as its entries): own columns of A and the children's Schur complements.
+    """Lower triangle of a front: own columns of A and the children's Schur complements.
 
     children : (places, Schur complement), of which the upper triangle is read.
     """
     count = len(rows)
-    dense = workspace.square(count + len(below), own.value.dtype)
+    dense = workspace.square(count + len(below))
 
     def position(place: np.ndarray) -> np.ndarray:
         return np.where(place < rows.stop, place - rows.start, count + np.searchsorted(below, place))

@@ -1,4 +1,4 @@
-"""Sparse factorisation of symmetric matrices that need not be definite: K − σM at a real shift, K(1 + 2iζ) − Ω²M.
+"""Sparse factorisation of symmetric matrices that need not be definite: K − σM at a real shift.
 
 As `factor.Factor`, front by front on nested dissection. A front that is positive definite is eliminated by Cholesky,
 any other by LU with partial pivoting among its own unknowns; far below a body's high frequencies those are only the
@@ -18,10 +18,8 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from gearfmu.fem.dissection import nested_dissection
-from gearfmu.fem.factor import FactorError, cholesky_front, dof_groups, eliminated, substitute
+from gearfmu.fem.factor import Factor, FactorError, cholesky_front
 
-_COLUMNS = 128
 _REFINED = 1e-9  # residual relative to the right-hand side; rounding leaves a tenth of it on solid bodies
 _ROUNDS = 3
 
@@ -54,32 +52,17 @@ class _PivotedFront:
         return replace(self, own=own, influence=self.influence.astype(number, copy=False))
 
 
-class SymmetricFactor:
-    """Factorisation of a real or complex symmetric (not Hermitian) matrix (n, n), definite or not.
+class SymmetricFactor(Factor):
+    """Factorisation of a real symmetric matrix (n, n), definite or not; arguments as of `factor.Factor`. Raises
+    FactorError where the matrix is singular to working accuracy."""
 
-    cells, node_of_dof : as of `factor.Factor`. Raises FactorError where the matrix is singular to working accuracy.
-    """
-
-    def __init__(self, matrix: sp.sparray, cells: np.ndarray, node_of_dof: np.ndarray):
-        self.shape, self._matrix = matrix.shape, sp.csr_array(matrix)
-        groups = dof_groups(nested_dissection(cells), node_of_dof)
-        self._order = np.concatenate(groups)
-        self._fronts = eliminated(self._matrix, groups, eliminate_symmetric)
+    def __init__(self, matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray):
+        super().__init__(matrix, cells, node_of_dof, eliminate_symmetric)
+        self._matrix = matrix
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """A⁻¹ rhs, rhs (n, k); refined."""
-        return refined(self._solve_once, lambda vectors: self._matrix @ vectors, rhs)
-
-    def _solve_once(self, rhs: np.ndarray) -> np.ndarray:
-        if np.iscomplexobj(rhs) and not np.iscomplexobj(self._matrix.data):
-            return self._solve_once(np.ascontiguousarray(rhs).view(float)).view(complex)
-        result = np.empty(rhs.shape, np.result_type(self._matrix.dtype, rhs.dtype))
-        for first in range(0, rhs.shape[1], _COLUMNS):
-            columns = slice(first, first + _COLUMNS)
-            work = np.ascontiguousarray(rhs[self._order, columns], dtype=result.dtype)
-            substitute(self._fronts, work)
-            result[self._order, columns] = work
-        return result
+        """A⁻¹ rhs, rhs (n, k) real; refined."""
+        return refined(super().solve, lambda vectors: self._matrix @ vectors, rhs)
 
 
 def refined(solve: Product, product: Product, rhs: np.ndarray) -> np.ndarray:
@@ -106,7 +89,7 @@ def refined(solve: Product, product: Product, rhs: np.ndarray) -> np.ndarray:
 
 def eliminate_symmetric(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
     """A gathered front of a symmetric matrix eliminated: what is kept of it, and the update of the rows below."""
-    found = None if np.iscomplexobj(dense) else cholesky_front(dense, start, stop, below)
+    found = cholesky_front(dense, start, stop, below)
     if found is not None:
         return found
     size = stop - start

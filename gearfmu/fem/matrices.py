@@ -16,7 +16,8 @@ import scipy.io
 import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
-from gearfmu.fem.nastran_matrices import Labelled, read_dmig, read_op4
+from gearfmu.fem.bulk_data import mesh_text
+from gearfmu.fem.nastran_matrices import Labelled, from_triangle, read_dmig, read_op4
 
 _SYMMETRIC = 1e-9  # largest relative asymmetry
 READ = ".mtx, .npz, .npy, .sti/.mas (CalculiX), .pch/.dmig (Nastran DMIG), .op4 (ASCII)"
@@ -80,11 +81,8 @@ def _as_many(path: Path, rows: int, unknowns: np.ndarray) -> None:
 def read_unknowns(path: Path) -> np.ndarray:
     """Node label and component (n, 2) of each row from a CalculiX .dof file ("17.3"). Raises MeshError."""
     try:
-        words = path.read_text(encoding="utf-8-sig").split()
-        pairs = [word.split(".") for word in words]
+        pairs = [word.split(".") for word in mesh_text(path).split()]
         return np.array([(int(node), int(component) - 1) for node, component in pairs])
-    except OSError as error:
-        raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None
     except ValueError:
         raise MeshError(f"{path}: expected lines such as 17.3, node and direction: is it the .dof file?") from None
 
@@ -133,8 +131,7 @@ def _from_triangle(path: Path) -> sp.csr_array:
         raise ValueError("expected lines with row, column and value")
     rows, columns = table[:, 0].astype(int) - 1, table[:, 1].astype(int) - 1
     size = int(max(rows.max(), columns.max())) + 1
-    one = sp.coo_array((table[:, 2], (rows, columns)), (size, size)).tocsr()
-    return sp.csr_array(one + one.T - sp.diags_array(one.diagonal()))
+    return from_triangle(sp.coo_array((table[:, 2], (rows, columns)), (size, size)).tocsr())
 
 
 def _symmetric(path: Path, matrix: sp.csr_array) -> sp.csr_array:

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.fem.bulk_data import bulk_cards, bulk_number
+
 
 @dataclass(frozen=True)
 class Labelled:
@@ -18,6 +20,11 @@ class Labelled:
 
     matrix: sp.csr_array
     unknowns: np.ndarray
+
+
+def from_triangle(matrix: sp.csr_array) -> sp.csr_array:
+    """The symmetric matrix of which one triangle is given."""
+    return sp.csr_array(matrix + matrix.T - sp.diags_array(matrix.diagonal()))
 
 
 def read_dmig(path: Path) -> Labelled:
@@ -47,41 +54,8 @@ def read_dmig(path: Path) -> Labelled:
         upper = abs(sp.triu(matrix, 1)).sum() > 0
         lower = abs(sp.tril(matrix, -1)).sum() > 0
         if not (upper and lower and abs(matrix - matrix.T).max() == 0):
-            matrix = sp.csr_array(matrix + matrix.T - sp.diags_array(matrix.diagonal()))
+            matrix = from_triangle(matrix)
     return Labelled(sp.csr_array(matrix), np.array(unknowns))
-
-
-def bulk_cards(path: Path) -> list[list[str]]:
-    """Bulk data cards as lists of fields, continuation lines joined (eight or four fields a line)."""
-    cards: list[list[str]] = []
-    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        line = line.split("$")[0].rstrip()
-        if not line:
-            continue
-        if "," in line:
-            fields = [field.strip() for field in line.split(",")]
-            head, body = fields[0], fields[1:9]
-        else:
-            head, wide = line[:8].strip(), 16 if "*" in line[:8] else 8
-            body = [line[k : k + wide].strip() for k in range(8, 72, wide)]
-        if head.startswith(("*", "+")) or not head:
-            width = len(body)
-            if cards:
-                cards[-1] += body
-        else:
-            width = 8 if "*" not in head else 4
-            cards.append([head.upper(), *(body + [""] * width)[:width]])
-    return cards
-
-
-def bulk_number(text: str) -> float:
-    """A Nastran real: 1.5, 1.5D3, 1.5+3."""
-    text = text.upper().replace("D", "E")
-    for sign in "+-":
-        place = text.rfind(sign)
-        if place > 0 and text[place - 1] not in "E+-":
-            text = f"{text[:place]}E{text[place:]}"
-    return float(text)
 
 
 def read_op4(path: Path) -> sp.csr_array:
@@ -104,8 +78,7 @@ def read_op4(path: Path) -> sp.csr_array:
         if column > columns:
             break
         if first:
-            count = words
-            values, at = _op4_values(lines, at, count, width)
+            values, at = _op4_values(lines, at, words, width)
             entries += [(first - 1 + k, column - 1, v) for k, v in enumerate(values)]
             continue
         at = _op4_strings(lines, at, (column - 1, words, kind, width, big), entries)
@@ -118,7 +91,7 @@ def read_op4(path: Path) -> sp.csr_array:
         and abs(matrix - matrix.T).max() > 0
         and min(abs(sp.triu(matrix, 1)).sum(), abs(sp.tril(matrix, -1)).sum()) == 0
     ):
-        matrix = matrix + matrix.T - sp.diags_array(matrix.diagonal())
+        matrix = from_triangle(matrix)
     return sp.csr_array(matrix)
 
 

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from gearfmu.fem.factor import CondensedFactor
 from gearfmu.fem.indefinite import Product, eliminate_symmetric, lu, refined
+from gearfmu.geometry.plane import about_z
 
 _COLUMNS = 128
 
@@ -42,9 +43,7 @@ class Parts:
 
     def turned(self, vectors: np.ndarray, part: int) -> np.ndarray:
         """Vectors (3m, k) of part 0 turned into `part`; a negative `part` turns back."""
-        angle = 2 * np.pi * part / self.count
-        c, s = np.cos(angle), np.sin(angle)
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turn = about_z(2 * np.pi * part / self.count)
         return np.matmul(turn, vectors.reshape(-1, 3, vectors.shape[1])).reshape(vectors.shape)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +10,7 @@ import scipy.sparse as sp
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, tet10
 from gearfmu.fem.hex20 import Material
+from gearfmu.fem.surface import Faces
 
 ELEMENTS = {"hexahedron20": hex20, "tetra10": tet10}
 _BATCH = 256
@@ -38,24 +38,6 @@ def jacobian_quality(nodes: np.ndarray, block: np.ndarray, kind: str) -> np.ndar
         lengths = np.linalg.norm(jacobian, axis=3).prod(axis=2)
         quality.append((np.linalg.det(jacobian) / np.maximum(lengths, 1e-300)).min(axis=1))
     return np.concatenate(quality)
-
-
-@dataclass(frozen=True)
-class Faces:
-    """Boundary faces: quads (F, 8), VTK_QUADRATIC_QUAD, and triangles (F, 6), VTK_QUADRATIC_TRIANGLE; normals out of
-    the body."""
-
-    quads: np.ndarray
-    triangles: np.ndarray
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """All nodes of the faces, ascending."""
-        return np.unique(np.concatenate([self.quads.ravel(), self.triangles.ravel()]))
-
-    def within(self, node_set: np.ndarray) -> Faces:
-        """The faces all of whose nodes lie in the set."""
-        return Faces(*(block[np.isin(block, node_set).all(axis=1)] for block in (self.quads, self.triangles)))
 
 
 def boundary(elements: Mapping[str, np.ndarray]) -> Faces:

@@ -32,11 +32,7 @@ def definite_factor(matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.nda
 
 
 def symmetric_factor(matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray) -> Solves:
-    """Factor of a real or complex symmetric matrix; arguments and errors as of `indefinite.SymmetricFactor`.
-
-    pypardiso takes real ones only."""
-    if np.iscomplexobj(matrix.data):
-        return SymmetricFactor(matrix, cells, node_of_dof)
+    """Factor of a real symmetric matrix; arguments and errors as of `indefinite.SymmetricFactor`."""
     return _pardiso(matrix, _REAL_INDEFINITE) or SymmetricFactor(matrix, cells, node_of_dof)
 
 
@@ -74,8 +70,6 @@ class PardisoFactor:
         """A⁻¹ rhs, rhs (n, k)."""
         if not rhs.shape[1]:
             return rhs
-        if np.iscomplexobj(rhs):
-            return self.solve(rhs.real) + 1j * self.solve(rhs.imag)
         rhs = np.asfortranarray(rhs, dtype=float)
         return np.asarray(self._solver.solve(self._upper, rhs)).reshape(rhs.shape)
 

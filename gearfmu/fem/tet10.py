@@ -24,22 +24,32 @@ NATURAL = np.vstack([CORNERS, 0.5 * (CORNERS[EDGES[:, 0]] + CORNERS[EDGES[:, 1]]
 
 def shape(xi: np.ndarray) -> np.ndarray:
     """Shape functions at natural coordinates: xi (P, 3) → (P, 10)."""
-    volume = _volume_coordinates(xi)
-    corners = volume * (2 * volume - 1)
-    return np.hstack([corners, 4 * volume[:, EDGES[:, 0]] * volume[:, EDGES[:, 1]]])
+    return simplex_shape(xi, EDGES)
 
 
 def shape_gradient(xi: np.ndarray) -> np.ndarray:
     """Derivatives with respect to the natural coordinates: xi (P, 3) → (P, 3, 10)."""
-    volume = _volume_coordinates(xi)
-    slope = np.vstack([-np.ones(3), np.eye(3)])
-    corners = (4 * volume - 1)[:, :, None] * slope
-    a, b = EDGES.T
-    edges = 4 * (volume[:, a, None] * slope[b] + volume[:, b, None] * slope[a])
-    return np.concatenate([corners, edges], axis=1).transpose(0, 2, 1)
+    return simplex_gradient(xi, EDGES)
 
 
-def _volume_coordinates(xi: np.ndarray) -> np.ndarray:
+def simplex_shape(xi: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Shape functions of a quadratic triangle or tetrahedron, corners first, then the middles of its `edges` (e, 2):
+    xi (P, d) → (P, d + 1 + e)."""
+    share, (a, b) = _shares(xi), edges.T
+    return np.hstack([share * (2 * share - 1), 4 * share[:, a] * share[:, b]])
+
+
+def simplex_gradient(xi: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Derivatives of `simplex_shape` with respect to the natural coordinates: xi (P, d) → (P, d, d + 1 + e)."""
+    share, (a, b) = _shares(xi), edges.T
+    slope = np.vstack([-np.ones(xi.shape[1]), np.eye(xi.shape[1])])
+    corners = (4 * share - 1)[:, :, None] * slope
+    middles = 4 * (share[:, a, None] * slope[b] + share[:, b, None] * slope[a])
+    return np.concatenate([corners, middles], axis=1).transpose(0, 2, 1)
+
+
+def _shares(xi: np.ndarray) -> np.ndarray:
+    """Share of every corner in a point, its area or volume coordinates."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 

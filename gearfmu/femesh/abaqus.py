@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from gearfmu.errors import MeshError
+from gearfmu.fem.bulk_data import mesh_text
+from gearfmu.femesh.mesh import LabelledMesh
 
 SOLIDS = {"C3D8": ("hexahedron", 8), "C3D20": ("hexahedron20", 20), "C3D10": ("tetra10", 10)}
 # Solids that are recognised, so that they can be refused by name.
@@ -22,17 +24,16 @@ _SUFFIXES = ("", "R", "I", "H", "RH", "IH", "M", "MH", "RI", "RS", "HS")
 
 
 @dataclass
-class Deck:
-    """What a deck says about its mesh, in the numbers of the file.
+class _Deck:
+    """The mesh of a deck so far, in the numbers of the file.
 
-    nodes : label → coordinates, length unit of the file. cells : kind (names of meshio) → element label → node labels.
-    sets : name in capitals → node labels. skipped : element types that are no solids, with their number.
+    nodes : label → coordinates. cells : kind → element label → node labels. sets : name in capitals → node labels, "*"
+    before that of a set of elements. instances : how many there were.
     """
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     cells: dict[str, dict[int, list[int]]] = field(default_factory=dict)
     sets: dict[str, list[int]] = field(default_factory=dict)
-    skipped: dict[str, int] = field(default_factory=dict)
     instances: int = 0
 
 
@@ -46,10 +47,10 @@ class _Block:
     place: str
 
 
-def read_deck(path: Path) -> Deck:
+def read_deck(path: Path) -> LabelledMesh:
     """The mesh of a deck. MeshError, with file and line, for what would be read wrongly: a second or moved instance,
     nodes in another system of coordinates, unknown solid elements, a set or file that is not there."""
-    deck = Deck()
+    deck = _Deck()
     readers = {"NODE": _nodes, "ELEMENT": _elements, "NSET": _node_set, "INSTANCE": _instance, "SYSTEM": _system}
     for block in _blocks(path):
         if block.keyword in readers:
@@ -59,18 +60,18 @@ def read_deck(path: Path) -> Deck:
                 raise MeshError(
                     f"{block.place}: *{block.keyword} cannot be read ({error}): correct this line"
                 ) from None
-    return deck
+    labels = np.array(sorted(deck.nodes), dtype=int)
+    return LabelledMesh(
+        labels,
+        np.array([deck.nodes[label] for label in labels]).reshape(-1, 3),
+        {kind: np.array(list(block.values())) for kind, block in deck.cells.items()},
+        {name: np.array(own, dtype=int) for name, own in deck.sets.items() if not name.startswith("*")},
+    )
 
 
 def _blocks(path: Path, depth: int = 0) -> Iterator[_Block]:
     """The keyword blocks of a deck, those of its *INCLUDE files in their place."""
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None
-    block: _Block | None = None
-    for block_or_file in _grouped(path, text):
-        block = block_or_file
+    for block in _grouped(path, mesh_text(path)):
         if block.keyword == "INCLUDE":
             if depth > 8:
                 raise MeshError(f"{block.place}: files include each other more than eight deep: put them into one")
@@ -108,7 +109,7 @@ def _keyword(line: str, place: str) -> _Block:
     )
 
 
-def _nodes(deck: Deck, block: _Block) -> None:
+def _nodes(deck: _Deck, block: _Block) -> None:
     if block.parameters.get("SYSTEM", "R").upper() != "R":
         raise MeshError(f"{block.place}: nodes in cylindrical or spherical coordinates: write them in x, y, z")
     labels = []
@@ -121,7 +122,7 @@ def _nodes(deck: Deck, block: _Block) -> None:
         deck.sets.setdefault(block.parameters["NSET"].upper(), []).extend(labels)
 
 
-def _elements(deck: Deck, block: _Block) -> None:
+def _elements(deck: _Deck, block: _Block) -> None:
     given = block.parameters.get("TYPE", "").upper()
     known = {name + suffix: kind for name, kind in (SOLIDS | OTHER_SOLIDS).items() for suffix in _SUFFIXES}
     if given not in known:
@@ -129,7 +130,6 @@ def _elements(deck: Deck, block: _Block) -> None:
             raise MeshError(
                 f"{block.place}: solid elements of type {given} are not known here: use {', '.join(SOLIDS)}"
             )
-        deck.skipped[given] = deck.skipped.get(given, 0) + len(block.rows)
         return
     kind, count = known[given]
     numbers = [int(item) for row in block.rows for item in row if item]
@@ -142,7 +142,7 @@ def _elements(deck: Deck, block: _Block) -> None:
         deck.sets.setdefault(f"*{block.parameters['ELSET'].upper()}", []).extend(np.unique(table[:, 1:]).tolist())
 
 
-def _node_set(deck: Deck, block: _Block) -> None:
+def _node_set(deck: _Deck, block: _Block) -> None:
     name = block.parameters.get("NSET", "").upper()
     found = deck.sets.setdefault(name, [])
     if "ELSET" in block.parameters:
@@ -158,7 +158,7 @@ def _node_set(deck: Deck, block: _Block) -> None:
             found.extend([int(plain)] if plain.isdigit() else _named_set(deck, plain.upper(), name, block.place))
 
 
-def _named_set(deck: Deck, wanted: str, name: str, place: str) -> list[int]:
+def _named_set(deck: _Deck, wanted: str, name: str, place: str) -> list[int]:
     if wanted not in deck.sets:
         raise MeshError(
             f"{place}: the node set {name} is made of the set {wanted.lstrip('*')}, which is not defined above it"
@@ -166,7 +166,7 @@ def _named_set(deck: Deck, wanted: str, name: str, place: str) -> list[int]:
     return list(deck.sets[wanted])
 
 
-def _instance(deck: Deck, block: _Block) -> None:
+def _instance(deck: _Deck, block: _Block) -> None:
     deck.instances += 1
     if deck.instances > 1:
         raise MeshError(f"{block.place}: a second *INSTANCE: write the body as one mesh (flat deck, without instances)")
@@ -177,6 +177,6 @@ def _instance(deck: Deck, block: _Block) -> None:
         )
 
 
-def _system(deck: Deck, block: _Block) -> None:
+def _system(deck: _Deck, block: _Block) -> None:
     if block.rows:
         raise MeshError(f"{block.place}: *SYSTEM moves the nodes that follow: write them in global x, y, z")

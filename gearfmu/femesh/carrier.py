@@ -31,6 +31,7 @@ from gearfmu.femesh.lattice import (
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.geometry.mesh import CarrierGeometry
+from gearfmu.geometry.plane import direction
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 
 _CORE = 0.55  # reach of the core in parts of the bolt's radius
@@ -87,7 +88,7 @@ def _section(g: CarrierGeometry, mesh: CarrierMeshSpec) -> tuple[np.ndarray, np.
     around, sides = graded(mesh.scaled(mesh.around), 1.0), graded(mesh.scaled(mesh.sides, 2), 1.0)
     turns = [_OUTWARD * around, _OUTWARD + (_INWARD - _OUTWARD) * sides, _INWARD + (math.pi - _INWARD) * around]
     centre = np.array([g.a, 0.0])
-    circle = _joined([centre + g.r_bolt * _directions(turn) for turn in turns])
+    circle = _joined([centre + g.r_bolt * direction(turn) for turn in turns])
     core = _joined(_core_sides(g, centre, around, sides))
     edge = _joined(_edges_of_plate(g, around, sides))
     bottom = core[2][-1] + np.outer(sides, core[0][0] - core[2][-1])
@@ -103,7 +104,7 @@ def _section(g: CarrierGeometry, mesh: CarrierMeshSpec) -> tuple[np.ndarray, np.
 def _core_sides(g: CarrierGeometry, centre: np.ndarray, around: np.ndarray, sides: np.ndarray) -> list[np.ndarray]:
     """The core's right, upper and left side."""
     reach = _CORE * g.r_bolt
-    corners = [centre + reach * _directions(np.array([angle]))[0] for angle in (0, _OUTWARD, _INWARD, math.pi)]
+    corners = [centre + reach * direction(angle) for angle in (0, _OUTWARD, _INWARD, math.pi)]
     shares = (around, sides, around)
     return [a + np.outer(t, b - a) for a, b, t in zip(corners[:-1], corners[1:], shares, strict=True)]
 
@@ -111,12 +112,8 @@ def _core_sides(g: CarrierGeometry, centre: np.ndarray, around: np.ndarray, side
 def _edges_of_plate(g: CarrierGeometry, around: np.ndarray, sides: np.ndarray) -> list[np.ndarray]:
     """Outer edge from the middle to the cut, the cut inwards, the bore's edge from the cut to the middle."""
     half = math.pi / g.planets
-    cut = (g.r_o + (g.r_bore - g.r_o) * sides)[:, None] * _directions(np.array([half]))
-    return [g.r_o * _directions(half * around), cut, g.r_bore * _directions(half * (1 - around))]
-
-
-def _directions(angle: np.ndarray) -> np.ndarray:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    cut = (g.r_o + (g.r_bore - g.r_o) * sides)[:, None] * direction(half)
+    return [g.r_o * direction(half * around), cut, g.r_bore * direction(half * (1 - around))]
 
 
 def _joined(curves: list[np.ndarray]) -> list[np.ndarray]:

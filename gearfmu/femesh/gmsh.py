@@ -7,12 +7,12 @@ in no physical group, and fails where all entities are saved; format 2.2 it read
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from gearfmu.errors import MeshError
+from gearfmu.femesh.mesh import LabelledMesh
 
 _TYPES = {
     1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8), 6: ("wedge", 6),
@@ -27,28 +27,19 @@ _VTK_ORDER = {
 _REMEDY = "save the mesh again as 'MSH 4.1' or 'MSH 2.2'"
 
 
-@dataclass
-class GmshMesh:
-    """nodes (N, 3) in the file's unit and their labels (N,); solids: type → (E, k) node labels in VTK order; sets: name
-    of a physical group → node labels."""
-
-    nodes: np.ndarray
-    labels: np.ndarray
-    solids: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    sets: dict[str, list[np.ndarray]] = field(default_factory=dict)
-
-
 def is_format_4(path: Path) -> bool:
     """Whether the file says that it has format 4."""
     with path.open("rb") as file:
         return file.readline().strip() == b"$MeshFormat" and file.readline().startswith(b"4")
 
 
-def read_gmsh(path: Path) -> GmshMesh:
+def read_gmsh(path: Path) -> LabelledMesh:
     """Nodes, solids and physical groups of a file of format 4.1. MeshError for another version, a file that ends early
     and elements of an order above two."""
     file, names, groups = _File(path), {}, {}
-    mesh = GmshMesh(np.empty((0, 3)), np.empty(0, int))
+    nodes, labels = np.empty((0, 3)), np.empty(0, int)
+    solids: dict[str, list[np.ndarray]] = {}
+    sets: dict[str, list[np.ndarray]] = {}
     for section in file.sections():
         if section == "PhysicalNames":
             names = _names(file)
@@ -57,14 +48,16 @@ def read_gmsh(path: Path) -> GmshMesh:
         elif section == "PartitionedEntities":
             raise MeshError(f"{path}: the mesh is partitioned: save it without partitions")
         elif section == "Nodes":
-            mesh.nodes, mesh.labels = _nodes(file)
+            nodes, labels = _nodes(file)
         elif section == "Elements":
             for place, kind, cells in _elements(file):
                 if place[0] == 3:
-                    mesh.solids.setdefault(kind, []).append(cells)
+                    solids.setdefault(kind, []).append(cells)
                 for name in {names[group] for group in groups.get(place, ()) if group in names}:
-                    mesh.sets.setdefault(name, []).append(cells.ravel())
-    return mesh
+                    sets.setdefault(name, []).append(cells.ravel())
+    order = np.argsort(labels)
+    joined = ({name: np.concatenate(blocks) for name, blocks in parts.items()} for parts in (solids, sets))
+    return LabelledMesh(labels[order], nodes[order], *joined)
 
 
 class _File:

@@ -16,8 +16,9 @@ import meshio
 import numpy as np
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh.abaqus import Deck, read_deck
+from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.gmsh import is_format_4, read_gmsh
+from gearfmu.femesh.mesh import LabelledMesh
 from gearfmu.femesh.nastran import nastran_problems, nastran_sets
 
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
@@ -42,20 +43,6 @@ class ImportedMesh:
     source: Path
     raised: int = 0
 
-    @property
-    def cells(self) -> np.ndarray:
-        """(E, 20) node indices of every element, −1 where it has fewer nodes."""
-        rows = [
-            np.pad(block, ((0, 0), (0, 20 - block.shape[1])), constant_values=-1) for block in self.elements.values()
-        ]
-        return np.concatenate(rows)
-
-    @property
-    def repeated_cells(self) -> np.ndarray:
-        """(E, 20) node indices of every element; one of fewer nodes repeats its first."""
-        cells = self.cells
-        return np.where(cells >= 0, cells, cells[:, :1])
-
     def node_set(self, name: str) -> np.ndarray:
         """Node indices of a set, capitals or not. MeshError names the sets there are."""
         for own, nodes in self.sets.items():
@@ -67,6 +54,11 @@ class ImportedMesh:
         raise MeshError(f"{self.source}: there is no node set '{name}'; sets in the file: {there}")
 
 
+def repeated_cells(elements: dict[str, np.ndarray]) -> np.ndarray:
+    """(E, 20) node indices of elements of every kind; one of fewer nodes repeats its first."""
+    return np.concatenate([np.hstack([b, np.repeat(b[:, :1], 20 - b.shape[1], axis=1)]) for b in elements.values()])
+
+
 def read_mesh(path: str | Path, length: float, ignore: tuple[str, ...] = ()) -> ImportedMesh:
     """The mesh of a file. length : m per length unit of the file. ignore : node sets of reference nodes, left out.
 
@@ -76,9 +68,9 @@ def read_mesh(path: str | Path, length: float, ignore: tuple[str, ...] = ()) -> 
     source = Path(path)
     suffix = source.suffix.lower()
     if suffix == ".inp":
-        nodes, cells, sets, labels = _from_deck(read_deck(source), source)
+        nodes, cells, sets, labels = _indexed(read_deck(source), source, "node set")
     elif suffix == ".msh" and source.is_file() and is_format_4(source):
-        nodes, cells, sets, labels = _from_gmsh(source)
+        nodes, cells, sets, labels = _indexed(read_gmsh(source), source, "physical group")
     elif suffix in _FORMATS:
         nodes, cells, sets, labels = _from_meshio(source, _FORMATS[suffix])
     else:
@@ -98,8 +90,6 @@ def read_surface(source: Path, length: float) -> tuple[np.ndarray, np.ndarray, n
         raise MeshError(
             f"{source}: '{source.suffix}' is no surface that is read here: write one of {', '.join(_FORMATS)}"
         )
-    if file_format == "nastran" and (problem := nastran_problems(source)):
-        raise MeshError(problem)
     mesh = _read_by_meshio(source, file_format)
     wide = {"quad": [0, 1, 2, 3], "triangle": [0, 1, 2, 2]}
     blocks = [block.data[:, wide[block.type]] for block in mesh.cells if block.type in wide]
@@ -110,34 +100,14 @@ def read_surface(source: Path, length: float) -> tuple[np.ndarray, np.ndarray, n
     return length * np.asarray(mesh.points, float), np.vstack(blocks), _labels(mesh)
 
 
-def _from_deck(deck: Deck, source: Path) -> tuple:
-    labels = np.array(sorted(deck.nodes), dtype=int)
-    nodes = np.array([deck.nodes[label] for label in labels]).reshape(-1, 3)
-    cells = {
-        kind: _numbered(np.array(list(block.values())), labels, source, f"elements ({kind})")
-        for kind, block in deck.cells.items()
-    }
+def _indexed(mesh: LabelledMesh, source: Path, set_kind: str) -> tuple:
+    """A mesh in node numbers as one in indices. set_kind : what the file calls its sets, for messages."""
+    cells = {kind: _numbered(block, mesh.labels, source, f"elements ({kind})") for kind, block in mesh.cells.items()}
     sets = {
-        name: np.unique(_numbered(np.array(members, dtype=int), labels, source, f"node set {name}"))
-        for name, members in deck.sets.items()
-        if not name.startswith("*")
+        name: np.unique(_numbered(members, mesh.labels, source, f"{set_kind} {name}"))
+        for name, members in mesh.sets.items()
     }
-    return nodes, cells, sets, labels
-
-
-def _from_gmsh(source: Path) -> tuple:
-    mesh = read_gmsh(source)
-    order = np.argsort(mesh.labels)
-    labels = mesh.labels[order]
-    cells = {
-        kind: _numbered(np.concatenate(blocks), labels, source, f"elements ({kind})")
-        for kind, blocks in mesh.solids.items()
-    }
-    sets = {
-        name: np.unique(_numbered(np.concatenate(blocks), labels, source, f"physical group {name}"))
-        for name, blocks in mesh.sets.items()
-    }
-    return mesh.nodes[order], cells, sets, labels
+    return mesh.nodes, cells, sets, mesh.labels
 
 
 def _numbered(members: np.ndarray, labels: np.ndarray, source: Path, what: str) -> np.ndarray:
@@ -152,8 +122,6 @@ def _numbered(members: np.ndarray, labels: np.ndarray, source: Path, what: str) 
 
 
 def _from_meshio(source: Path, file_format: str) -> tuple:
-    if file_format == "nastran" and (problem := nastran_problems(source)):
-        raise MeshError(problem)
     mesh = _read_by_meshio(source, file_format)
     cells: dict[str, list[np.ndarray]] = {}
     for block in mesh.cells:
@@ -175,6 +143,8 @@ def _labels(mesh: meshio.Mesh) -> np.ndarray:
 
 
 def _read_by_meshio(source: Path, file_format: str) -> meshio.Mesh:
+    if file_format == "nastran" and (problem := nastran_problems(source)):
+        raise MeshError(problem)
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

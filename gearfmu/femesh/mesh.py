@@ -6,6 +6,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gearfmu.geometry.plane import about_z
+
+
+@dataclass(frozen=True)
+class LabelledMesh:
+    """A mesh in the node numbers of its file: labels (N,), ascending, and nodes (N, 3) in its unit of length; cells:
+    kind (names of meshio) → (E, k) labels in VTK order; sets: name → labels."""
+
+    labels: np.ndarray
+    nodes: np.ndarray
+    cells: dict[str, np.ndarray]
+    sets: dict[str, np.ndarray]
+
 
 @dataclass(frozen=True)
 class FlankGrid:
@@ -80,5 +93,4 @@ class FeMesh:
 
 def rotated(points: np.ndarray, angle: float) -> np.ndarray:
     """Points (N, 3) turned about +z by `angle` (rad)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return points @ about_z(-angle)

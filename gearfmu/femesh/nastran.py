@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gearfmu.errors import MeshError
+from gearfmu.fem.bulk_data import card_fields, mesh_text
 
 _SET = re.compile(r"\s*SET\s+(\w+)\s*=\s*(.*)", re.IGNORECASE)
 _RANGE = re.compile(r"(\d+)\s+THRU\s+(\d+)", re.IGNORECASE)
@@ -14,7 +14,7 @@ _RANGE = re.compile(r"(\d+)\s+THRU\s+(\d+)", re.IGNORECASE)
 def nastran_sets(path: Path) -> dict[str, list[int]]:
     """Node numbers of `SET n = 1, 2, 7 THRU 9` (case control) by the set's number as text: "n"."""
     sets: dict[str, list[int]] = {}
-    lines = iter(_text(path).splitlines())
+    lines = iter(mesh_text(path).splitlines())
     for line in lines:
         found = _SET.match(line.split("$")[0])
         if not found:
@@ -34,13 +34,13 @@ def nastran_sets(path: Path) -> dict[str, list[int]]:
 
 def nastran_problems(path: Path) -> str | None:
     """Why meshio would read this file wrongly, or None."""
-    text = _text(path)
+    text = mesh_text(path)
     if "BEGIN BULK" not in text.upper():
         return f"{path}: there is no line BEGIN BULK: write the whole input file, not only the cards"
     if "ENDDATA" not in text.upper():
         return f"{path}: there is no line ENDDATA: the file ends early"
     for number, line in enumerate(text.splitlines(), start=1):
-        if line.upper().startswith("GRID") and (system := _field(line, 2)) not in ("", "0"):
+        if line.upper().startswith("GRID") and (system := [*card_fields(line), "", ""][2]) not in ("", "0"):
             return (
                 f"{path}:{number}: a GRID in coordinate system {system}, which is not applied here: write the nodes in "
                 "the basic system"
@@ -48,20 +48,3 @@ def nastran_problems(path: Path) -> str | None:
         if line.upper().startswith("INCLUDE"):
             return f"{path}:{number}: INCLUDE is not followed: write one file"
     return None
-
-
-def _field(line: str, number: int) -> str:
-    """Field of a card in free, small or large format; 0 is the card's name."""
-    if "," in line:
-        fields = line.split(",")
-        return fields[number].strip() if number < len(fields) else ""
-    width = 16 if line.split()[0].endswith("*") else 8
-    first = 8 + width * (number - 1)
-    return line[first : first + width].strip()
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None

@@ -18,6 +18,7 @@ from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, f
 from gearfmu.femesh.sector import gear_sector, sector_of
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.plane import direction
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
 
@@ -51,16 +52,16 @@ def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tup
     share = graded(mesh.scaled(mesh.root, 2), 1.0)
     flank, surface = ring.flank_point(roll), _root_curve(ring, share)
     surface[0] = flank[0]
-    tooth_middle = _direction(ring.half_pitch)
+    tooth_middle = direction(ring.half_pitch)
     core, depth = _core_arc(ring, flank[0], share)
     top = ring.r_a * tooth_middle
     middle = core[0] + parameter(flank)[:, None] * (top - core[0])
     half = ring.half_pitch - ring.tip_half_angle
-    tip = ring.r_a * _direction(half + (ring.half_pitch - half) * across[:, 0])
+    tip = ring.r_a * direction(half + (ring.half_pitch - half) * across[:, 0])
     middle[-1], tip[0], tip[-1] = top, flank[-1], top
     neck = flank[0] + across * (core[0] - flank[0])
     neck[-1] = core[0]
-    outer = ring.r_rim * _direction((1 - share) * ring.half_pitch)
+    outer = ring.r_rim * direction((1 - share) * ring.half_pitch)
     outer[-1] = (ring.r_rim, 0.0)
     up = rim_parameters(ring.r_rim - ring.r_f - depth, depth, mesh)[:, None]
     below = np.concatenate([surface[-1:], surface[-1] + across[1:] * [depth, 0.0]])
@@ -77,7 +78,7 @@ def _root_curve(ring: InternalGearGeometry, share: np.ndarray) -> np.ndarray:
     wanted = share * (ring.fillet_length + land)
     angle = np.maximum(ring.fillet_length + land - wanted, 0.0) / ring.r_f
     on_fillet = ring.fillet_point(np.minimum(wanted / ring.fillet_length, 1.0))
-    curve = np.where((wanted > ring.fillet_length)[:, None], ring.r_f * _direction(angle), on_fillet)
+    curve = np.where((wanted > ring.fillet_length)[:, None], ring.r_f * direction(angle), on_fillet)
     curve[-1] = (ring.r_f, 0.0)
     return curve
 
@@ -88,14 +89,10 @@ def _core_arc(ring: InternalGearGeometry, form: np.ndarray, share: np.ndarray) -
     if rim <= 0:
         raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make its diameter larger")
     depth = min(ROOT_DEPTH * ring.m, RIM_SHARE * rim)
-    along = _direction(ring.half_pitch)
+    along = direction(ring.half_pitch)
     half_thickness = along[1] * form[0] - along[0] * form[1]
     middle = min(form @ along + CORE_SLOPE * half_thickness, ring.r_f + RIM_SHARE * rim)
     radius = ring.r_f + depth + (middle - ring.r_f - depth) * (1 - share) ** 2
-    arc = radius[:, None] * _direction((1 - share) * ring.half_pitch)
+    arc = radius[:, None] * direction((1 - share) * ring.half_pitch)
     arc[0], arc[-1] = middle * along, (ring.r_f + depth, 0.0)
     return arc, depth
-
-
-def _direction(angle: float | np.ndarray) -> np.ndarray:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)

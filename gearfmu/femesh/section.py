@@ -19,6 +19,7 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
+from gearfmu.geometry.plane import direction
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
 ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
@@ -92,11 +93,11 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
     core[-1], surface[-1] = (gear.r_f - depth) * space, gear.r_f * space
     middle = core[0] + (gear.r_a - core[0, 0]) * parameter(flank)[:, None] * [1, 0]
     tip_angle = gear.tip_half_angle * (1 - across)
-    tip = gear.r_a * np.concatenate([np.cos(tip_angle), np.sin(tip_angle)], axis=1)
+    tip = gear.r_a * direction(tip_angle[:, 0])
     middle[-1], tip[0], tip[-1] = (gear.r_a, 0.0), flank[-1], (gear.r_a, 0.0)
     neck = flank[0] + across * (core[0] - flank[0])
     neck[-1] = core[0]
-    bore = gear.r_bore * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
+    bore = gear.r_bore * direction(share * gear.half_pitch)
     bore[-1] = gear.r_bore * space
     down = rim_parameters(gear.r_f - depth - gear.r_bore, depth, mesh)[:, None]
     tooth = transfinite(neck, tip, flank, middle)
@@ -133,7 +134,7 @@ def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
     land = rounding.land_angle * gear.r_f
     wanted = share * (run[-1] + land)
     angle = gear.half_pitch - rounding.land_angle + np.maximum(wanted - run[-1], 0.0) / gear.r_f
-    on_land = gear.r_f * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    on_land = gear.r_f * direction(angle)
     on_trochoid = rounding.point(np.interp(wanted, run, tau))
     return np.where((wanted > run[-1])[:, None], on_land, on_trochoid)
 
@@ -146,5 +147,4 @@ def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[
     radius = gear.r_f - depth + (middle - gear.r_f + depth) * (1 - share) ** 2
     if rim <= 0 or radius.min() <= gear.r_bore:
         raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make the bore smaller")
-    angle = share * gear.half_pitch
-    return radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1), depth
+    return radius[:, None] * direction(share * gear.half_pitch), depth

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from gearfmu.geometry import involute
+from gearfmu.geometry.plane import about_z
 
 _NEAR = 0.03  # share of r_b by which the normal of a flank face may miss the base circle
 _ASIDE = 0.3  # share of ψ_b by which the base angle of a flank face may miss those of its side
@@ -71,7 +72,7 @@ class InvoluteFit:
 
     def turn(self) -> np.ndarray:
         """(3, 3) rotation into the frame of the gear."""
-        return _about_z(-self.phase) @ _tilt(self.direction)
+        return about_z(-self.phase) @ _tilt(self.direction)
 
 
 def flank_faces(centres: np.ndarray, normals: np.ndarray, teeth: int, r_b: float | None = None) -> FlankPoints:
@@ -166,8 +167,3 @@ def _tilt(direction: np.ndarray) -> np.ndarray:
     x, y, z = direction
     factor = 1 / (1 + z)
     return np.array([[1 - x * x * factor, -x * y * factor, -x], [-x * y * factor, 1 - y * y * factor, -y], [x, y, z]])
-
-
-def _about_z(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

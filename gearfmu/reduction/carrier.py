@@ -29,7 +29,7 @@ def carrier_full_order(carrier: CarrierBody, scale: float = 1.0) -> FullOrder:
     is. Rotations count with the bolt circle's radius. Raises MeshError.
     """
     if carrier.imported is not None:
-        return imported_carrier(carrier).full
+        return imported_carrier(carrier)[0]
     sector = scaled_sector(carrier, scale)
     full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.circle))
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full

@@ -96,8 +96,8 @@ def averaging(body: Elements, nodes: np.ndarray, point: np.ndarray) -> sp.csr_ar
     Area-weighted over the element faces whose nodes are all in the set; with equal weight on every node where elements
     are not 20-node hexahedra or the set spans no face.
     """
-    faces = surface.faces_within(body.elements, nodes) if body.elements.shape[1] == 20 else np.empty((0, 8), int)
-    about_origin = averaging_rows(body.nodes, faces) if len(faces) else averaging_rows_uniform(body.nodes, nodes)
+    faces = surface.faces_within(body.elements, nodes) if body.elements.shape[1] == 20 else None
+    about_origin = averaging_rows(body.nodes, faces) if faces else averaging_rows_uniform(body.nodes, nodes)
     return sp.csr_array(moved(about_origin, point))
 
 

@@ -6,8 +6,7 @@ between the interfaces that are not ground, the ground interfaces of a free body
 the same in both, is modal damping ζ at resonance. Rotations are multiplied, moments divided, by the body's length.
 
 Reference: the full model on so many moments (`moments`: 0 and points in the band) that the next blocks change H
-nowhere in the band by more than 1e-12 of its norm or by what rounding leaves; `direct` solves the full model itself at
-one line, which is how a reference is verified. Theory, eqs. 26 and 27.
+nowhere in the band by more than 1e-12 of its norm or by what rounding leaves. Theory, eqs. 26 and 27.
 """
 
 from __future__ import annotations
@@ -15,10 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from gearfmu.errors import BodyError
-from gearfmu.fem.indefinite import SymmetricFactor
 from gearfmu.reduction.basis import BAND, Growing
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -144,17 +141,3 @@ class _Moments:
     def projection(self) -> Projection:
         """What is there so far, without static residual."""
         return Projection("moments", self.stiffness, self.rows, np.zeros((len(self.rows),) * 2))
-
-
-def direct(body: FullOrder, frequency: float, damping_ratio: float) -> np.ndarray:
-    """H (m, m) at one line by factorising K(1 + 2iζ) − Ω²M of the full model, ground held by constraint."""
-    held = body.grounded()
-    matrix = sp.csr_array(held.stiffness * (1 + 2j * damping_ratio) - (2 * np.pi * frequency) ** 2 * held.mass)
-    factor = SymmetricFactor(matrix, held.cells, held.node_of_dof)
-    rows = sp.csr_array(sp.diags_array(held.scales()) @ held.rows())
-    response = factor.solve(rows.T.toarray().astype(complex))
-    if held.constraints is not None:
-        reaction = factor.solve(held.constraints.T.toarray().astype(complex))
-        carried = np.linalg.solve(held.constraints @ reaction, held.constraints @ response)
-        response = response - reaction @ carried
-    return rows @ response

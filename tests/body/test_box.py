@@ -13,6 +13,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 from blocks import STEEL, box
+from line_by_line import direct
 from small_body import averaging
 
 from gearfmu.body import Body, bodies, load_body, sound
@@ -27,7 +28,7 @@ from gearfmu.reduction.basis import Size
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
 from gearfmu.reduction.imported.skin import enveloping_surface
-from gearfmu.reduction.transfer import Judging, direct
+from gearfmu.reduction.transfer import Judging
 from gearfmu.sound import skin_of
 from gearfmu.stage.assembly.ground_part import ground_part
 
@@ -71,7 +72,7 @@ def surface() -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
     """The outside of the box: points, faces of four corners, and the rows of their displacement."""
     nodes, cells = mesh()
     outside = np.flatnonzero(np.any(np.abs(np.abs(nodes) - np.array(SIZE) / 2) < 1e-9, axis=1))
-    faces = faces_within(cells, outside)[:, :4]
+    faces = faces_within(cells, outside).corners
     used, numbers = np.unique(faces, return_inverse=True)
     dofs = (3 * used[:, None] + np.arange(3)).ravel()
     rows = sp.csr_array((np.ones(dofs.size), (np.arange(dofs.size), dofs)), (dofs.size, nodes.size))

@@ -20,14 +20,11 @@ def held(nodes, elements, fixed):
     return k[free][:, free], free
 
 
-@pytest.mark.parametrize("kind", [float, complex])
-def test_solution_is_that_of_a_general_solver(kind):
+def test_solution_is_that_of_a_general_solver():
     nodes, elements = ring((3, 12, 3), 0.02, 0.05, 0.03)
     matrix, free = held(nodes, elements, nodes[:, 2] < -0.0149)
     rng = np.random.default_rng(0)
-    rhs = rng.standard_normal((len(free), 200)).astype(kind)
-    if kind is complex:
-        rhs += 1j * rng.standard_normal(rhs.shape)
+    rhs = rng.standard_normal((len(free), 200))
     solution = Factor(matrix, elements, free // 3).solve(rhs)
     assert np.abs(matrix @ solution - rhs).max() < 1e-9 * np.abs(matrix.data).max() * np.abs(solution).max()
     assert np.allclose(

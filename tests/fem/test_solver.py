@@ -33,8 +33,7 @@ def test_pypardiso_gives_the_same_solutions(sign: int) -> None:
     make = solver.definite_factor if sign > 0 else solver.symmetric_factor
     fast = make(matrix, ELEMENTS, NODE_OF_DOF)
     assert isinstance(fast, solver.PardisoFactor)
-    for rhs in (RHS, RHS + 1j * RHS[::-1]):
-        assert np.linalg.norm(fast.solve(rhs) - own.solve(rhs)) < 1e-9 * np.linalg.norm(own.solve(rhs))
+    assert np.linalg.norm(fast.solve(RHS) - own.solve(RHS)) < 1e-9 * np.linalg.norm(own.solve(RHS))
 
 
 @pytest.mark.needs("pypardiso")

@@ -54,7 +54,7 @@ def test_carrier_elements_are_good_cuts_match_and_sets_are_the_seats(carrier):
     assert np.hypot(seat[:, 0] - CARRIER.a, seat[:, 1]) == pytest.approx(CARRIER.r_bolt, rel=1e-12)
     assert (seat[:, 2].min(), seat[:, 2].max()) == (-10e-3, 10e-3)
     assert np.hypot(*carrier.nodes[carrier.sets["bore"], :2].T) == pytest.approx(CARRIER.r_bore, rel=1e-12)
-    faces = surface.faces_within(carrier.elements, carrier.sets["bolt"])
+    faces = surface.faces_within(carrier.elements, carrier.sets["bolt"]).quads
     points = carrier.nodes[faces]
     area = np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 3] - points[:, 0]), axis=1).sum()
     assert area == pytest.approx(2 * math.pi * CARRIER.r_bolt * CARRIER.seat, rel=0.03)

@@ -14,9 +14,11 @@ from decks import STEEL, brick, write_deck
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
-from gearfmu.femesh.imported import read_mesh
+from gearfmu.femesh.imported import ImportedMesh, read_mesh, repeated_cells
+from gearfmu.reduction.couplings import Judgement, full_order
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported.couplings import elements_of, set_coupling
 
 MM = 1e-3
 KINDS = ("hexahedron20", "tetra10", "hexahedron")
@@ -87,7 +89,8 @@ def test_hexahedra_and_tetrahedra_in_one_deck(tmp_path: Path) -> None:
     mesh = read_mesh(write_deck(tmp_path / "b.inp", np.concatenate([nodes, others + 20]), both), MM)
     mass = solids.assemble(mesh.nodes, mesh.elements, STEEL)[1]
     assert mass.sum() / 3 == pytest.approx(2 * 7850e-6)
-    assert len(mesh.cells) == 7 and (mesh.cells[1:, 10:] == -1).all()
+    cells = repeated_cells(mesh.elements)
+    assert len(cells) == 7 and (cells[1:, 10:] == cells[1:, :1]).all()
 
 
 def test_traps_of_decks(tmp_path: Path) -> None:
@@ -241,16 +244,22 @@ def test_rows_must_be_the_displacements_of_all_nodes(tmp_path: Path, matrix: np.
 
 
 # ---- sets of nodes as interfaces -------------------------------------------------------------------------------------
+def coupled(mesh: ImportedMesh, interfaces: list[tuple[str, str]]) -> FullOrder:
+    """The free body of a mesh with node sets and their kinds as interfaces."""
+    faces = solids.boundary(mesh.elements)
+    couplings = [set_coupling(mesh, faces, name, kind) for name, kind in interfaces]
+    return full_order("b", elements_of(mesh, None, STEEL), couplings, Judgement((), 0.05))
+
+
 @pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "hexahedron"])
 def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) -> None:
     """A bar pulled at averaging and rigid ends: the static stretch is F L / (E A), in between for the rigid ends."""
     nodes, cells = brick(kind, (8, 2, 2))
     ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {kind: cells}, ends), MM)
-    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
     stretch = {}
     for coupling in ("averaging", "rigid"):
-        body = full_order(mesh, matrices, [SetInterface("LEFT", coupling), SetInterface("RIGHT", coupling)])
+        body = coupled(mesh, [("LEFT", coupling), ("RIGHT", coupling)])
         assert np.abs(body.stiffness @ body.rigid).max() < 1e-8 * np.abs(body.stiffness).max()
         pull = body.rows("RIGHT")[[0]] - body.rows("LEFT")[[0]]
         stretch[coupling] = float((pull @ Elastic(body.held(body.rows("LEFT"))).flexibility(pull.T.toarray()))[0, 0])
@@ -259,15 +268,12 @@ def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) ->
     assert 0.95 * exact < stretch["rigid"] < stretch["averaging"]
 
 
-def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+def test_a_set_in_one_line_is_refused(tmp_path: Path) -> None:
     nodes, cells = brick("hexahedron20")
     edge = {"EDGE": np.flatnonzero((nodes[:, 1] == 0) & (nodes[:, 2] == 0))}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": cells}, edge), MM)
-    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
     with pytest.raises(MeshError, match="'edge' lie in one line"):
-        full_order(mesh, matrices, [SetInterface("edge")])
-    with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
-        full_order(mesh, matrices, [SetInterface("edge", "welded")])
+        coupled(mesh, [("edge", "averaging")])
 
 
 def test_a_byte_order_mark_and_line_ends_change_no_deck(tmp_path: Path) -> None:

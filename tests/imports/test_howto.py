@@ -1,4 +1,4 @@
-"""docs/howto-import.md does what it says, and CalculiX's matrices have CalculiX's frequencies."""
+"""Deck and section of docs/howto-import.md; its chain runs in tests/test_new_to_report.py."""
 
 from __future__ import annotations
 

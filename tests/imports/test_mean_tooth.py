@@ -10,8 +10,8 @@ import scipy.sparse as sp
 from small_gear import GEAR, STEEL, coarse, flank
 from turned_rows import on_tooth
 
-from gearfmu.fem import patches, solids
-from gearfmu.fem.coupling import rigid_modes
+from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows, rigid_modes
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import elastic_modes
 from gearfmu.reduction.cyclic.statics import static_tables
@@ -31,7 +31,7 @@ def whole() -> WholeGear:
     rows = tuple(
         tooth_loads(mesh.nodes, faces, flank(), coarse().points, 2 * np.pi * k / GEAR.z) for k in range(GEAR.z)
     )
-    bore = sp.csr_array(patches.averaging_rows(mesh.nodes, faces.within(mesh.sets["bore"])))
+    bore = sp.csr_array(averaging_rows(mesh.nodes, faces.within(mesh.sets["bore"])))
     body = FullOrder(
         "gear", *solids.assemble(mesh.nodes, elements, STEEL), rigid_modes(mesh.nodes),
         (Interface("bore", bore, COMPONENTS, np.zeros(3), "averaging"),), ("bore",), GEAR.r,

@@ -8,8 +8,8 @@ from blocks import free_body
 from decks import STEEL, brick
 
 from gearfmu.errors import MeshError
-from gearfmu.fem import patches, solids, tet10
-from gearfmu.fem.coupling import averaging_rows_uniform, rigid_fields, rigid_modes
+from gearfmu.fem import solids, tet10
+from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, rigid_fields, rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
 
 
@@ -72,7 +72,7 @@ def test_patches_of_triangles_average_like_surfaces(bar) -> None:
     nodes, elements = bar
     faces = solids.boundary(elements).within(np.flatnonzero(nodes[:, 0] == 0))
     assert len(faces.triangles) == 8 and len(faces.quads) == 0
-    rows = patches.averaging_rows(nodes, faces)
+    rows = averaging_rows(nodes, faces)
     motion = np.array([1e-3, -2e-3, 3e-3, 0.01, -0.02, 0.03])
     assert np.allclose(rows @ (rigid_fields(nodes) @ motion).ravel(), motion, rtol=1e-10)
     stretched = np.zeros_like(nodes)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from line_by_line import direct
 from small_body import mounted, small, tiny
 
 from gearfmu.errors import BodyError
@@ -14,7 +15,7 @@ from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import expansion_points, input_loads
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
+from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 
 BODIES = {"free": small, "held": lambda: HELD, "mounted": mounted}
 HELD = small().grounded()

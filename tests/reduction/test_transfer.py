@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from line_by_line import direct
 from small_body import mounted, small
 
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import oscillators
-from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
+from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 
 LINES = Judging.over(lines=30)
 

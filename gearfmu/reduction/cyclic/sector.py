@@ -14,6 +14,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.femesh.mesh import FeMesh
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
@@ -35,7 +36,7 @@ class SectorBody:
         self.stiffness, self.internal = stiffness, "rim" in mesh.sets
         sector = Sector(
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
-            bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
+            bool(flank.base_helix_angle), self._held_faces.nodes if rigid_bore else None,
         )  # fmt: skip
         self.material, self.spaces = material, sector_spaces(sector)
         self.load_matrix = self._all_loads()
@@ -85,7 +86,7 @@ class SectorBody:
         return self.flank_count + len(self.patch_rows)
 
     @property
-    def _held_faces(self) -> np.ndarray:
+    def _held_faces(self) -> surface.Faces:
         return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
 
     @cached_property
@@ -154,7 +155,6 @@ class SectorBody:
         """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
         total = np.zeros((6, 6))
         for angle in 2 * np.pi * np.arange(self.teeth) / self.teeth:
-            c, s = np.cos(angle), np.sin(angle)
-            turn = np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+            turn = np.kron(np.eye(2), about_z(angle))
             total += turn @ matrix @ turn.T
         return total

@@ -6,7 +6,6 @@ bore and bolts, each found as the circle that fits its nodes best (Kåsa, IEEE T
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,9 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.mesh import CarrierGeometry
-from gearfmu.reduction.couplings import Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported.couplings import elements_of, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
 from gearfmu.stagefile.forms.planetary import CarrierBody
@@ -27,16 +26,9 @@ from gearfmu.stagefile.forms.shapes import carrier_geometry
 _OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
 
 
-@dataclass(frozen=True)
-class ImportedCarrier:
-    """An imported carrier before reduction, and plain facts about its mesh."""
-
-    full: FullOrder
-    facts: dict[str, Any]
-
-
-def imported_carrier(carrier: CarrierBody) -> ImportedCarrier:
-    """The imported carrier of a planetary set: interfaces bolt0 … and bore, each coupled as the file says.
+def imported_carrier(carrier: CarrierBody) -> tuple[FullOrder, dict[str, Any]]:
+    """The imported carrier of a planetary set before reduction, and plain facts about its mesh: interfaces bolt0 … and
+    bore, each coupled as the file says.
 
     Masters lie on the bolts' axes at z = 0 and on the set's axis in the middle of the bore. MeshError lists every node
     set that does not lie where the set has it, and says what is wrong with mesh or matrices.
@@ -50,15 +42,12 @@ def imported_carrier(carrier: CarrierBody) -> ImportedCarrier:
         members = {interface: mesh.node_set(name) for interface, name in names.items()}
         points = _points(mesh, members, names, geometry)
         matrices = ready_matrices(source, mesh, np.eye(3), carrier.material)
-        matrices = matrices or Matrices(*solids.assemble(mesh.nodes, mesh.elements, carrier.material))
         faces = solids.boundary(mesh.elements)
-        couplings = [
-            set_coupling(mesh, faces, SetInterface(names[i], carrier.coupling_of(i), points[i]), i) for i in names
-        ]
-        body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
+        couplings = [set_coupling(mesh, faces, names[i], carrier.coupling_of(i), points[i], i) for i in names]
+        body = elements_of(mesh, matrices, carrier.material)
         full = full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))
     dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
-    return ImportedCarrier(full, mesh_facts(mesh) | {"method": "whole body"} | dofs)
+    return full, mesh_facts(mesh) | {"method": "whole body"} | dofs
 
 
 def _points(

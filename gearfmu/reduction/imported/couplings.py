@@ -1,4 +1,4 @@
-"""Finite elements made elsewhere as a `FullOrder`: matrices, rigid fields, node sets as interfaces.
+"""Finite elements made elsewhere and their interfaces: matrices, node sets.
 
 A node set is coupled to a master node at the centre of its nodes, rigidly (RBE2: its nodes move as one rigid body and
 leave the unknowns) or by averaging (RBE3: the mean motion of the surface, or of the nodes where they span no surface).
@@ -6,75 +6,51 @@ leave the unknowns) or by averaging (RBE3: the mean motion of the surface, or of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
-from gearfmu.fem import patches, solids
-from gearfmu.fem.coupling import rigid_fields
-from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement
-from gearfmu.reduction.couplings import full_order as coupled
-from gearfmu.reduction.full_order import FullOrder
+from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows, rigid_fields
+from gearfmu.fem.hex20 import Material
+from gearfmu.fem.surface import Faces
+from gearfmu.femesh.imported import ImportedMesh, repeated_cells
+from gearfmu.reduction.couplings import Coupling, Elements
 
-KINDS = ("averaging", "rigid")
-
-
-@dataclass(frozen=True)
-class SetInterface:
-    """A node set as an interface: the set's name in the file, kind "averaging" or "rigid", and the point (3,) m of its
-    master node (None: mean of its nodes)."""
-
-    node_set: str
-    kind: str = "averaging"
-    point: np.ndarray | None = None
+Matrices: TypeAlias = tuple[sp.csr_array, sp.csr_array]
+"""Stiffness (3N, 3N), N/m, and mass, kg, over the nodes of a mesh: unknown 3·node + component."""
 
 
-@dataclass(frozen=True)
-class Matrices:
-    """Stiffness (3N, 3N), N/m, and mass, kg, over the nodes of a mesh: unknown 3·node + component."""
-
-    stiffness: sp.csr_array
-    mass: sp.csr_array
+def elements_of(mesh: ImportedMesh, matrices: Matrices | None, material: Material) -> Elements:
+    """Finite elements of a mesh with ready-made matrices, or without these those of our own elements."""
+    own = matrices or solids.assemble(mesh.nodes, mesh.elements, material)
+    return Elements(mesh.nodes, repeated_cells(mesh.elements), *own)
 
 
-def full_order(
+def set_coupling(
     mesh: ImportedMesh,
-    matrices: Matrices,
-    interfaces: Sequence[SetInterface],
-    ground: tuple[str, ...] = (),
-    length: float | None = None,
-) -> FullOrder:
-    """The free body of an imported mesh with its matrices.
+    faces: Faces,
+    node_set: str,
+    kind: str = "averaging",
+    point: np.ndarray | None = None,
+    name: str = "",
+) -> Coupling:
+    """A node set of the file as an interface, called `name` or like the set.
 
-    ground : names of sets that are held when a reduction is judged. length : m, by which rotations are multiplied; the
-    largest distance of a node from the origin when None. MeshError for sets that are missing, empty, in one line, or
-    claimed by two rigid couplings.
+    faces : the boundary of the mesh. kind : "averaging" or "rigid". point : (3,) m, of its master node (None: mean of
+    its nodes). MeshError for a set that is missing, empty, or in one line.
     """
-    faces = solids.boundary(mesh.elements)
-    reach = float(np.linalg.norm(mesh.nodes, axis=1).max()) if length is None else length
-    body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
-    couplings = [set_coupling(mesh, faces, interface) for interface in interfaces]
-    return coupled(mesh.source.stem, body, couplings, Judgement(ground, reach))
-
-
-def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface, name: str = "") -> Coupling:
-    """The coupling of a node set to its master, called `name` or like the set. faces : the boundary of the mesh.
-    MeshError as `full_order`."""
-    if interface.kind not in KINDS:
-        raise MeshError(f"{mesh.source}: '{interface.kind}' is no kind of interface: one of {', '.join(KINDS)}")
-    members = mesh.node_set(interface.node_set)
-    point = mesh.nodes[members].mean(axis=0) if interface.point is None else np.asarray(interface.point, float)
-    _spanned(mesh, members, interface.node_set)
+    members = mesh.node_set(node_set)
+    point = mesh.nodes[members].mean(axis=0) if point is None else point
+    _spanned(mesh, members, node_set)
     rows = None
-    if interface.kind == "averaging":
+    if kind == "averaging":
         own, about = faces.within(members), mesh.nodes - point
-        if len(own.quads) + len(own.triangles):
-            rows = sp.csr_array(patches.averaging_rows(about, own))
-    return Coupling(name or interface.node_set, interface.kind, members, point, rows)
+        if len(own):
+            rows = sp.csr_array(averaging_rows(about, own))
+    return Coupling(name or node_set, kind, members, point, rows)
 
 
 def _spanned(mesh: ImportedMesh, members: np.ndarray, name: str) -> None:

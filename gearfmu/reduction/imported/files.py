@@ -82,4 +82,4 @@ def ready_matrices(source: FilesSpec, mesh: ImportedMesh, turn: np.ndarray, mate
         problems = speed_problem(stiffness, mass, mesh.nodes, speed)
     if problems:
         raise MeshError("; ".join(problems))
-    return Matrices(stiffness, mass)
+    return stiffness, mass

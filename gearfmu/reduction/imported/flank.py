@@ -16,10 +16,10 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-from gearfmu.fem.patches import triangle_gradient, triangle_shape
-from gearfmu.fem.solids import Faces
+from gearfmu.fem.surface import Faces
 from gearfmu.geometry import involute
 from gearfmu.geometry.involute_fit import FitError, FlankPoints, InvoluteFit, fit_involute, flank_faces
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
 
 _STEEP = 0.3  # largest axial component of a flank face's normal
@@ -38,7 +38,7 @@ def corner_geometry(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corner nodes (F, 4) of all faces (a triangle's third twice), their centres (F, 3) and unit normals out of the
     body; of an internal gear into it, as of the external gear that fills its spaces."""
-    corners = np.vstack([faces.quads[:, :4], faces.triangles[:, [0, 1, 2, 2]]])
+    corners = faces.corners
     normal = np.cross(nodes[corners[:, 2]] - nodes[corners[:, 0]], nodes[corners[:, 3]] - nodes[corners[:, 1]])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     centre = np.concatenate([nodes[faces.quads[:, :4]].mean(axis=1), nodes[faces.triangles[:, :3]].mean(axis=1)])
@@ -139,8 +139,7 @@ def tooth_loads(
     nodes (N, 3) m in the frame of the gear. tooth_angle : rad, where the tooth stands. direction : as of
     `flank.flank_loads`. MeshError when the faces do not cover the flank from form circle to tip over the face width.
     """
-    c, s = np.cos(tooth_angle), np.sin(tooth_angle)
-    back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    back = about_z(tooth_angle)
     local = nodes @ back
     direction = direction or flank.normal
     parts = [_flank_part(local, faces, flank, side) for side in (0, 1)]
@@ -155,8 +154,7 @@ def middle_node(nodes: np.ndarray, faces: Faces, flank: ToothFlank, tooth_angle:
 
     nodes (N, 3) m in the frame of the gear. MeshError without a face on the flank.
     """
-    c, s = np.cos(tooth_angle), np.sin(tooth_angle)
-    local = nodes @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    local = nodes @ about_z(tooth_angle)
     own = _flank_part(local, faces, flank, 0).nodes
     if len(own) == 0:
         raise MeshError("there is no face on one of the flanks")
@@ -168,23 +166,17 @@ def middle_node(nodes: np.ndarray, faces: Faces, flank: ToothFlank, tooth_angle:
 
 def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -> Faces:
     """Faces of one flank of the tooth on +x, with those that reach beyond form and tip circle."""
-    sg, out = 1 - 2 * side, -1 if flank.internal else 1
-    parts = []
-    for block, corners in ((faces.quads, 4), (faces.triangles, 3)):
-        ring = local[block[:, :corners]]
-        last = ring[:, corners - 1]
-        normal = np.cross(ring[:, 2] - ring[:, 0], last - ring[:, 1])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-        centre = ring.mean(axis=1)
-        moment = sg * out * (centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0])
-        radius = np.hypot(ring[..., 0], ring[..., 1])
-        angle = sg * np.arctan2(centre[:, 1], centre[:, 0])
-        low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in flank.roll_range)
-        chosen = (
-            (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
-        )
-        parts.append(block[chosen & (radius.max(axis=1) > low) & (radius.min(axis=1) < high)])
-    return Faces(*parts)
+    sg = 1 - 2 * side
+    corners, centre, normal = corner_geometry(local, faces, flank.internal)
+    moment = sg * (centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0])
+    radius = np.hypot(local[corners, 0], local[corners, 1])
+    angle = sg * np.arctan2(centre[:, 1], centre[:, 0])
+    low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in flank.roll_range)
+    chosen = (
+        (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
+    ) & ((radius.max(axis=1) > low) & (radius.min(axis=1) < high))
+    quads, triangles = np.split(chosen, [len(faces.quads)])
+    return Faces(faces.quads[quads], faces.triangles[triangles])
 
 
 def _side_loads(
@@ -247,7 +239,7 @@ def _on_surface(chart: np.ndarray, part: Faces, place: np.ndarray) -> sp.csr_arr
     """(P, N) interpolation at the places (P, 2), arc length and width, from the nodes of the faces."""
     blocks = (
         (part.quads, surface.shape, surface.shape_gradient, _beyond_square, np.zeros(2)),
-        (part.triangles, triangle_shape, triangle_gradient, _beyond_triangle, np.full(2, 1 / 3)),
+        (part.triangles, surface.triangle_shape, surface.triangle_gradient, _beyond_triangle, np.full(2, 1 / 3)),
     )
     best, answer = np.full(len(place), np.inf), sp.csr_array((len(place), len(chart)))
     for block, shape, slope, beyond, start in blocks:

@@ -14,9 +14,10 @@ from gearfmu.fem import solids
 from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.involute_fit import InvoluteFit
+from gearfmu.reduction.couplings import Judgement, full_order
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, full_order
+from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.imported.flank import FitRange, fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
@@ -108,8 +109,7 @@ def imported_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> Import
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
         else:
             bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
-            ready = found.matrices
-            elastic = wanted.material if ready is None else (ready.stiffness, ready.mass)
+            elastic = found.matrices or wanted.material
             body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
     return ImportedGear(body, found.mesh.nodes, found.facts)
 
@@ -197,10 +197,10 @@ def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
 
 
 def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted: Wanted) -> WholeGear:
-    if matrices is None:
-        matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
-    body = full_order(mesh, matrices, [SetInterface(BORE, coupling, np.zeros(3))], (BORE,), wanted.flank.r_b)
     faces = solids.boundary(mesh.elements)
+    bore = set_coupling(mesh, faces, BORE, coupling, np.zeros(3))
+    elements = elements_of(mesh, matrices, wanted.material)
+    body = full_order(mesh.source.stem, elements, [bore], Judgement((BORE,), wanted.flank.r_b))
     angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
     rows = (tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles)
     if coupling == "rigid":

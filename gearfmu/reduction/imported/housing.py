@@ -15,11 +15,12 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, elimination, full_order
+from gearfmu.reduction.couplings import Coupling, Judgement, elimination, full_order
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.carrier import circle_centre
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported.couplings import elements_of, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.imported.skin import Surface, closed_surface, enveloping_surface
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
@@ -52,11 +53,10 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
     with naming(Path(source.file)):
         require_memory(whole_need(mesh.nodes.size, 3 * housing.modes, HOUSING_FACTORS), MESH_COARSER)
         matrices = ready_matrices(source, mesh, np.eye(3), housing.material)
-        matrices = matrices or Matrices(*solids.assemble(mesh.nodes, mesh.elements, housing.material))
         faces = solids.boundary(mesh.elements)
         held = _seats(mesh, faces, source) + _feet(mesh, faces, source)
         felt = [_sensor(mesh, faces, name, node_set) for name, node_set in source.sensors.items()]
-        body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
+        body = elements_of(mesh, matrices, housing.material)
         judgement = Judgement(tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max()))
         full = full_order(housing.name, body, [*held, *felt], judgement)
         loaded, sensors = full.interfaces[: len(held)], full.interfaces[len(held) :]
@@ -75,7 +75,7 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
     )
 
 
-def _seats(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+def _seats(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[Coupling]:
     found = []
     for name, node_set in source.seats.items():
         nodes = mesh.nodes[mesh.node_set(node_set)]
@@ -84,20 +84,19 @@ def _seats(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -
         except MeshError as error:
             raise MeshError(f"seat {name} ('{node_set}'): {error}") from error
         point = np.array([*centre, 0.5 * (nodes[:, 2].min() + nodes[:, 2].max())])
-        found.append(set_coupling(mesh, faces, SetInterface(node_set, source.seat_coupling, point), name))
+        found.append(set_coupling(mesh, faces, node_set, source.seat_coupling, point, name))
     return found
 
 
-def _feet(mesh: ImportedMesh, faces: solids.Faces, source: HousingImportSpec) -> list[Coupling]:
+def _feet(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[Coupling]:
     return [
-        set_coupling(mesh, faces, SetInterface(node_set, source.foot_coupling), name)
-        for name, node_set in source.feet.items()
+        set_coupling(mesh, faces, node_set, source.foot_coupling, name=name) for name, node_set in source.feet.items()
     ]
 
 
-def _sensor(mesh: ImportedMesh, faces: solids.Faces, name: str, node_set: str) -> Coupling:
+def _sensor(mesh: ImportedMesh, faces: Faces, name: str, node_set: str) -> Coupling:
     """One node moves as itself, more as their mean."""
     members = mesh.node_set(node_set)
     if len(members) == 1:
         return Coupling(name, "nodes", members, mesh.nodes[members[0]])
-    return set_coupling(mesh, faces, SetInterface(node_set), name)
+    return set_coupling(mesh, faces, node_set, name=name)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, Series, compare, frf_inputs, port_scale, rigid_compliance
 from gearfmu.reduction.cyclic.modal import Modes, Progress
@@ -232,8 +233,4 @@ def mean_frf(gear: WholeGear, space: Elastic, modes: Modes, statics: Statics, ca
 
 def _frames(teeth: int) -> np.ndarray:
     """(z, 6, 6): vectors of each tooth's frame in the frame of the gear, displacements and rotations."""
-    turns = []
-    for angle in 2 * np.pi * np.arange(teeth) / teeth:
-        c, s = np.cos(angle), np.sin(angle)
-        turns.append(np.kron(np.eye(2), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])))
-    return np.array(turns)
+    return np.array([np.kron(np.eye(2), about_z(angle)) for angle in 2 * np.pi * np.arange(teeth) / teeth])

@@ -8,10 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows, surface_moments
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
-from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.femesh.imported import repeated_cells
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -37,7 +38,7 @@ class ImportedSector(SectorBody):
         self.cut, self.bore, self.teeth = cut, bore, teeth
         self.flank, self.points = flank
         self.internal = self.flank.internal
-        self.mesh = FeMesh(cut.nodes, _repeated(cut.elements), {}, teeth, cut.cut_minus, cut.cut_plus)
+        self.mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), {}, teeth, cut.cut_minus, cut.cut_plus)
         self.faces = solids.boundary(cut.elements)
         matrices = elastic if isinstance(elastic, tuple) else solids.assemble(cut.nodes, cut.elements, elastic)
         self.stiffness, self.mass_matrix = matrices
@@ -69,10 +70,5 @@ class ImportedSector(SectorBody):
     @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
         """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
-        moments, gram = patch_moments(self.cut.nodes, self.faces.within(self.bore))
+        moments, gram = surface_moments(self.cut.nodes, self.faces.within(self.bore))
         return moments, self.turned_sum(gram)
-
-
-def _repeated(elements: dict[str, np.ndarray]) -> np.ndarray:
-    """(E, 20) node numbers of all elements; a tetrahedron repeats its first node."""
-    return np.concatenate([np.hstack([b, np.repeat(b[:, :1], 20 - b.shape[1], axis=1)]) for b in elements.values()])

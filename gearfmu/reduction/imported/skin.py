@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from gearfmu.errors import MeshError
-from gearfmu.fem import solids
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.sound import envelope
 
@@ -30,11 +30,11 @@ class Surface:
     holes: int
 
 
-def closed_surface(mesh: ImportedMesh, faces: solids.Faces, name: str) -> Surface:
+def closed_surface(mesh: ImportedMesh, faces: Faces, name: str) -> Surface:
     """The skin of a mesh: boundary faces whose nodes all lie in the node set `name`. MeshError where it has no faces,
     or edges of more than two, or is not in one piece with simple holes."""
     own = faces.within(mesh.node_set(name))
-    corners = np.vstack([own.quads[:, :4], own.triangles[:, [0, 1, 2, 2]]])
+    corners = own.corners
     if not len(corners):
         raise MeshError(f"skin '{name}': no boundary face has all its nodes in this set: name the outer surface")
     used, local = np.unique(corners, return_inverse=True)
@@ -58,10 +58,10 @@ def enclosed(nodes: np.ndarray, faces: np.ndarray, name: str) -> Surface:
     return Surface(points, closed, sample, len(loops))
 
 
-def enveloping_surface(mesh: ImportedMesh, faces: solids.Faces) -> Surface:
+def enveloping_surface(mesh: ImportedMesh, faces: Faces) -> Surface:
     """The convex envelope of a mesh, in triangles as long as the edges of its boundary; a point moves as the boundary
     node that is nearest to it."""
-    corners = np.vstack([faces.quads[:, :4], faces.triangles[:, [0, 1, 2, 2]]])
+    corners = faces.corners
     used, at = np.unique(corners), mesh.nodes[corners]
     around = envelope(mesh.nodes[used], float(np.linalg.norm(at[:, 1] - at[:, 0], axis=1).mean()))
     nearest = used[cKDTree(mesh.nodes[used]).query(around.points)[1]]

@@ -18,9 +18,10 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
+from gearfmu.fem.bulk_data import bulk_cards, bulk_number
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.matrices import read_labelled, read_recovery, read_unknowns
-from gearfmu.fem.nastran_matrices import Labelled, bulk_cards, bulk_number
+from gearfmu.fem.nastran_matrices import Labelled
 from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.imported import read_surface
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
@@ -204,7 +205,8 @@ def read_points(path: Path) -> dict[int, np.ndarray]:
     """Coordinates (3,) of every point by its label, in the file's unit. MeshError for a file without points, and for
     points in another system of coordinates."""
     if path.suffix.lower() == ".inp":
-        found = {label: np.array(point, float) for label, point in read_deck(path).nodes.items()}
+        mesh = read_deck(path)
+        found = dict(zip(mesh.labels.tolist(), mesh.nodes, strict=True))
     else:
         found = _grids(path)
     if not found:
@@ -213,12 +215,10 @@ def read_points(path: Path) -> dict[int, np.ndarray]:
 
 
 def _grids(path: Path) -> dict[int, np.ndarray]:
-    try:
-        cards = [card for card in bulk_cards(path) if card[0].rstrip("*") == "GRID"]
-    except OSError as error:
-        raise MeshError(f"{path}: the file cannot be read ({error.strerror}): check the path") from None
     found = {}
-    for card in cards:
+    for card in bulk_cards(path):
+        if card[0].rstrip("*") != "GRID":
+            continue
         if card[2] not in ("", "0"):
             raise MeshError(f"{path}: GRID {card[1]} is in coordinate system {card[2]}: write it in the basic system")
         try:

@@ -5,8 +5,7 @@ A sector is unfolded: its nodes and elements turned tooth by tooth, and so are r
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,54 +15,54 @@ from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.mesh import mount_spaces
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, full_order
+from gearfmu.geometry.plane import about_z
+from gearfmu.reduction.couplings import Coupling, Judgement, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.couplings import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
 from gearfmu.reduction.imported.flank import middle_node
 from gearfmu.reduction.imported.gear import BORE, CheckedGear, Wanted
+from gearfmu.stagefile.forms.planetary import MountsSpec
 
 
-@dataclass(frozen=True)
-class Held:
-    """How a gear is called, judged and held: name, length (m) that scales rotations, coupling of its bore, mounts of a
-    ring (MountsSpec) or None."""
-
-    name: str
-    length: float
-    coupling: str
-    mounts: Any = None
-
-
-def imported_gear_order(found: CheckedGear, wanted: Wanted, held: Held) -> FullOrder:
+def imported_gear_order(
+    found: CheckedGear,
+    wanted: Wanted,
+    name: str,
+    length: float,
+    coupling: str,
+    mounts: MountsSpec | None = None,
+) -> FullOrder:
     """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, its ground when judged;
-    a ring (one node a space) on the springs of its mounts, or free without them. Raises MeshError."""
-    mesh, matrices = _whole(found, wanted, held)
-    faces, body = solids.boundary(mesh.elements), Elements(mesh.nodes, mesh.repeated_cells, *_pair(matrices))
+    a ring (one node a space) on the springs of its mounts, or free without them.
+
+    length : m, that scales rotations. coupling : of its bore. Raises MeshError.
+    """
+    mesh, matrices = _whole(found, wanted, mounts)
+    faces, body = solids.boundary(mesh.elements), elements_of(mesh, matrices, wanted.material)
     couplings = []
     for tooth in range(wanted.teeth):
         node = middle_node(mesh.nodes, faces, wanted.flank, 2 * np.pi * tooth / wanted.teeth)
         couplings.append(Coupling(f"tooth{tooth}", "nodes", np.array([node]), mesh.nodes[node]))
     if not wanted.flank.internal:
-        couplings.append(set_coupling(mesh, faces, SetInterface(BORE, held.coupling, np.zeros(3))))
-        return full_order(held.name, body, couplings, Judgement((BORE,), held.length))
-    names = [name for name in mesh.sets if name != BORE]
-    mounts = [set_coupling(mesh, faces, SetInterface(name)) for name in names]
-    rows = [mount.rows[:3] for mount in mounts if mount.rows is not None]
-    springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), held.mounts.stiffness)) if rows else None
-    return full_order(held.name, body, couplings, Judgement((), held.length), springs)
+        couplings.append(set_coupling(mesh, faces, BORE, coupling, np.zeros(3)))
+        return full_order(name, body, couplings, Judgement((BORE,), length))
+    springs = None
+    if mounts is not None:
+        patches = [set_coupling(mesh, faces, own) for own in mesh.sets if own != BORE]
+        rows = [patch.rows[:3] for patch in patches if patch.rows is not None]
+        springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), mounts.stiffness))
+    return full_order(name, body, couplings, Judgement((), length), springs)
 
 
-def _pair(matrices: Matrices) -> tuple[sp.csr_array, sp.csr_array]:
-    return matrices.stiffness, matrices.mass
-
-
-def _whole(found: CheckedGear, wanted: Wanted, held: Held) -> tuple[ImportedMesh, Matrices]:
-    """All teeth of a checked gear, and its matrices: ready-made or of our elements."""
+def _whole(found: CheckedGear, wanted: Wanted, mounts: MountsSpec | None) -> tuple[ImportedMesh, Matrices | None]:
+    """All teeth of a checked gear, and their ready-made matrices or None."""
     mesh, ready = found.mesh, found.matrices
     if found.cut is not None:
-        mesh = _unfolded(mesh, found.cut, wanted.teeth, held.mounts.points if held.mounts else 0)
-        ready = ready and Matrices(*(unfolded_matrix(m, found.cut, wanted.teeth) for m in _pair(ready)))
-    return mesh, ready or Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
+        mesh = _unfolded(mesh, found.cut, wanted.teeth, mounts.points if mounts else 0)
+        if ready is not None:
+            stiffness, mass = (unfolded_matrix(matrix, found.cut, wanted.teeth) for matrix in ready)
+            ready = stiffness, mass
+    return mesh, ready
 
 
 def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int, mounts: int) -> ImportedMesh:
@@ -86,8 +85,7 @@ def unfolded_matrix(matrix: sp.csr_array, cut: CyclicCut, teeth: int) -> sp.csr_
     nodes, numbers = _numbers(cut, teeth)
     whole = sp.csr_array((nodes.size, nodes.size))
     for tooth, number in enumerate(numbers):
-        c, s = np.cos(2 * np.pi * tooth / teeth), np.sin(2 * np.pi * tooth / teeth)
-        turn = sp.kron(sp.identity(len(number)), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), format="csr")
+        turn = sp.kron(sp.identity(len(number)), about_z(2 * np.pi * tooth / teeth), format="csr")
         dofs = (3 * number[:, None] + np.arange(3)).ravel()
         turned = sp.coo_array(turn @ matrix @ turn.T)
         row, column = turned.coords
