@@ -284,12 +284,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "poisson_ratio": ("", 0, 0.49, "steel has 0.3"),
     "density": ("kg/m^3", 100, 30e3, "steel has 7850 kg/m^3, plastics about 1200 kg/m^3"),
     # what holds bodies
-    "bearing_stiffness": (
-        "N/m",
-        1e4,
-        1e16,
-        "rolling bearings have 1e7 to 1e9 N/m, a floating sun about 1e6 N/m",
-    ),
+    "bearing_stiffness": ("N/m", 1e4, 1e16, "rolling bearings have 1e7 to 1e9 N/m, a floating sun about 1e6 N/m"),
     "axial_stiffness": ("N/m", 1, 1e16, "rolling bearings have about 1e8 N/m"),
     "tilt_stiffness": ("N*m/rad", 1e-6, 1e16, "rolling bearings have about 5e4 N*m/rad"),
     "mount_stiffness": ("N/m", 1e4, 1e12, "of one mount, about 1e8 N/m"),

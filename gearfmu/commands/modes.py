@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
-from gearfmu.commands.shared import Quantity, progress_bar, stage_names
+from gearfmu.commands.shared import PATH, progress_bar, quantity, stage_names
 from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
@@ -32,14 +32,8 @@ COUPLED = (
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
 @click.option("--uncoupled", is_flag=True, help="The carrier of a set without the couplings of its bolts and bore.")
-@click.option(
-    "--torque",
-    type=Quantity("torque"),
-    help='Without --body: torque on the input, "302 N*m"; default: the largest that torque_max allows.',
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
-)
+@quantity("--torque", 'Without --body: torque on the input, "302 N*m"; default: the largest that torque_max allows.')
+@click.option("--out", type=PATH, default=Path("modes"), show_default=True, help="Folder to write to.")
 def modes(stage: str, name: str | None, count: int, torque: float | None, out: Path, **how: bool) -> None:
     """Natural frequencies of STAGE.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
+from gearfmu.commands.shared import FILE, FOLDER, PATH, level_option, progress_bar, quantity, scene_names, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.body import Body
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from gearfmu.stagefile.forms.general import Stage
 
 DEMO_STEP = 20e-6  # s
-OUT = click.Path(path_type=Path, file_okay=False)
 
 
 def _list(context: click.Context, option: object, wanted: bool) -> None:
@@ -36,12 +35,11 @@ def _list(context: click.Context, option: object, wanted: bool) -> None:
 
 @click.command()
 @click.argument("scene", required=False, shell_complete=scene_names)
-@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
 @click.option(
-    "--plan",
-    "plan_path",
-    type=click.Path(path_type=Path),
-    help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned.",
+    "--out", type=FOLDER, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given."
+)
+@click.option(
+    "--plan", "plan_path", type=PATH, help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned."
 )
 @click.option(
     "--unit",
@@ -53,14 +51,14 @@ def _list(context: click.Context, option: object, wanted: bool) -> None:
 @click.option(
     "--fmu",
     "fmu_path",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="An FMU exported earlier, which brings its stage; the scene's stage is exported anew when not given.",
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 @click.option("--stage", help="Another STAGE than the scene's; with --fmu the one that the FMU must be of.")
-@click.option("--step", type=Quantity("step"), help="Another communication step than the scene's: 20 us for spectra.")
-@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
-@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
+@quantity("--step", "Another communication step than the scene's: 20 us for spectra.")
+@quantity("--torque", 'Another torque on the input than the scene\'s, "302 N*m".')
+@quantity("--speed", 'Another speed of the input at the start, "2000 rpm".')
 @level_option
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
@@ -89,29 +87,21 @@ def _unit(how: Mapping[str, Any]) -> str | Path:
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option("--torque", type=Quantity("torque"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
-@click.option(
+@quantity("--torque", 'Torque on the input, "302 N*m".')
+@quantity("--speed", 'Speed of the input, "2000 rpm".')
+@quantity(
     "--end-speed",
-    type=Quantity("speed"),
-    help='A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+    'A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+    "speed",
 )
 @click.option(
     "--profile",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="A CSV file of torque, speed or both over time, in place of the options: time_[s],torque_[N*m],speed_[rpm].",
 )
-@click.option(
-    "--duration", type=Quantity("duration"), help="Simulated time; 0.1 s or that of the profile when not given."
-)
-@click.option("--step", type=Quantity("step"), default="20 us", show_default=True, help="Time between samples.")
-@click.option(
-    "--settle",
-    type=Quantity("time"),
-    default="0.02 s",
-    show_default=True,
-    help="From here on results and spectra are taken.",
-)
+@quantity("--duration", "Simulated time; 0.1 s or that of the profile when not given.")
+@quantity("--step", "Time between samples.", default="20 us", show_default=True)
+@quantity("--settle", "From here on results and spectra are taken.", "time", default="0.02 s", show_default=True)
 @click.option(
     "--set",
     "settings",
@@ -120,7 +110,9 @@ def _unit(how: Mapping[str, Any]) -> str | Path:
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
 @level_option
-@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
+@click.option(
+    "--out", type=FOLDER, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given."
+)
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque."""
@@ -141,7 +133,7 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
 
 
 @click.command()
-@click.option("--out", type=OUT, default=Path("out/demo"), show_default=True, help="Folder of the results.")
+@click.option("--out", type=FOLDER, default=Path("out/demo"), show_default=True, help="Folder of the results.")
 def demo(out: Path) -> int:
     """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report.
 
@@ -153,9 +145,9 @@ def demo(out: Path) -> int:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="FOLDER")
+@click.argument("path", type=PATH, metavar="FOLDER")
 @click.option("--stage", help="STAGE of the run; the one it names when not given.")
-@click.option("--out", type=OUT, help="Folder of the files; FOLDER/deformation when not given.")
+@click.option("--out", type=FOLDER, help="Folder of the files; FOLDER/deformation when not given.")
 def deformed(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the gears that a run recorded deformed, FOLDER/deformation.h5, as .vtu with a .pvd for ParaView."""
     from gearfmu.api.results import stage_and_bodies
@@ -169,9 +161,9 @@ def deformed(path: Path, stage: str | None, out: Path | None) -> None:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
+@click.argument("path", type=PATH, metavar="TRACE")
 @click.option("--stage", help="STAGE of the run, for the deformed gears.")
-@click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
+@click.option("--out", type=FOLDER, help="Folder of the report; that of the trace when not given.")
 def report(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
     from gearfmu.api.results import trace_file, write_report
@@ -182,7 +174,7 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True), metavar="TRACE…")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="The page; comparison.html by default.")
+@click.option("--out", type=FILE, help="The page; comparison.html by default.")
 @click.option("--name", "names", multiple=True, help="Name of a trace on the page; once for each.")
 def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -> None:
     """Compare two or more traces (files, or folders that hold trace.h5) with the first of them, in one page."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity, echo_pairs, level_option, progress_bar, stage_names
+from gearfmu.commands.shared import PATH, Quantity, echo_pairs, level_option, progress_bar, quantity, stage_names
 from gearfmu.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("te.csv"),
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
@@ -160,8 +160,8 @@ def above_sharing(result: TeResult, load_sharing: float) -> list[str]:
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
+@quantity("--torque", 'Torque on the input, "302 N*m".', required=True)
+@quantity("--speed", 'Speed of the input, "2000 rpm".', required=True)
 @click.option(
     "--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches of the slowest mesh."
 )

@@ -11,7 +11,7 @@ import platform
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -196,16 +196,17 @@ def run_once(
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
     try:
-        return run_coupled(*_coupled(scene, drive, (stage, source.model), (progress, wiring, frames)))
+        plan = replace(_plan(scene, drive), progress=progress, frames=frames)
+        return run_coupled(_cut(scene, drive, stage, source.model, wiring), plan)
     finally:
         stage.close()
 
 
-def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None = None) -> CoupledRun:
+def coupled_run(scene: SceneSpec, source: UnitSource) -> CoupledRun:
     """A run of the scene that is stepped from outside; not begun."""
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
-    return CoupledRun(*_coupled(scene, drive, (stage, source.model), (progress, WHOLE, None)))
+    return CoupledRun(_cut(scene, drive, stage, source.model, WHOLE), _plan(scene, drive))
 
 
 def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
@@ -222,31 +223,24 @@ def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
     }
 
 
-def _coupled(
-    scene: SceneSpec,
-    drive: Drive,
-    of: tuple[Unit, StageModel],
-    how: tuple[Progress | None, Wiring, FramePlan | None],
-) -> tuple[Cut | Loaded, Plan]:
-    """The cut and how it is stepped. of: the stage and its model; how: progress, wiring, frames."""
-    (stage, model), (progress, wiring, frames), coupling = of, how, scene.coupling
-    parameters = _parameters(scene, drive)
-    cut: Cut | Loaded
-    if callable(drive.partner):
-        network = drive.partner(lambda torques: _rest(model, parameters, torques))
-        cut = Cut(stage, PyUnit(network, coupling.micro_step or None), tuple(drive.ports), drive.signals, wiring)
-    else:
+def _plan(scene: SceneSpec, drive: Drive) -> Plan:
+    coupling = scene.coupling
+    return Plan(coupling.master, coupling.step, scene.steps, scene.record, omit=drive.silent)
+
+
+def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel, wiring: Wiring) -> Cut | Loaded:
+    """stage: of the model."""
+    if not callable(drive.partner):
         speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
-        cut = Loaded(stage, ShaftLoads(drive.partner), speeds)
-    return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, drive.silent, frames)
+        return Loaded(stage, ShaftLoads(drive.partner), speeds)
 
+    def rest(torques: Mapping[str, float]) -> Mapping[str, float]:
+        kernel = KernelUnit(model.blob, _parameters(scene, drive)).kernel
+        kernel.prepare()
+        return kernel.rest(torques)
 
-def _rest(
-    model: StageModel, parameters: Mapping[str, float | str], torques: Mapping[str, float]
-) -> Mapping[str, float]:
-    kernel = KernelUnit(model.blob, parameters).kernel
-    kernel.prepare()
-    return kernel.rest(torques)
+    drivetrain = PyUnit(drive.partner(rest), scene.coupling.micro_step or None)
+    return Cut(stage, drivetrain, tuple(drive.ports), drive.signals, wiring)
 
 
 def verified(
@@ -285,11 +279,8 @@ def _part(progress: Progress | None, start: float, end: float) -> Progress | Non
     return None if progress is None else lambda fraction: progress(start + (end - start) * fraction)
 
 
-TORQUES = (
-    "{}.shaft.tau",
-    "{}.tau",
-    "{}.w",
-)  # whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
+# whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
+TORQUES = ("{}.shaft.tau", "{}.tau", "{}.w")
 COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "retried_steps": "solver.retried_steps"}
 
 

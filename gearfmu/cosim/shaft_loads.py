@@ -31,7 +31,6 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import turns, undriven
 from gearfmu.stagefile.tables.connections import PortSpec
 
-ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on
 
 
@@ -140,7 +139,7 @@ class TorqueMaster:
 
     def __post_init__(self) -> None:
         stage, names = self.cut.stage, list(self.cut.drive.laws)
-        self.order = ORDERS["gs_mean" if self.foreseen else "jacobi"]
+        self.order = 2 if self.foreseen else 1
         self._tau: Any = stage.resolve([f"{name}.tau" for name in names])
         self._phi: Any = stage.resolve([f"{name}.phi" for name in names])
         self._w: Any = stage.resolve([f"{name}.w" for name in names])
