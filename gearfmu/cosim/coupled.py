@@ -157,6 +157,15 @@ class CoupledRun:
             if self.plan.progress and self.at % tell == 0:
                 self.plan.progress(self.at / self.plan.steps)
 
+    def window(self, first: int, last: int) -> Trace:
+        """On to step `last`; the trace from step `first` on, from here where the run is beyond it."""
+        self.new_recorder(last - self.at)
+        self.advance(max(first, self.at))
+        self.new_recorder(last - self.at)
+        self.record()
+        self.advance(last)
+        return self.recorder.trace({})
+
     def record(self) -> None:
         """Record this point."""
         self.recorder.take(self.time)

@@ -60,6 +60,11 @@ class Knob:
     kept: str = ""
     effect: Effect | None = None
 
+    @property
+    def by_nature(self) -> bool:
+        """Whether it is kept by its nature: no trial shows its error."""
+        return bool(self.effect and self.effect.kept)
+
 
 @dataclass(frozen=True)
 class Space:
