@@ -20,7 +20,7 @@ from gearfmu.errors import Problem, SpecError, UnitError
 if TYPE_CHECKING:
     import pint
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
+NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
 _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
@@ -55,7 +55,7 @@ def to_si(text: object, unit: str) -> float:
         if not math.isfinite(text):
             raise UnitError(f'not a finite number: write it like "1.5 {usual_unit(unit)}"')
         raise UnitError(f'the unit is missing: write "{text:g} {usual_unit(unit)}" or another unit of the same kind')
-    match = _NUMBER.match(text)
+    match = NUMBER.match(text)
     if not match:
         raise UnitError(f'not a number with a unit: write it like "1.5 {usual_unit(unit)}"')
     number, unit_text = float(match[1]), _plain_unit(match[2])

@@ -38,25 +38,16 @@ def inspect(path: Path, as_json: bool) -> None:
 def schema(kind: str, out: Path | None) -> None:
     """JSON schema of the stage.toml of a pair (stage), a general stage or a planetary set, or of scene.toml."""
     from gearfmu.files import write_text
+    from gearfmu.scenefile.scene import SceneSpec
+    from gearfmu.stagefile.schema import file_schema, general_schema, set_schema, stage_schema
 
-    text = _schema_text(kind)
+    stages = {"stage": stage_schema, "general": general_schema, "planetary": set_schema}
+    made = file_schema(SceneSpec) if kind == "scene" else stages[kind]()
+    text = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text(out, text)
-
-
-def _schema_text(kind: str) -> str:
-    from gearfmu.scenefile.scene import SceneSpec
-    from gearfmu.stagefile.schema import file_schema, general_schema, set_schema, stage_schema
-
-    made = {
-        "stage": stage_schema,
-        "general": general_schema,
-        "planetary": set_schema,
-        "scene": lambda: file_schema(SceneSpec),
-    }
-    return json.dumps(made[kind](), indent=2, ensure_ascii=False) + "\n"
 
 
 def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:

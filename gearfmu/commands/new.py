@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -114,15 +113,19 @@ def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
 
 def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
     """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
+    import numpy as np
+
     from gearfmu.errors import SpecError
     from gearfmu.rexs import draft_from_rexs
+    from gearfmu.stage.run.trace import write_columns
     from gearfmu.stagefile.proposals.new import write_drafted
     from gearfmu.stagefile.stage import load_stage
 
     draft = draft_from_rexs(rexs, stage)
     path = write_drafted(name, draft.tables, draft.marks, f"read from the REXS file {rexs.name}")
     table = path.with_name("rexs_unread.csv")
-    _write_unread(table, draft.unread)
+    names = ("component", "attribute", "value", "unit")
+    write_columns(table, {n: np.array([getattr(entry, n) for entry in draft.unread], dtype=object) for n in names})
     click.echo(f"{path}\nassumed, because the file does not say it:")
     echo_pairs({place: mark.removeprefix("assumed: ") for place, mark in draft.assumptions().items()}, "  ")
     click.echo(f"  everything else that is marked so in the file: as in {draft.like}")
@@ -136,14 +139,3 @@ def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
         return 1
     click.echo(f"Next: edit it, then 'gearfmu reduce {path}'.")
     return 0
-
-
-def _write_unread(path: Path, unread: Iterable[Any]) -> None:
-    import csv
-
-    from gearfmu.files import written_whole
-
-    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("component", "attribute", "value", "unit"))
-        writer.writerows((entry.component, entry.attribute, entry.value, entry.unit) for entry in unread)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
@@ -68,21 +68,16 @@ def run(scene: str | None, out: Path | None, stage: str | None, **how: Any) -> i
     changed = {key: how.pop(key) for key in ("torque", "speed", "level", "step")}
     if how["fmu_path"] is not None and how["unit"] == "kernel":
         raise click.UsageError("--fmu is run as an FMU: leave --unit kernel away")
+    unit = how["fmu_path"] or how["unit"]
     if how["plan_path"] is not None:
         if scene is not None or stage is not None or how["verify"] or set(changed.values()) != {None}:
             remedy = "--plan names scene, stage, load, level and step itself, and verifies by spot checks: give none"
             raise click.UsageError(remedy)
-        return run_plan(how["plan_path"], out, _unit(how))
+        return run_plan(how["plan_path"], out, unit)
     if scene is None:
         raise click.UsageError("name a SCENE, or a plan with --plan")
     spec = changed_scene(scene, **changed)
-    return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=_unit(how), verify=how["verify"])
-
-
-def _unit(how: Mapping[str, Any]) -> str | Path:
-    """ "kernel", "fmu" or the path of an FMU."""
-    unit: str | Path = how["unit"] if how["fmu_path"] is None else how["fmu_path"]
-    return unit
+    return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=unit, verify=how["verify"])
 
 
 @click.command()
@@ -239,11 +234,12 @@ def finish(trace: Trace, out: Path, stage: str | None, prepared: float | None = 
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
     else 1. stage : as of `api.write_report`. prepared : processor time (s) of the work around the simulation, to be
     shown."""
+    from gearfmu.api.results import write_report
     from gearfmu.report.results import REACHED_THE_END
 
     begin = process_time()
     trace.save(out / "trace.h5")
-    page = write_report(trace, out, stage)
+    page = write_report(trace, out, stage, tell=_tell)
     meta, reported = trace.meta, process_time() - begin
     click.echo(
         f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
@@ -270,13 +266,6 @@ def write_deformed(deformation: Deformation, folder: Path, spec: Stage, reduced:
     phases = tooth_phases(spec)
     gears = [deformed_gear(name, bodies[name], motion, phases[name]) for name, motion in deformation.gears.items()]
     return [write_series(gear, deformation.time, folder) for gear in gears]
-
-
-def write_report(trace: Trace, out: Path, stage: str | None, home: Path | None = None) -> Path:
-    """`api.write_report`, its remark on standard error."""
-    from gearfmu.api.results import write_report as write
-
-    return write(trace, out, stage, home, _tell)
 
 
 def _tell(text: str) -> None:

@@ -108,29 +108,23 @@ class FmuLog:
 class FmuUnit:
     """Unit of an FMU.
 
-    path : the .fmu; parameters : start values by name, numbers, booleans or the items of an enumeration; folder :
-    where to unpack (a temporary one if None). Raises FmuError when the FMU cannot be loaded, knows no such variable
-    or refuses a call; SimulationError when it discards a step. `close` (or the end of a with block) frees the
-    instance.
+    path : the .fmu, unpacked into a temporary folder; parameters : start values by name, numbers, booleans or the items
+    of an enumeration. Raises FmuError when the FMU cannot be loaded, knows no such variable or refuses a call;
+    SimulationError when it discards a step. `close` frees the instance.
     """
 
-    def __init__(
-        self,
-        path: str | Path,
-        parameters: Mapping[str, float | bool | str] | None = None,
-        folder: str | Path | None = None,
-    ) -> None:
+    def __init__(self, path: str | Path, parameters: Mapping[str, float | bool | str] | None = None) -> None:
         self.path = Path(path)
         self.messages: list[str] = []
-        self._own_folder = None if folder else tempfile.mkdtemp(prefix="gearfmu-")
+        self._folder = tempfile.mkdtemp(prefix="gearfmu-")
         try:
-            self._load(str(folder or self._own_folder))
-            self.instantiate(parameters or {})
+            self._load(self._folder)
+            self._instantiate(parameters or {})
         except GearfmuError:
-            self._remove_folder()
+            shutil.rmtree(self._folder, ignore_errors=True)
             raise
         except Exception as error:  # whatever a damaged file or a foreign binary makes of it
-            self._remove_folder()
+            shutil.rmtree(self._folder, ignore_errors=True)
             raise FmuError(f"{self.path}: cannot be loaded: {error} {self._last_message()}") from error
 
     def _load(self, folder: str) -> None:
@@ -157,7 +151,7 @@ class FmuUnit:
         del self.messages[:-MESSAGES_KEPT]
 
     # -- life ----------------------------------------------------------------------------------------------------------
-    def instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
+    def _instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
         """A fresh instance with these start values."""
         self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         self._component = c_void_p(self._fmu.component)
@@ -183,13 +177,7 @@ class FmuUnit:
         if self._fmu.component is not None:
             self._fmu.freeInstance()
             self._fmu.component = None
-        self._remove_folder()
-
-    def __enter__(self) -> FmuUnit:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     # -- variables -----------------------------------------------------------------------------------------------------
     def outputs(self) -> dict[str, Variable]:
@@ -294,10 +282,6 @@ class FmuUnit:
 
     def _last_message(self) -> str:
         return self.messages[-1] if self.messages else "The FMU gave no message."
-
-    def _remove_folder(self) -> None:
-        if self._own_folder:
-            shutil.rmtree(self._own_folder, ignore_errors=True)
 
 
 def outcome_of(message: str) -> str:
