@@ -135,15 +135,11 @@ def _failed(error: Exception, debug: bool) -> int:
         traceback.print_exception(error)
     if isinstance(error, (GearfmuError, click.ClickException)):
         text = error.message if isinstance(error, click.ClickException) else str(error)
-        click.echo(f"gearfmu: {text}", err=True)
     elif isinstance(error, OSError):
-        place = f"{error.filename}: " if error.filename else ""
-        click.echo(f"gearfmu: {place}{error.strerror or error}", err=True)
+        text = f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or error}"
     else:
-        click.echo(
-            f"gearfmu: internal error, {type(error).__name__}: {error}; please report it with the output of --debug",
-            err=True,
-        )
+        text = f"internal error, {type(error).__name__}: {error}; please report it with the output of --debug"
+    click.echo(f"gearfmu: {text}", err=True)
     return 1
 
 

@@ -73,7 +73,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
     from gearfmu.commands.models import level_of
-    from gearfmu.report.te import write_plot
+    from gearfmu.report.te import write_flanks, write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
 
@@ -104,7 +104,9 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
             click.echo(f"warning: {text}", err=True)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
-    _draw_flanks(model, out)
+    flanks = out.with_name(f"{out.stem}_flanks.png")
+    if write_flanks(model.stage, flanks):
+        click.echo(str(flanks))
     warn_of_limits(model, torques)
     if failed:
         click.get_current_context().exit(1)
@@ -128,15 +130,6 @@ def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> TeRe
         return None if 0.0 in torques else loaded_te(model, [0.0], **where)
     except SimulationError:
         return None
-
-
-def _draw_flanks(model: StageModel, out: Path) -> None:
-    """A picture of the flanks beside the table, where they are not nominal."""
-    from gearfmu.report.te import write_flanks
-
-    picture = out.with_name(f"{out.stem}_flanks.png")
-    if write_flanks(model.stage, picture):
-        click.echo(str(picture))
 
 
 def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:

@@ -45,6 +45,7 @@ from gearfmu.stagefile.forms.turning import meshings, require_driven, shafts_of
 from gearfmu.stagefile.stage import load_stage
 
 WHOLE = Wiring()
+OF_FRAMES = ("scene", "description", "stage", "level", "fmu_path")  # of a run's meta, in that of its frames
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,8 @@ def run(
         meta["warnings"] = [*staged.remarks, *meta["warnings"]]
         if result.frames is not None and out_dir is not None:
             meta["deformation"] = FILE_NAME
-            frames = result.frames.frames(gear_hashes(source.model), _frame_meta(meta))
-            frames.save(Path(out_dir) / FILE_NAME)
+            told = {name: meta[name] for name in OF_FRAMES if name in meta} | {"model": source.model.hash}
+            result.frames.frames(gear_hashes(source.model), told).save(Path(out_dir) / FILE_NAME)
     trace = Trace(result.trace.time, result.trace.channels, meta)
     if out_dir is not None:
         trace.save(Path(out_dir) / "trace.h5")
@@ -143,11 +144,6 @@ def origin(staged: Staged) -> dict[str, Any]:
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     return Staged.of(scene).model
-
-
-def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
-    told = ("scene", "description", "stage", "level", "fmu_path")
-    return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
 def drive_of(scene: SceneSpec, stage: Stage) -> Drive:

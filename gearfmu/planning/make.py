@@ -208,7 +208,7 @@ class _Made:
     def _line(self, knob: Knob, found: Found, pair: Pair | None, known: Conditions, most: float) -> Line:
         """pair: two measured sets that differ by one step of this knob, where there are such."""
         chosen, lower = found.chosen, found.refused.get(knob.name)
-        verdict = _verdict(knob, chosen.choice)
+        verdict = _setting(knob, chosen.choice)
         formula = predicted(knob, self.space.cheapest(knob.name), known) if not knob.by_nature else math.nan
         alone = saved = math.nan
         if pair is not None:
@@ -220,27 +220,18 @@ class _Made:
         if lower is None:
             reason = f"the set without it is {chosen.bound:.2g} budgets"
         elif math.isinf(lower.bound):
-            reason = f"{_step_down(knob, lower.choice)} does not reach the end of the window"
+            reason = f"{_setting(knob, lower.choice)} does not reach the end of the window"
         elif lower.bound > most:
-            reason = f"{_step_down(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
+            reason = f"{_setting(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
         else:
-            reason = f"{_step_down(knob, lower.choice)} saves nothing"
+            reason = f"{_setting(knob, lower.choice)} saves nothing"
         return Line(knob.name, verdict, "measured", reason, formula, alone, saved)
 
 
-def _verdict(knob: Knob, choice: Choice) -> str:
-    if knob.name == MODES:
-        return choice.level
-    if knob.name == STEP:
-        return f"{1e6 * choice.h:.3g} µs"
-    if knob.name == SLICED:
-        return str(choice.slices)
-    return "off" if knob.name in choice.off else "on"
-
-
-def _step_down(knob: Knob, lower: Choice) -> str:
-    """What the step down is."""
-    return {MODES: lower.level, STEP: f"{1e6 * lower.h:.3g} µs", SLICED: f"{lower.slices}"}.get(knob.name, "off")
+def _setting(knob: Knob, choice: Choice) -> str:
+    """What a choice says of a knob."""
+    ladders = {MODES: choice.level, STEP: f"{1e6 * choice.h:.3g} µs", SLICED: str(choice.slices)}
+    return ladders.get(knob.name, "off" if knob.name in choice.off else "on")
 
 
 def _noise_notes(noise: Noise, lost: bool) -> Iterator[str]:

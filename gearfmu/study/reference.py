@@ -11,7 +11,7 @@ from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.refinement import twice
 from gearfmu.stage.run.trace import TraceError
-from gearfmu.study.bench import Point, measure
+from gearfmu.study.bench import Point, Run, measure
 from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
 from gearfmu.study.norm import Errors, Signals, errors, kept_signals
 
@@ -44,17 +44,16 @@ def make_reference(
     step, tell = scene.coupling.step, progress or (lambda text: None)
     slices = twice(model.stage, slices)
 
-    def run(h: float) -> Signals:
+    def run(h: float) -> Run:
         tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")
-        return measure(scene, model, Point("full", h=h, slices=slices)).signals
+        return measure(scene, model, Point("full", h=h, slices=slices))
 
     h = fitting(step, min(QUICK_STEPS if quick else STEPS))
-    finest, h = run(h), h / FIRST
-    coarse = run(h)
+    finest, h = run(h).signals, h / FIRST
+    coarse = run(h).signals
     while True:
         h /= 2
-        tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")
-        made = measure(scene, model, Point("full", h=h, slices=slices))
+        made = run(h)
         found = Reference(made.signals, h, made.n_dyn, errors(coarse, made.signals), errors(finest, made.signals))
         if found.reached or h / 2 < FINEST:
             return found
