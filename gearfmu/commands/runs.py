@@ -136,7 +136,7 @@ def demo(out: Path) -> int:
     """
     from gearfmu.scenefile.scene import load_scene
 
-    return run_scene(with_step(load_scene("clutch_closure"), DEMO_STEP), out, unit="fmu")
+    return run_scene(load_scene("clutch_closure").with_coupling(step=DEMO_STEP), out, unit="fmu")
 
 
 @click.command()
@@ -187,12 +187,7 @@ def changed_scene(scene: str, step: float | None = None, **others: object) -> Sc
     keys = {"level": "stage.level", "stage": "stage.name"}
     changes = {keys.get(key, key): value for key, value in others.items() if value is not None}
     spec = load_scene(scene, changes)
-    return spec if step is None else with_step(spec, step)
-
-
-def with_step(scene: SceneSpec, step: float) -> SceneSpec:
-    """The SceneSpec with another communication step (s)."""
-    return scene.model_copy(update={"coupling": scene.coupling.model_copy(update={"step": step})})
+    return spec if step is None else spec.with_coupling(step=step)
 
 
 def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:

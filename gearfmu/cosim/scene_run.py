@@ -91,14 +91,12 @@ def run(
     scene: Staged | SceneSpec | str,
     out_dir: str | Path | None = None,
     unit: str = "fmu",
-    fmu_path: str | Path | None = None,
     verify: bool = False,
     progress: Progress | None = None,
 ) -> Trace:
     """Run a scene (or the scene file or shipped scene of that name; or one whose stage is assembled already).
 
-    unit : "fmu" (exported into out_dir) or "kernel". fmu_path : an FMU exported earlier, whose stage is run in place of
-    the scene's (`Staged.of_fmu`).
+    unit : "fmu" (of `Staged.of_fmu`, else exported into out_dir) or "kernel".
     verify : run again with half the communication step and estimate the coupling error. progress : called with
     the part done, 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
     [deformation]. The trace's meta is the summary: outcome "ok" or the reason of an early end, last good time,
@@ -107,7 +105,8 @@ def run(
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
-    staged = scene if isinstance(scene, Staged) else _staged(scene, fmu_path)
+    named = load_scene(scene) if isinstance(scene, str) else scene
+    staged = named if isinstance(named, Staged) else Staged.of(named)
     scene = staged.scene
     with stage_source(staged, unit, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
@@ -129,11 +128,6 @@ def run(
         trace.save(Path(out_dir) / "trace.h5")
         write_text(Path(out_dir) / "summary.json", json.dumps(meta, indent=1, sort_keys=True, allow_nan=False) + "\n")
     return trace
-
-
-def _staged(scene: SceneSpec | str, fmu_path: str | Path | None) -> Staged:
-    spec = load_scene(scene) if isinstance(scene, str) else scene
-    return Staged.of(spec) if fmu_path is None else Staged.of_fmu(spec, fmu_path)
 
 
 def origin(staged: Staged) -> dict[str, Any]:
@@ -258,11 +252,7 @@ def verified(
 
 def _verifying(scene: SceneSpec, source: Source, steps: tuple[float, float], progress: Progress | None) -> Result:
     """A run with another communication and internal step; CouplingError when it does not reach the end."""
-    changed = {
-        "coupling": scene.coupling.model_copy(update={"step": steps[0]}),
-        "stage": scene.stage.model_copy(update={"h": steps[1]}),
-    }
-    result = run_once(scene.model_copy(update=changed), source, progress)
+    result = run_once(scene.with_coupling(step=steps[0]).with_stage(h=steps[1]), source, progress)
     if result.outcome != OK:
         raise CouplingError(
             f"no coupling error: the run with a communication step of {steps[0]:g} s stopped at "

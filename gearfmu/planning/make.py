@@ -36,14 +36,13 @@ class PlanError(GearfmuError):
 
 @dataclass(frozen=True)
 class Job:
-    """What a plan is made of. least_share: effects that cost less of a step stay on; force: effects that are candidates
-    nevertheless; tell: is told what is done."""
+    """What a plan is made of. force: effects that are candidates though they cost little; tell: is told what is
+    done."""
 
     scene: SceneSpec
     model: StageModel
     request: Request
     runner: Runner
-    least_share: float = LEAST_SHARE
     force: tuple[str, ...] = ()
     tell: Tell = field(default=lambda text: None)
 
@@ -51,7 +50,7 @@ class Job:
     def identity(self) -> str:
         """Hex digest of what decides the plan: scene, model, request, policy, kernel, format."""
         kernel = hashlib.sha256(library_path().read_bytes()).hexdigest()
-        asked = (self.scene.hash, self.model.hash, sorted(self.request.plain.items()), self.least_share, self.force)
+        asked = (self.scene.hash, self.model.hash, sorted(self.request.plain.items()), LEAST_SHARE, self.force)
         return hashlib.sha256(f"{FORMAT} {asked} {kernel}".encode()).hexdigest()
 
 
@@ -72,7 +71,7 @@ class _Made:
 
     def __init__(self, job: Job, part: Part) -> None:
         self.job, self.part = job, part
-        self.space: Space = space(job.scene, job.model, job.least_share, job.force)
+        self.space: Space = space(job.scene, job.model, force=job.force)
         self.text = job.scene.model_dump_json()
         prime(self.text, job.scene, job.model)
         task = Task(self.text, self.space.full, part.window, job.request, priced=True)

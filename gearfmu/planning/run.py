@@ -74,9 +74,7 @@ class PlannedRun:
 
 def planned_scene(plan: Plan) -> SceneSpec:
     """The scene of a plan, with the communication step that was planned for."""
-    scene = load_scene(plan.scene)
-    coupling = scene.coupling.model_copy(update={"step": plan.step})
-    return scene.model_copy(update={"coupling": coupling})
+    return load_scene(plan.scene).with_coupling(step=plan.step)
 
 
 def planned_stage(plan: Plan, fmu: Path | None = None) -> Staged:

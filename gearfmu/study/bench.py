@@ -12,7 +12,7 @@ import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -153,9 +153,8 @@ def recorded_run(scene: SceneSpec, model: StageModel) -> tuple[Result, Kept]:
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     """A coupled run of the scene at `point`. ModelError when the kernel refuses it, with the kernel's reason."""
     effects = scene.stage.effects.model_copy(update=dict.fromkeys(point.off, False))
-    choice: dict[str, Any] = {"level": point.level, "integrator": point.integrator, "h": point.h}
-    choice |= {"slices": point.slices, "effects": effects}
-    changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
+    fields = {name: getattr(point, name) for name in ("level", "integrator", "h", "slices")}
+    changed = scene.with_stage(**fields, effects=effects).model_copy(update={"record": ("*",)})
     result, stage = recorded_run(changed, model)
     facts, end = result.facts, float(result.trace.time[-1])
     clutch = any(name.endswith(".clutch.capacity") for name in stage.kernel.variables)

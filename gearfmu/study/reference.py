@@ -3,7 +3,6 @@ fifth of the error of the finest point of the study."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,19 +35,15 @@ class Reference:
         return self.moved.below(SHARE, self.finest)
 
 
-def make_reference(
-    scene: SceneSpec, model: StageModel, slices: int, quick: bool = False, progress: Callable[[str], None] | None = None
-) -> Reference:
+def make_reference(scene: SceneSpec, model: StageModel, slices: int, quick: bool = False) -> Reference:
     """Run the scene with ever smaller steps until `reached`, or at most to FINEST; a helical stage with twice the
     slices."""
-    step, tell = scene.coupling.step, progress or (lambda text: None)
     slices = twice(model.stage, slices)
 
     def run(h: float) -> Run:
-        tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")
         return measure(scene, model, Point("full", h=h, slices=slices))
 
-    h = fitting(step, min(QUICK_STEPS if quick else STEPS))
+    h = fitting(scene.coupling.step, min(QUICK_STEPS if quick else STEPS))
     finest, h = run(h).signals, h / FIRST
     coarse = run(h).signals
     while True:

@@ -19,7 +19,7 @@ from gearfmu.fmu.opened import OpenedFmu
 from gearfmu.fmu.package import write_archive
 from gearfmu.planning.book import Plan
 from gearfmu.planning.run import run_planned
-from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.trace import Trace
 
@@ -125,7 +125,7 @@ def test_an_fmu_of_another_kind_of_stage_is_refused_by_name(plain: Path) -> None
         of_scene(scene, opened)
     assert of_scene(scene, opened, spec) is scene  # named with --stage it is wanted
     with pytest.raises(SpecError, match=r"kind of stage fzg_c = external_pair: scene planetary_paper"):
-        cosim.run("planetary_paper", fmu_path=plain)
+        cosim.run(Staged.of_fmu(load_scene("planetary_paper"), plain))
 
 
 def test_an_fmu_of_another_stage_than_the_named_one_is_refused(plain: Path) -> None:
@@ -136,8 +136,8 @@ def test_an_fmu_of_another_stage_than_the_named_one_is_refused(plain: Path) -> N
 
 def test_the_stage_of_the_scene_need_not_be_there(plain: Path) -> None:
     scene = short("pair_loaded")
-    scene = scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": "gone/stage.toml"})})
-    assert cosim.run(scene, fmu_path=plain).meta["stage"] == "fzg_c"
+    scene = scene.with_stage(name="gone/stage.toml")
+    assert cosim.run(Staged.of_fmu(scene, plain)).meta["stage"] == "fzg_c"
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_an_fmu_that_does_not_show_a_recorded_gear_is_refused(plain: Path) -> No
     scene = gf.load_scene("planetary_paper").deformation
     asked = short("pair_loaded", deformation=scene.model_copy(update={"gears": ("wheel", "moon")}))
     with pytest.raises(SpecError, match=r"observed gears = none: .* how wheel, moon moves: .* --observe wheel"):
-        cosim.run(asked, fmu_path=plain)
+        cosim.run(Staged.of_fmu(asked, plain))
 
 
 def test_a_plan_for_another_model_is_refused(plain: Path, tmp_path: Path) -> None:
@@ -182,12 +182,12 @@ def test_an_fmu_of_a_former_version_is_refused(plain: Path, tmp_path: Path) -> N
         members = {name: archive.read(name) for name in archive.namelist() if not name.endswith("stage.json")}
     old = write_archive(tmp_path / "old.fmu", members)
     with pytest.raises(FmuError, match=r"old.fmu: resources/stage.json: is missing.*export it again"):
-        cosim.run("pair_loaded", fmu_path=old)
+        cosim.run(Staged.of_fmu(load_scene("pair_loaded"), old))
 
 
 def test_the_model_of_an_fmu_runs_in_the_kernel_too(plain: Path) -> None:
-    by_kernel = cosim.run(short("pair_loaded"), unit="kernel", fmu_path=plain)
-    assert by_kernel.meta["unit"] == "kernel" and same(by_kernel, cosim.run(short("pair_loaded"), fmu_path=plain))
+    by_kernel = cosim.run(Staged.of_fmu(short("pair_loaded"), plain), unit="kernel")
+    assert by_kernel.meta["unit"] == "kernel" and same(by_kernel, cosim.run(Staged.of_fmu(short("pair_loaded"), plain)))
 
 
 def test_an_fmu_for_a_scene_shows_the_gears_that_it_records() -> None:

@@ -25,10 +25,6 @@ def scene(name: str, duration: float, **stage) -> SceneSpec:
     return shipped.model_copy(update=changed)
 
 
-def with_step(given: SceneSpec, step: float) -> SceneSpec:
-    return given.model_copy(update={"coupling": given.coupling.model_copy(update={"step": step})})
-
-
 def test_fmu_and_kernel_give_the_same_bits(tmp_path):
     """Every channel of the demo scene's first 5 ms, master and drivetrain included; names, units and types too."""
     closure = scene("clutch_closure", 5e-3)
@@ -78,7 +74,7 @@ def test_gs_mean_on_the_kernel_is_of_second_order():
     """Same internal step, communication steps 80, 40, 20 µs."""
     rig = scene("pair_light", 0.02, level="rigid", slices=1, h=2.5e-6)
     source = Source(stage_model(rig))
-    results = [run_once(with_step(rig, step), source) for step in (8e-5, 4e-5, 2e-5, 1e-5)]
+    results = [run_once(rig.with_coupling(step=step), source) for step in (8e-5, 4e-5, 2e-5, 1e-5)]
     taus = [result.trace["pinion.tau"][:: 2**k] for k, result in enumerate(results)]
     errors = np.array([rms(coarse - fine) for coarse, fine in zip(taus, taus[1:], strict=False)])
     assert 0.5 * np.log2(errors[0] / errors[2]) > 1.7, errors
@@ -88,7 +84,7 @@ def test_coupling_error_does_not_count_the_internal_step():
     """20 µs holds 7 internal steps, half of it 3.5: a plain comparison would mostly see another internal step."""
     rig = scene("pair_light", 0.02, level="fast")
     source = Source(stage_model(rig))
-    own, halved = run_once(rig, source), run_once(with_step(rig, 0.5 * rig.coupling.step), source)
+    own, halved = run_once(rig, source), run_once(rig.with_coupling(step=0.5 * rig.coupling.step), source)
     assert round(rig.coupling.step / own.facts["solver.h"]) % 2 == 1
     plain = coupling_errors(own.trace, halved.trace, 2, Window(0.0, steady=False))["pinion.tau"].relative
     estimate = verified(rig, source, own)["pinion.tau"].relative

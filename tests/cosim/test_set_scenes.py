@@ -25,7 +25,7 @@ BACKLASH = 0.06e-3  # m, of each of the two meshes in series
 def sliced_once(name: str) -> SceneSpec:
     """A shipped scene with one slice: its teeth are spur, and preparing takes a third."""
     scene = load_scene(name)
-    return scene.model_copy(update={"stage": scene.stage.model_copy(update={"slices": 1})})
+    return scene.with_stage(slices=1)
 
 
 def with_capacity(scene: SceneSpec, duration: float, *points: tuple[float, float]) -> SceneSpec:
