@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from ctypes import CFUNCTYPE, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from gearfmu.cosim.units import Variable
+from gearfmu.cosim.units import RowLog, Variable
 from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
 from gearfmu.kernel.build import SUFFIX, host_platform
@@ -75,34 +76,6 @@ class FmuHandle:
     groups: tuple[_Group, ...]
     buffer: np.ndarray
     real: bool
-
-
-class FmuLog:
-    """Rows that the FMU writes itself, one table for each FMI type."""
-
-    def __init__(self, unit: FmuUnit, names: Sequence[str], points: int) -> None:
-        self._unit, self._width, self._points, self._count = unit, len(names), points, 0
-        self._groups = unit.resolve(names).groups
-        self._tables = [np.zeros((points, len(group.places)), dtype=group.view.dtype) for group in self._groups]
-        self._writes = [
-            (group, len(group.places), table.ctypes.data, table.strides[0])
-            for group, table in zip(self._groups, self._tables, strict=True)
-        ]
-
-    def take(self) -> None:
-        """Keep the present outputs."""
-        if self._count == self._points:
-            raise CouplingError(f"the log holds {self._count} times and no more")
-        for group, width, address, stride in self._writes:
-            self._unit.read(group.call, group.references, width, address + self._count * stride)
-        self._count += 1
-
-    def rows(self) -> np.ndarray:
-        """(times, names) kept so far."""
-        found = np.zeros((self._count, self._width))
-        for group, table in zip(self._groups, self._tables, strict=True):
-            found[:, group.places] = table[: self._count]
-        return found
 
 
 class FmuUnit:
@@ -220,20 +193,16 @@ class FmuUnit:
     def get(self, handle: FmuHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer, one call a type."""
         for group in handle.groups:
-            self.read(group.call, group.references, len(group.places), group.values)
+            getter = self._getters[group.call]
+            if getter(self._component, group.references, len(group.places), group.values) > fmi2Warning:
+                raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
             if not handle.real:
                 handle.buffer[group.places] = group.view
         return handle.buffer
 
-    def read(self, call: str, references: object, count: int, address: object) -> None:
-        """Values of variables of one type (Real, Integer, Boolean) to an address, which must have room for them.
-        Raises FmuError when the FMU refuses."""
-        if self._getters[call](self._component, references, count, address) > fmi2Warning:
-            raise FmuError(f"{self.path}: fmi2Get{call} refused. {self._last_message()}")
-
-    def log(self, names: Sequence[str], points: int) -> FmuLog:
+    def log(self, names: Sequence[str], points: int) -> RowLog:
         """Keeps these outputs at up to `points` times."""
-        return FmuLog(self, names, points)
+        return RowLog(partial(self.get, self.resolve(names)), len(names), points)
 
     def step(self, time: float, h: float) -> None:
         """fmi2DoStep. Raises SimulationError with outcome and last successful time on discard, FmuError on error."""
