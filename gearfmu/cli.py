@@ -19,10 +19,7 @@ USAGE_ERROR = 100
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 VERBS = {
-    "new": (
-        "gearfmu.commands.new:new",
-        "Write a commented stage.toml of your own, from a few numbers.",
-    ),
+    "new": ("gearfmu.commands.new:new", "Write a commented stage.toml of your own, from a few numbers."),
     "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
     "reduce": (
         "gearfmu.commands.stages:reduce",
@@ -36,10 +33,7 @@ VERBS = {
         "gearfmu.commands.te:te",
         "Quasi-static loaded transmission error, load shares, stiffness of mesh and stage.",
     ),
-    "efficiency": (
-        "gearfmu.commands.te:efficiency",
-        "Loss of every mesh to friction of its flanks.",
-    ),
+    "efficiency": ("gearfmu.commands.te:efficiency", "Loss of every mesh to friction of its flanks."),
     "bearings": (
         "gearfmu.commands.bearings:bearings",
         "Rolling bearings under load: forces, contact pressure, stiffness, ball pass.",
@@ -141,15 +135,11 @@ def _failed(error: Exception, debug: bool) -> int:
         traceback.print_exception(error)
     if isinstance(error, (GearfmuError, click.ClickException)):
         text = error.message if isinstance(error, click.ClickException) else str(error)
-        click.echo(f"gearfmu: {text}", err=True)
     elif isinstance(error, OSError):
-        place = f"{error.filename}: " if error.filename else ""
-        click.echo(f"gearfmu: {place}{error.strerror or error}", err=True)
+        text = f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or error}"
     else:
-        click.echo(
-            f"gearfmu: internal error, {type(error).__name__}: {error}; please report it with the output of --debug",
-            err=True,
-        )
+        text = f"internal error, {type(error).__name__}: {error}; please report it with the output of --debug"
+    click.echo(f"gearfmu: {text}", err=True)
     return 1
 
 

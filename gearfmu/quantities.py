@@ -20,7 +20,7 @@ from gearfmu.errors import Problem, SpecError, UnitError
 if TYPE_CHECKING:
     import pint
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
+NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
 _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
@@ -55,7 +55,7 @@ def to_si(text: object, unit: str) -> float:
         if not math.isfinite(text):
             raise UnitError(f'not a finite number: write it like "1.5 {usual_unit(unit)}"')
         raise UnitError(f'the unit is missing: write "{text:g} {usual_unit(unit)}" or another unit of the same kind')
-    match = _NUMBER.match(text)
+    match = NUMBER.match(text)
     if not match:
         raise UnitError(f'not a number with a unit: write it like "1.5 {usual_unit(unit)}"')
     number, unit_text = float(match[1]), _plain_unit(match[2])
@@ -284,12 +284,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     "poisson_ratio": ("", 0, 0.49, "steel has 0.3"),
     "density": ("kg/m^3", 100, 30e3, "steel has 7850 kg/m^3, plastics about 1200 kg/m^3"),
     # what holds bodies
-    "bearing_stiffness": (
-        "N/m",
-        1e4,
-        1e16,
-        "rolling bearings have 1e7 to 1e9 N/m, a floating sun about 1e6 N/m",
-    ),
+    "bearing_stiffness": ("N/m", 1e4, 1e16, "rolling bearings have 1e7 to 1e9 N/m, a floating sun about 1e6 N/m"),
     "axial_stiffness": ("N/m", 1, 1e16, "rolling bearings have about 1e8 N/m"),
     "tilt_stiffness": ("N*m/rad", 1e-6, 1e16, "rolling bearings have about 5e4 N*m/rad"),
     "mount_stiffness": ("N/m", 1e4, 1e12, "of one mount, about 1e8 N/m"),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any, TypedDict
 
 from typing_extensions import Unpack
 
-from gearfmu.api.models import PathLike, load
+from gearfmu.api.models import PathLike, loaded_stage
 from gearfmu.api.settings import Quantity, checked
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.whole import housing_order
@@ -56,7 +55,7 @@ def frf(stage: PathLike | Stage, body: str, methods: Sequence[str] = PAPER, **ho
     """
     low, high = (checked("band", edge, "frequency") for edge in how.get("band", BAND))
     entries = [_entry(text, how.get("size", SIZE), (low, high)) for text in methods]
-    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    spec = loaded_stage(stage)
     full = _full_order(spec, body, how.get("scale"))
     lines = Lines.over((low, high), how.get("lines", LINES), how.get("damping", DAMPING))
     return judged(full if how.get("free") else full.grounded(), entries, lines)

@@ -47,6 +47,11 @@ def load(stage: PathLike, changes: Changes | None = None) -> Stage:
     return load_stage_file(stage, changes)
 
 
+def loaded_stage(stage: PathLike | Stage) -> Stage:
+    """`load`, unless it is loaded already."""
+    return stage if isinstance(stage, Stage) else load(stage)
+
+
 def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:
     """A scene: a stage in a drivetrain, with its events and duration.
 
@@ -72,7 +77,7 @@ def reduce(
 
     Raises MeshError and BodyError.
     """
-    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    spec = loaded_stage(stage)
     told = None if progress is None else lambda text, part: progress(part, text)
     apart = changed_folder(spec) if folder is None else None
     return reduce_bodies(spec, folder, force, told) if apart is None else reduce_apart(spec, apart, force, told)
@@ -114,7 +119,7 @@ def reduced_to_move(
 ) -> tuple[Stage, list[Body]]:
     """The stage with these bores, and its bodies, for `assemble`. SpecError, before anything is reduced,
     for a set that does not say all that it needs to move."""
-    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    spec = loaded_stage(stage)
     spec.require_motion()
     coupled = spec if bore is None else with_other_bores(spec, bore)
     return coupled, reduce(coupled, folder or bodies_folder(spec, bore), progress=progress)

@@ -57,10 +57,7 @@ def plan(
 
 
 def run_plan(
-    plan: Plan | PathLike,
-    out: PathLike | None = None,
-    progress: Progress | None = None,
-    unit: PathLike = "kernel",
+    plan: Plan | PathLike, out: PathLike | None = None, progress: Progress | None = None, unit: PathLike = "kernel"
 ) -> Trace:
     """Run the scene of a plan as it says, with tripwires: where the run leaves what was planned for it goes back to its
     last saved state and on with the effect that was missing; where a spot check is missed, back to where the check

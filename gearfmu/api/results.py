@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import warnings
 import webbrowser
@@ -15,7 +14,7 @@ from typing import Any
 from typing_extensions import Unpack
 
 from gearfmu import fmu
-from gearfmu.api.models import AnyStage, PathLike, load, model_of
+from gearfmu.api.models import AnyStage, PathLike, loaded_stage, model_of
 from gearfmu.api.settings import Quantity, Starts, checked
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
@@ -151,11 +150,16 @@ def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike],
 
 def _run(source: Trace | PathLike) -> Run:
     """A trace with its stage and bodies where they can be read."""
-    trace = source if isinstance(source, Trace) else Trace.load(trace_file(source))
+    trace = loaded_trace(source)
     try:
         return Run(trace, trace.meta, *stage_and_bodies(trace.meta))
     except GearfmuError:
         return Run(trace, trace.meta)
+
+
+def loaded_trace(source: Trace | PathLike) -> Trace:
+    """The Trace, or the one in a file or folder."""
+    return source if isinstance(source, Trace) else Trace.load(trace_file(source))
 
 
 def trace_file(path: PathLike) -> Path:
@@ -187,7 +191,7 @@ def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = N
     is known; else that of the FMU that was run, with the bodies beside the stage file that `stage_of` names.
     GearfmuError where there is none such, or where the FMU is another by now."""
     named = stage or stage_of(meta) or ""
-    own = load(named) if isinstance(named, (str, os.PathLike)) else named
+    own = loaded_stage(named)
     path = meta.get("fmu_path")
     if stage or not path:
         return own, load_bodies(own)

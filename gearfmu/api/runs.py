@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from typing_extensions import Unpack
 
 from gearfmu import cosim
-from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, model_of, reduce
+from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, loaded_stage, model_of, reduce
 from gearfmu.api.settings import Quantity, RunSettings, Settings, checked, in_si
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.scenefile.scene import SceneSpec
@@ -169,10 +168,8 @@ def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None
     spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     if stage is None:
         return spec, None
-    named = isinstance(stage, (str, os.PathLike))
-    own = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
-    choice = spec.stage.model_copy(update={"name": str(stage) if named else str(own.source)})
-    return spec.model_copy(update={"stage": choice}), own
+    own = loaded_stage(stage)
+    return spec.with_stage(name=str(own.source if isinstance(stage, Stage) else stage)), own
 
 
 def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progress: Progress | None) -> Staged:

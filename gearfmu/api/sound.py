@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfmu.api.models import PathLike, assemble, changed_folder, load, reduce
-from gearfmu.api.results import stage_and_bodies, trace_file
+from gearfmu.api.models import PathLike, assemble, changed_folder, loaded_stage, reduce
+from gearfmu.api.results import loaded_trace, stage_and_bodies
 from gearfmu.api.settings import Quantity, checked
 from gearfmu.body import Body, body_path
 from gearfmu.body.sound import kept_radiation, make_radiation, sound_path
@@ -37,10 +37,10 @@ def house(trace: Trace | PathLike, housing: PathLike | Stage, torque: Quantity |
     their means; theory 11 says what it leaves out. Raises SoundError for a run that lost contact or has a housing;
     ModelError for other bearings.
     """
-    run = _trace(trace)
+    run = loaded_trace(trace)
     own, _ = stage_and_bodies(run.meta)
     _require_contact(run, own)
-    stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing
+    stage = loaded_stage(housing)
     given = run.meta.get("torque") if torque is None else checked("torque", torque, "torque")
     if given is None:
         raise SoundError("the run does not say its torque: give the torque on the input")
@@ -73,7 +73,7 @@ def sound_power(
 
     Raises SoundError for a stage without a skin and a record without equal steps.
     """
-    run = _trace(trace)
+    run = loaded_trace(trace)
     stage, bodies = _housed(run, housing)
     sound = _radiation(stage, housing_body(stage, bodies), matrix, patches)
     return radiated_power(run, stage, bodies, sound, Heard(speed, checked("start", start, "time")))
@@ -89,13 +89,13 @@ def transfer_paths(
 
     Raises SoundError for an unknown sensor and a record without equal steps.
     """
-    run = _trace(trace)
+    run = loaded_trace(trace)
     return paths_of(run, *_housed(run, housing), sensor, checked("start", start, "time"))
 
 
 def _housed(run: Trace, housing: PathLike | Stage | None) -> tuple[Stage, list[Body]]:
     """The stage of a housing, that which the trace names when None, and its bodies."""
-    stage = load(housing) if isinstance(housing, (str, os.PathLike)) else housing or stage_and_bodies(run.meta)[0]
+    stage = stage_and_bodies(run.meta)[0] if housing is None else loaded_stage(housing)
     return stage, reduce(stage)
 
 
@@ -105,10 +105,6 @@ def _radiation(stage: Stage, body: Body, matrix: PathLike | None, patches: int |
     path = own if matrix is None else Path(matrix)
     found = kept_radiation(body, path, patches)
     return found or make_radiation(body, path if os.access(path.parent, os.W_OK) else None, patches)
-
-
-def _trace(trace: Trace | PathLike) -> Trace:
-    return trace if isinstance(trace, Trace) else Trace.load(trace_file(trace))
 
 
 def _require_contact(run: Trace, stage: Stage) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TypedDict, cast
 
 from typing_extensions import Unpack
 
-from gearfmu.api.models import AnyStage, PathLike, assemble, load, model_of, reduce
+from gearfmu.api.models import AnyStage, PathLike, assemble, loaded_stage, model_of, reduce
 from gearfmu.api.settings import Quantity, Settings, checked, in_si
 from gearfmu.errors import Problem, SpecError
 from gearfmu.modes.bodies import body_modes, gear_modes
@@ -96,7 +95,7 @@ def bearings(stage: PathLike | Stage, torque: Quantity | None = None) -> Bearing
 
     Raises ModelError for a stage without rolling bearings, and where one cannot carry its load.
     """
-    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    spec = loaded_stage(stage)
     return stage_bearings(spec, reduce(spec), None if torque is None else checked("torque", torque, "torque"))
 
 
@@ -111,7 +110,7 @@ def modes(
     Of a stage StageModes: frequency (positions, count) Hz, damping_ratio, shares of the energy; of a body BodyModes
     with shapes. Raises SpecError for a body that there is not.
     """
-    spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    spec = loaded_stage(stage)
     if body is None:
         bodies, model = reduce(spec), assemble(spec)
         asked = largest_torque(model) if torque is None else checked("torque", torque, "torque")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from gearfmu.commands.shared import Quantity, stage_names
+from gearfmu.commands.shared import FILE, quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.stage.run.bearings import BearingState
@@ -16,10 +16,8 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option(
-    "--torque", type=Quantity("torque"), help='Torque on the input, "100 N*m"; that of the file if not given.'
-)
-@click.option("--csv", "table", type=click.Path(dir_okay=False, path_type=Path), help="Write the table as CSV file.")
+@quantity("--torque", 'Torque on the input, "100 N*m"; that of the file if not given.')
+@click.option("--csv", "table", type=FILE, help="Write the table as CSV file.")
 def bearings(stage: str, torque: float | None, table: Path | None) -> None:
     """Rolling bearings of STAGE under a torque: loads of the shaft, displacement of the inner ring, rolling elements
     that carry, largest contact pressure, stiffness at that load, how often rolling elements pass and how far that moves

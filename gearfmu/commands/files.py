@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import echo_pairs
+from gearfmu.commands.shared import PATH, echo_pairs
 
 if TYPE_CHECKING:
     from gearfmu.stagefile.forms.general import Stage
@@ -21,7 +21,7 @@ UNITS = {
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="FILE")
+@click.argument("path", type=PATH, metavar="FILE")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def inspect(path: Path, as_json: bool) -> None:
     """Show the contents of FILE: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage.
@@ -34,29 +34,20 @@ def inspect(path: Path, as_json: bool) -> None:
 
 @click.command()
 @click.argument("kind", type=click.Choice(["stage", "general", "planetary", "scene"]))
-@click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
+@click.option("--out", type=PATH, help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
     """JSON schema of the stage.toml of a pair (stage), a general stage or a planetary set, or of scene.toml."""
     from gearfmu.files import write_text
+    from gearfmu.scenefile.scene import SceneSpec
+    from gearfmu.stagefile.schema import file_schema, general_schema, set_schema, stage_schema
 
-    text = _schema_text(kind)
+    stages = {"stage": stage_schema, "general": general_schema, "planetary": set_schema}
+    made = file_schema(SceneSpec) if kind == "scene" else stages[kind]()
+    text = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text(out, text)
-
-
-def _schema_text(kind: str) -> str:
-    from gearfmu.scenefile.scene import SceneSpec
-    from gearfmu.stagefile.schema import file_schema, general_schema, set_schema, stage_schema
-
-    made = {
-        "stage": stage_schema,
-        "general": general_schema,
-        "planetary": set_schema,
-        "scene": lambda: file_schema(SceneSpec),
-    }
-    return json.dumps(made[kind](), indent=2, ensure_ascii=False) + "\n"
 
 
 def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
@@ -210,8 +201,8 @@ def _fmu(path: Path) -> dict[str, Any]:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
-@click.argument("out", type=click.Path(path_type=Path), metavar="OUT")
+@click.argument("path", type=PATH, metavar="TRACE")
+@click.argument("out", type=PATH, metavar="OUT")
 @click.option("--channel", "channels", multiple=True, metavar="NAME", help="Only this channel; may repeat.")
 def convert(path: Path, out: Path, channels: tuple[str, ...]) -> None:
     """Write TRACE (the file, or the folder that holds trace.h5) as OUT in the format of its suffix: .csv, .mat

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar, stage_names
+from gearfmu.commands.shared import PATH, progress_bar, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.stage import StageModel
@@ -19,7 +19,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
 
 @click.command()
 @click.argument("stage", required=False, shell_complete=stage_names)
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
+@click.option("-o", "--out", type=PATH, help="File to write; <stage>.fmu when not given.")
 @click.option(
     "--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat."
 )
@@ -43,10 +43,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
     "its own with the [cross] extra.",
 )
 @click.option(
-    "--observe",
-    multiple=True,
-    metavar="GEAR",
-    help="Its rigid motion and modal amplitudes become outputs; may repeat.",
+    "--observe", multiple=True, metavar="GEAR", help="Its rigid motion and modal amplitudes become outputs; may repeat."
 )
 @click.option(
     "--start",
@@ -108,7 +105,7 @@ def how_to_load(path: Path, model: StageModel) -> str:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="FMU")
+@click.argument("path", type=PATH, metavar="FMU")
 @click.option("--json", "as_json", is_flag=True, help="Problems as JSON.")
 def validate(path: Path, as_json: bool) -> int:
     """Check an FMU of ours or of others. Exit code: the number of problems (at most 99), 0 for none."""

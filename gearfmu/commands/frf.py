@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gearfmu.commands.shared import Quantity, stage_names
+from gearfmu.commands.shared import FOLDER, Quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.reduction.full_order import FullOrder
@@ -45,7 +45,7 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "CPU s")
 @click.option("--free/--held", default=False, help="Reduce the free body (as the kernel takes it) or, as the paper, "
               "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip
 @click.option("--scale", type=click.FloatRange(0.05, 4), help="Factor on the element counts of the stage.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of results.")
+@click.option("--out", type=FOLDER, required=True, help="Folder of results.")
 def frf(stage: str, body: str, **options: Any) -> None:
     """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, echo_pairs, stage_names
+from gearfmu.commands.shared import PATH, echo_pairs, quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.stagefile.forms.general import Stage
 
 
 @click.command(name="import")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.argument("stage", required=False, shell_complete=stage_names)
 @click.argument("gear", required=False)
-@click.option("--length", type=Quantity("length_unit"), required=True, help='One length unit of the file: "1 mm".')
+@quantity("--length", 'One length unit of the file: "1 mm".', "length_unit", required=True)
 @click.option(
     "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
 )

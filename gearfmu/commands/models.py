@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 import click
@@ -21,10 +21,9 @@ def model_of(
 ) -> StageModel:
     """`api.assemble` of STAGE, saying where bodies lie that are not the stage's own."""
     from gearfmu.api.models import with_port_kinds
-
-    spec, bodies = bodies_for_motion(stage, bores)
     from gearfmu.stage import assemble
 
+    spec, bodies = bodies_for_motion(stage, bores)
     return assemble(with_port_kinds(spec, port_kinds or {}), bodies, observe=observe)
 
 
@@ -59,17 +58,10 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Stage, list
     return found
 
 
-@contextmanager
-def reducing(title: str = "reducing") -> Iterator[Progress]:
+def reducing(title: str = "reducing") -> AbstractContextManager[Progress]:
     """A progress function for the reduction of bodies: a bar on a terminal, else a line on standard error for every
     body that is being made, and every ten seconds one with the present task and its share done."""
-    with progress_bar(title, named=_body) as progress:
-        yield progress
-
-
-def _body(text: str) -> str:
-    """The body that a line of progress is about."""
-    return text.split(":")[0]
+    return progress_bar(title, named=lambda text: text.split(":")[0])
 
 
 def by_text(progress: Progress) -> Callable[[str, float], None]:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
-from gearfmu.commands.shared import Quantity, progress_bar, stage_names
+from gearfmu.commands.shared import PATH, progress_bar, quantity, stage_names
 from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
     from gearfmu.modes.linear import StageModes
     from gearfmu.modes.shapes import BodyModes
     from gearfmu.report.campbell import Crossing
-    from gearfmu.stagefile.forms.general import Stage
 
 
 COUPLED = (
@@ -32,14 +31,8 @@ COUPLED = (
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
 @click.option("--uncoupled", is_flag=True, help="The carrier of a set without the couplings of its bolts and bore.")
-@click.option(
-    "--torque",
-    type=Quantity("torque"),
-    help='Without --body: torque on the input, "302 N*m"; default: the largest that torque_max allows.',
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
-)
+@quantity("--torque", 'Without --body: torque on the input, "302 N*m"; default: the largest that torque_max allows.')
+@click.option("--out", type=PATH, default=Path("modes"), show_default=True, help="Folder to write to.")
 def modes(stage: str, name: str | None, count: int, torque: float | None, out: Path, **how: bool) -> None:
     """Natural frequencies of STAGE.
 
@@ -54,7 +47,7 @@ def modes(stage: str, name: str | None, count: int, torque: float | None, out: P
         return _of_stage(stage, torque, count, out)
     if torque is not None:
         raise click.BadParameter("modes of a free body have no torque: leave it out", param_hint="--torque")
-    body = _shapes(stage, name, count, (how["mounted"], how["uncoupled"]))
+    body = _shapes(stage, name, count, **how)
     for line in table(body):
         click.echo(line)
     if body.name == "carrier":
@@ -139,43 +132,27 @@ def table(body: BodyModes) -> list[str]:
     return lines
 
 
-def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
-    """how: the ring on its mounts, the carrier without couplings."""
+def _shapes(stage: str, name: str, count: int, mounted: bool, uncoupled: bool) -> BodyModes:
+    """mounted: the ring on its mounts; uncoupled: the carrier without couplings."""
+    from gearfmu.modes.bodies import body_modes, gear_modes, mounted_ring_modes, uncoupled_carrier_modes
     from gearfmu.stagefile.forms.expand import CARRIER
     from gearfmu.stagefile.stage import load_stage
 
-    spec, (mounted, uncoupled) = load_stage(stage), how
-    of_set = bool(spec.carriers)
-    if uncoupled and not (of_set and name == CARRIER):
+    spec = load_stage(stage)
+    if uncoupled and not (spec.carriers and name == CARRIER):
         raise click.BadParameter("only the carrier of a planetary set has couplings", param_hint="--uncoupled")
-    if mounted and not (of_set and name == "ring"):
+    if mounted and not (spec.carriers and name == "ring"):
         raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
-    if of_set:
-        return _of_set(spec, name, count, how)
-    _check(name, spec.files)
-    _, bodies = bodies_of(stage)
-    from gearfmu.modes.bodies import gear_modes
-
+    if name not in spec.files:
+        raise click.BadParameter(f"no body '{name}'; the stage has {', '.join(spec.files)}", param_hint="--body")
+    bodies = [] if spec.carriers else bodies_of(stage)[1]
     with progress_bar("shapes") as progress:
-        return gear_modes(spec, bodies[spec.files.index(name)], count, by_text(progress))
-
-
-def _of_set(spec: Stage, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
-    from gearfmu.modes.bodies import body_modes, mounted_ring_modes, uncoupled_carrier_modes
-
-    _check(name, spec.files)
-    with progress_bar("shapes") as progress:
-        mounted, uncoupled = how
+        tell = by_text(progress)
+        if bodies:
+            return gear_modes(spec, bodies[spec.files.index(name)], count, tell)
         if mounted:
-            return mounted_ring_modes(spec, count, by_text(progress))
-        if uncoupled:
-            return uncoupled_carrier_modes(spec, count, by_text(progress))
-        return body_modes(spec, name, count, by_text(progress))
-
-
-def _check(name: str, names: Sequence[str]) -> None:
-    if name not in names:
-        raise click.BadParameter(f"no body '{name}'; the stage has {', '.join(names)}", param_hint="--body")
+            return mounted_ring_modes(spec, count, tell)
+        return uncoupled_carrier_modes(spec, count, tell) if uncoupled else body_modes(spec, name, count, tell)
 
 
 def _write(body: BodyModes, out: Path) -> None:

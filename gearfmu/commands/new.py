@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, echo_pairs
+from gearfmu.commands.shared import PATH, Quantity, echo_pairs, quantity
 
 _WHOLE = re.compile(r"[+-]?\d+$")
 
@@ -51,25 +50,23 @@ class _Teeth(click.ParamType):
 @click.command(cls=_WithTeeth)
 @click.argument("name")
 @click.option("--like", metavar="STAGE", help="Shipped stage to start from.  [default: fzg_c]")
-@click.option(
-    "--rexs", type=click.Path(path_type=Path), metavar="FILE", help="Gear data from a REXS file (.rexs, .rexsz)."
-)
+@click.option("--rexs", type=PATH, metavar="FILE", help="Gear data from a REXS file (.rexs, .rexsz).")
 @click.option("--stage", default="", metavar="ID", help="With --rexs: identifier or name of one of several stages.")
 @click.option("--teeth", type=_Teeth(), help="Of pinion and wheel; with --planets of sun, planet and ring.")
 @click.option("--planets", type=int, metavar="N", help="A planetary set with so many planets.")
 @click.option("--unequal", is_flag=True, help="Planets at the places nearest to even ones at which teeth fit.")
-@click.option("--module", type=Quantity("module"), help='Normal module: "2.5 mm".')
+@quantity("--module", 'Normal module: "2.5 mm".')
 @click.option("--diametral-pitch", type=float, metavar="P", help="In place of --module: teeth per inch, 25.4 mm/m_n.")
-@click.option("--width", type=Quantity("face_width"), help='Common face width: "30 mm".')
-@click.option("--center", type=Quantity("center_distance"), help="Centre distance; without it one is proposed.")
-@click.option("--helix", type=Quantity("helix_angle"), help='Helix angle of pinion or sun: "22 deg".')
-@click.option("--pressure-angle", type=Quantity("pressure_angle"), help="Normal pressure angle, 20 deg without it.")
+@quantity("--width", 'Common face width: "30 mm".', "face_width")
+@quantity("--center", "Centre distance; without it one is proposed.", "center_distance")
+@quantity("--helix", 'Helix angle of pinion or sun: "22 deg".', "helix_angle")
+@quantity("--pressure-angle", "Normal pressure angle, 20 deg without it.", "pressure_angle")
 @click.option("--shift", "shifts", multiple=True, type=float, metavar="X",
               help="Profile shift; twice, of pinion and wheel or of sun and planet.")  # fmt: skip
 @click.option("--bore", "bores", multiple=True, type=Quantity("bore"), help='Bore diameter, "30 mm"; twice, likewise.')
-@click.option("--relief", type=Quantity("relief"), help='Tip relief of these gears: "20 um", parabolic.')
-@click.option("--torque", type=Quantity("torque_max"), help="Largest torque of the pinion or the carrier.")
-@click.option("--speed", type=Quantity("speed_max"), help="Largest speed of the pinion or the carrier.")
+@quantity("--relief", 'Tip relief of these gears: "20 um", parabolic.')
+@quantity("--torque", "Largest torque of the pinion or the carrier.", "torque_max")
+@quantity("--speed", "Largest speed of the pinion or the carrier.", "speed_max")
 def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: object) -> int:
     """Write NAME/stage.toml, every field commented: from numbers of teeth, module and face width with everything else
     proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
@@ -116,15 +113,19 @@ def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
 
 def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
     """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
+    import numpy as np
+
     from gearfmu.errors import SpecError
     from gearfmu.rexs import draft_from_rexs
+    from gearfmu.stage.run.trace import write_columns
     from gearfmu.stagefile.proposals.new import write_drafted
     from gearfmu.stagefile.stage import load_stage
 
     draft = draft_from_rexs(rexs, stage)
     path = write_drafted(name, draft.tables, draft.marks, f"read from the REXS file {rexs.name}")
     table = path.with_name("rexs_unread.csv")
-    _write_unread(table, draft.unread)
+    names = ("component", "attribute", "value", "unit")
+    write_columns(table, {n: np.array([getattr(entry, n) for entry in draft.unread], dtype=object) for n in names})
     click.echo(f"{path}\nassumed, because the file does not say it:")
     echo_pairs({place: mark.removeprefix("assumed: ") for place, mark in draft.assumptions().items()}, "  ")
     click.echo(f"  everything else that is marked so in the file: as in {draft.like}")
@@ -138,14 +139,3 @@ def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
         return 1
     click.echo(f"Next: edit it, then 'gearfmu reduce {path}'.")
     return 0
-
-
-def _write_unread(path: Path, unread: Iterable[Any]) -> None:
-    import csv
-
-    from gearfmu.files import written_whole
-
-    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("component", "attribute", "value", "unit"))
-        writer.writerows((entry.component, entry.attribute, entry.value, entry.unit) for entry in unread)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.shared import Quantity, level_option, progress_bar, scene_names, stage_names
+from gearfmu.commands.shared import FILE, FOLDER, PATH, level_option, progress_bar, quantity, scene_names, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.body import Body
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from gearfmu.stagefile.forms.general import Stage
 
 DEMO_STEP = 20e-6  # s
-OUT = click.Path(path_type=Path, file_okay=False)
 
 
 def _list(context: click.Context, option: object, wanted: bool) -> None:
@@ -36,12 +35,11 @@ def _list(context: click.Context, option: object, wanted: bool) -> None:
 
 @click.command()
 @click.argument("scene", required=False, shell_complete=scene_names)
-@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
 @click.option(
-    "--plan",
-    "plan_path",
-    type=click.Path(path_type=Path),
-    help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned.",
+    "--out", type=FOLDER, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given."
+)
+@click.option(
+    "--plan", "plan_path", type=PATH, help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned."
 )
 @click.option(
     "--unit",
@@ -53,14 +51,14 @@ def _list(context: click.Context, option: object, wanted: bool) -> None:
 @click.option(
     "--fmu",
     "fmu_path",
-    type=click.Path(path_type=Path),
+    type=PATH,
     help="An FMU exported earlier, which brings its stage; the scene's stage is exported anew when not given.",
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 @click.option("--stage", help="Another STAGE than the scene's; with --fmu the one that the FMU must be of.")
-@click.option("--step", type=Quantity("step"), help="Another communication step than the scene's: 20 us for spectra.")
-@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
-@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
+@quantity("--step", "Another communication step than the scene's: 20 us for spectra.")
+@quantity("--torque", 'Another torque on the input than the scene\'s, "302 N*m".')
+@quantity("--speed", 'Another speed of the input at the start, "2000 rpm".')
 @level_option
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
@@ -70,48 +68,35 @@ def run(scene: str | None, out: Path | None, stage: str | None, **how: Any) -> i
     changed = {key: how.pop(key) for key in ("torque", "speed", "level", "step")}
     if how["fmu_path"] is not None and how["unit"] == "kernel":
         raise click.UsageError("--fmu is run as an FMU: leave --unit kernel away")
+    unit = how["fmu_path"] or how["unit"]
     if how["plan_path"] is not None:
         if scene is not None or stage is not None or how["verify"] or set(changed.values()) != {None}:
             remedy = "--plan names scene, stage, load, level and step itself, and verifies by spot checks: give none"
             raise click.UsageError(remedy)
-        return run_plan(how["plan_path"], out, _unit(how))
+        return run_plan(how["plan_path"], out, unit)
     if scene is None:
         raise click.UsageError("name a SCENE, or a plan with --plan")
     spec = changed_scene(scene, **changed)
-    return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=_unit(how), verify=how["verify"])
-
-
-def _unit(how: Mapping[str, Any]) -> str | Path:
-    """ "kernel", "fmu" or the path of an FMU."""
-    unit: str | Path = how["unit"] if how["fmu_path"] is None else how["fmu_path"]
-    return unit
+    return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=unit, verify=how["verify"])
 
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option("--torque", type=Quantity("torque"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
-@click.option(
+@quantity("--torque", 'Torque on the input, "302 N*m".')
+@quantity("--speed", 'Speed of the input, "2000 rpm".')
+@quantity(
     "--end-speed",
-    type=Quantity("speed"),
-    help='A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+    'A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+    "speed",
 )
 @click.option(
     "--profile",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     help="A CSV file of torque, speed or both over time, in place of the options: time_[s],torque_[N*m],speed_[rpm].",
 )
-@click.option(
-    "--duration", type=Quantity("duration"), help="Simulated time; 0.1 s or that of the profile when not given."
-)
-@click.option("--step", type=Quantity("step"), default="20 us", show_default=True, help="Time between samples.")
-@click.option(
-    "--settle",
-    type=Quantity("time"),
-    default="0.02 s",
-    show_default=True,
-    help="From here on results and spectra are taken.",
-)
+@quantity("--duration", "Simulated time; 0.1 s or that of the profile when not given.")
+@quantity("--step", "Time between samples.", default="20 us", show_default=True)
+@quantity("--settle", "From here on results and spectra are taken.", "time", default="0.02 s", show_default=True)
 @click.option(
     "--set",
     "settings",
@@ -120,7 +105,9 @@ def _unit(how: Mapping[str, Any]) -> str | Path:
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
 @level_option
-@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
+@click.option(
+    "--out", type=FOLDER, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given."
+)
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque."""
@@ -141,7 +128,7 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: P
 
 
 @click.command()
-@click.option("--out", type=OUT, default=Path("out/demo"), show_default=True, help="Folder of the results.")
+@click.option("--out", type=FOLDER, default=Path("out/demo"), show_default=True, help="Folder of the results.")
 def demo(out: Path) -> int:
     """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report.
 
@@ -149,13 +136,13 @@ def demo(out: Path) -> int:
     """
     from gearfmu.scenefile.scene import load_scene
 
-    return run_scene(with_step(load_scene("clutch_closure"), DEMO_STEP), out, unit="fmu")
+    return run_scene(load_scene("clutch_closure").with_coupling(step=DEMO_STEP), out, unit="fmu")
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="FOLDER")
+@click.argument("path", type=PATH, metavar="FOLDER")
 @click.option("--stage", help="STAGE of the run; the one it names when not given.")
-@click.option("--out", type=OUT, help="Folder of the files; FOLDER/deformation when not given.")
+@click.option("--out", type=FOLDER, help="Folder of the files; FOLDER/deformation when not given.")
 def deformed(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the gears that a run recorded deformed, FOLDER/deformation.h5, as .vtu with a .pvd for ParaView."""
     from gearfmu.api.results import stage_and_bodies
@@ -169,9 +156,9 @@ def deformed(path: Path, stage: str | None, out: Path | None) -> None:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
+@click.argument("path", type=PATH, metavar="TRACE")
 @click.option("--stage", help="STAGE of the run, for the deformed gears.")
-@click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
+@click.option("--out", type=FOLDER, help="Folder of the report; that of the trace when not given.")
 def report(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
     from gearfmu.api.results import trace_file, write_report
@@ -182,7 +169,7 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True), metavar="TRACE…")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="The page; comparison.html by default.")
+@click.option("--out", type=FILE, help="The page; comparison.html by default.")
 @click.option("--name", "names", multiple=True, help="Name of a trace on the page; once for each.")
 def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -> None:
     """Compare two or more traces (files, or folders that hold trace.h5) with the first of them, in one page."""
@@ -200,12 +187,7 @@ def changed_scene(scene: str, step: float | None = None, **others: object) -> Sc
     keys = {"level": "stage.level", "stage": "stage.name"}
     changes = {keys.get(key, key): value for key, value in others.items() if value is not None}
     spec = load_scene(scene, changes)
-    return spec if step is None else with_step(spec, step)
-
-
-def with_step(scene: SceneSpec, step: float) -> SceneSpec:
-    """The SceneSpec with another communication step (s)."""
-    return scene.model_copy(update={"coupling": scene.coupling.model_copy(update={"step": step})})
+    return spec if step is None else spec.with_coupling(step=step)
 
 
 def run_scene(scene: SceneSpec, out: Path, **options: Any) -> int:
@@ -247,11 +229,12 @@ def finish(trace: Trace, out: Path, stage: str | None, prepared: float | None = 
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
     else 1. stage : as of `api.write_report`. prepared : processor time (s) of the work around the simulation, to be
     shown."""
+    from gearfmu.api.results import write_report
     from gearfmu.report.results import REACHED_THE_END
 
     begin = process_time()
     trace.save(out / "trace.h5")
-    page = write_report(trace, out, stage)
+    page = write_report(trace, out, stage, tell=_tell)
     meta, reported = trace.meta, process_time() - begin
     click.echo(
         f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
@@ -278,13 +261,6 @@ def write_deformed(deformation: Deformation, folder: Path, spec: Stage, reduced:
     phases = tooth_phases(spec)
     gears = [deformed_gear(name, bodies[name], motion, phases[name]) for name, motion in deformation.gears.items()]
     return [write_series(gear, deformation.time, folder) for gear in gears]
-
-
-def write_report(trace: Trace, out: Path, stage: str | None, home: Path | None = None) -> Path:
-    """`api.write_report`, its remark on standard error."""
-    from gearfmu.api.results import write_report as write
-
-    return write(trace, out, stage, home, _tell)
 
 
 def _tell(text: str) -> None:

@@ -7,6 +7,8 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -14,6 +16,9 @@ from click.shell_completion import CompletionItem
 LEVELS = ("rigid", "fast", "standard", "full", "paper", "explicit")
 Progress = Callable[..., None]
 _EVERY = 9.0  # s between lines of progress where there is no terminal
+PATH = click.Path(path_type=Path)
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 class Quantity(click.ParamType):
@@ -47,6 +52,11 @@ class Quantity(click.ParamType):
             field = "" if param is None else param.opts[0].lstrip("-")
             raise SpecError([Problem("", field, str(value), refusal)])
         return number
+
+
+def quantity(option: str, help: str, name: str = "", **how: Any) -> Callable[[Any], Any]:
+    """An option that takes a Quantity. name: its range, that of the option's name when not given."""
+    return click.option(option, type=Quantity(name or option.removeprefix("--")), help=help, **how)
 
 
 def level_option(command: Callable[..., object]) -> Callable[..., object]:

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from gearfmu.commands.shared import Quantity, stage_names
+from gearfmu.commands.shared import FILE, quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.sound import SoundPower
-
-FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
 @click.argument("run", type=click.Path(exists=True, path_type=Path))
 @click.argument("housing", shell_complete=stage_names)
 @click.option("--out", type=FILE, help="Trace that is written; housed.h5 beside the run when not given.")
-@click.option("--torque", type=Quantity("torque"), help="Torque on the input; that of the run when not given.")
+@quantity("--torque", "Torque on the input; that of the run when not given.")
 def house(run: Path, housing: str, out: Path | None, torque: float | None) -> None:
     """Put a housing under a finished RUN on rigid ground (its trace.h5 or folder): HOUSING is a stage with the same
     bearings in a housing. Writes a trace of seat forces, mount forces, sensors and the housing's motion."""
@@ -42,7 +40,7 @@ def house(run: Path, housing: str, out: Path | None, torque: float | None) -> No
     "--matrix", type=FILE, help="File of the radiation matrix; that beside the housing's body when not given."
 )
 @click.option("--patches", type=click.IntRange(50, 6000), help="Boundary elements; those of the matrix when not given.")
-@click.option("--start", type=Quantity("time"), default=0.0, help="Time from which sound counts.")
+@quantity("--start", "Time from which sound counts.", "time", default=0.0)
 @click.option("--erp", is_flag=True, help="Print equivalent radiated power beside the sound power.")
 @click.option("--speed", help="Channel of a waterfall, input.gear.w: one row a segment of time in the CSV file.")
 @click.option("--csv", "table", type=FILE, help="Write third octaves as CSV file.")
@@ -61,10 +59,8 @@ def sound(run: Path, housing: str | None, patches: int | None, erp: bool, start:
 @click.argument("run", type=click.Path(exists=True, path_type=Path))
 @click.argument("sensor")
 @click.option("--housing", help="STAGE of the housing; that of the run when not given.")
-@click.option(
-    "--band", type=Quantity("frequency"), help="Nominal frequency of a third octave; all of them when not given."
-)
-@click.option("--start", type=Quantity("time"), default=0.0, help="Time from which the run counts.")
+@quantity("--band", "Nominal frequency of a third octave; all of them when not given.", "frequency")
+@quantity("--start", "Time from which the run counts.", "time", default=0.0)
 @click.option("--csv", "table", type=FILE, help="Write every path in third octaves as CSV file.")
 def paths(run: Path, sensor: str, housing: str | None, band: float | None, **how: Any) -> None:
     """Transfer paths: share of every bearing direction in the acceleration of SENSOR (top.ay). RUN is the trace or

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gearfmu.commands.models import by_text, reducing
-from gearfmu.commands.shared import echo_pairs, stage_names
+from gearfmu.commands.shared import PATH, echo_pairs, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.body import Body
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 )
 @click.option("--full", is_flag=True, help="All teeth instead of one sector.")
 @click.option("--deck", is_flag=True, help="Also <body>.inp for CalculiX, with a step that stores K and M.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the files.")
+@click.option("--out", type=PATH, default=Path("."), help="Folder of the files.")
 def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out: Path) -> None:
     """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
     from gearfmu.body.sector import body_sector
@@ -52,9 +52,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder of the .h5 files; beside the stage file when not given."
-)
+@click.option("--out", type=PATH, help="Folder of the .h5 files; beside the stage file when not given.")
 @click.option("--force", is_flag=True, help="Reduce again even where a body is up to date.")
 @click.option(
     "--coarse",

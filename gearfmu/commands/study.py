@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import FOLDER, progress_bar
 
 if TYPE_CHECKING:
     from gearfmu.scenefile.scene import SceneSpec
@@ -20,10 +20,7 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 @click.command()
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    required=True,
-    help="Folder of the CSV files and charts; an existing study is continued.",
+    "--out", type=FOLDER, required=True, help="Folder of the CSV files and charts; an existing study is continued."
 )
 @click.option("--quick", is_flag=True, help="Few points on a short window.")
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes.")

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from gearfmu.commands.runs import changed_scene
-from gearfmu.commands.shared import Quantity, progress_bar, scene_names
+from gearfmu.commands.shared import FILE, FOLDER, progress_bar, quantity, scene_names
 
 
 @click.command()
@@ -21,9 +21,7 @@ from gearfmu.commands.shared import Quantity, progress_bar, scene_names
     help='Values of a key: "torque=100, 200, 300 N*m", "speed=1000:6000:11 rpm" (start:end:count), "stage.level=fast"; '
     "may repeat: all combinations, the last key fastest.",
 )
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder; out/sweep_<name> when not given."
-)
+@click.option("--out", type=FOLDER, help="Folder; out/sweep_<name> when not given.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes of this machine; one a core when not given.")
 @click.option("--scheduler", metavar="ADDRESS", help='A dask cluster instead: "tcp://host:8786"; needs gearfmu[dist].')
 @click.option("--traces", is_flag=True, help="Keep the trace of every run, traces/*.h5.")
@@ -63,14 +61,14 @@ def sweep(
 @click.option("--budget", help='Largest error of the levels in the band, "1 dB".')
 @click.option("--waveform", help='Largest error of the waveforms in the band after a common delay, "5 %".')
 @click.option("--stage", help="Another STAGE than the scene's.")
-@click.option("--torque", type=Quantity("torque"), help='Another torque on the input than the scene\'s, "302 N*m".')
-@click.option("--speed", type=Quantity("speed"), help='Another speed of the input at the start, "2000 rpm".')
-@click.option("--step", type=Quantity("step"), help="Another communication step than the scene's.")
+@quantity("--torque", 'Another torque on the input than the scene\'s, "302 N*m".')
+@quantity("--speed", 'Another speed of the input at the start, "2000 rpm".')
+@quantity("--step", "Another communication step than the scene's.")
 @click.option(
     "--may-drop", "force", multiple=True, metavar="EFFECT",
     help="An effect that may be left out though it costs little: coast_flank; may repeat.",
 )  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), default="plan.toml", show_default=True)
+@click.option("--out", type=FILE, default="plan.toml", show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Trials side by side.")
 @click.option("--scheduler", help="Address of a dask scheduler that runs the trials, tcp://host:8786.")
 @click.option("--fresh", is_flag=True, help="Plan anew, though this was planned before.")

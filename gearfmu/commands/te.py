@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity, echo_pairs, level_option, progress_bar, stage_names
+from gearfmu.commands.shared import PATH, Quantity, echo_pairs, level_option, progress_bar, quantity, stage_names
 from gearfmu.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PATH,
     default=Path("te.csv"),
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
@@ -73,7 +73,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
     The torque acts on the input, the first port: a pair's pinion. The output is the second port. A torque without
     equilibrium is named and NaN in the table, and the exit code is 1."""
     from gearfmu.commands.models import level_of
-    from gearfmu.report.te import write_plot
+    from gearfmu.report.te import write_flanks, write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.run.trace import write_columns
 
@@ -104,7 +104,9 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, doubled: bool |
             click.echo(f"warning: {text}", err=True)
         click.echo(f"{path}, {picture}")
         failed |= any(result.failed)
-    _draw_flanks(model, out)
+    flanks = out.with_name(f"{out.stem}_flanks.png")
+    if write_flanks(model.stage, flanks):
+        click.echo(str(flanks))
     warn_of_limits(model, torques)
     if failed:
         click.get_current_context().exit(1)
@@ -130,15 +132,6 @@ def _unloaded(model: StageModel, torques: Sequence[float], **where: Any) -> TeRe
         return None
 
 
-def _draw_flanks(model: StageModel, out: Path) -> None:
-    """A picture of the flanks beside the table, where they are not nominal."""
-    from gearfmu.report.te import write_flanks
-
-    picture = out.with_name(f"{out.stem}_flanks.png")
-    if write_flanks(model.stage, picture):
-        click.echo(str(picture))
-
-
 def warn_of_limits(model: StageModel, torques: Sequence[float]) -> None:
     """Say on standard error which torques (N·m) on the input are beyond the limits of the stage."""
     from gearfmu.stage.run.limits import beyond_limits
@@ -160,8 +153,8 @@ def above_sharing(result: TeResult, load_sharing: float) -> list[str]:
 
 @click.command()
 @click.argument("stage", shell_complete=stage_names)
-@click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
+@quantity("--torque", 'Torque on the input, "302 N*m".', required=True)
+@quantity("--speed", 'Speed of the input, "2000 rpm".', required=True)
 @click.option(
     "--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches of the slowest mesh."
 )

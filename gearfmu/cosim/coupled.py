@@ -16,7 +16,7 @@ from gearfmu.cosim.frames import FramePlan, FrameRecorder
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.shaft_loads import Loaded
-from gearfmu.cosim.units import Recorded, Unit, Variable
+from gearfmu.cosim.units import Log, Recorded, Unit, Variable
 from gearfmu.errors import CouplingError, FmuError, ModelError, SimulationError
 from gearfmu.stage.run.trace import Channel, Trace
 
@@ -86,15 +86,8 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
     return Result(trace, outcome, message, cpu, cpu * share, *exchanged, coupled.master.order, facts, coupled.frames)
 
 
-FACTS = (
-    "energy.work",
-    "energy.residual",
-    "solver.n_dyn",
-    "solver.h",
-    "solver.retried_steps",
-    "solver.steps",
-    "solver.status",
-)
+SOLVER_FACTS = ("n_dyn", "h", "retried_steps", "steps", "status")
+FACTS = ("energy.work", "energy.residual", *(f"solver.{name}" for name in SOLVER_FACTS))
 
 
 class _Timed:
@@ -164,6 +157,15 @@ class CoupledRun:
             if self.plan.progress and self.at % tell == 0:
                 self.plan.progress(self.at / self.plan.steps)
 
+    def window(self, first: int, last: int) -> Trace:
+        """On to step `last`; the trace from step `first` on, from here where the run is beyond it."""
+        self.new_recorder(last - self.at)
+        self.advance(max(first, self.at))
+        self.new_recorder(last - self.at)
+        self.record()
+        self.advance(last)
+        return self.recorder.trace({})
+
     def record(self) -> None:
         """Record this point."""
         self.recorder.take(self.time)
@@ -208,14 +210,18 @@ class Recorder:
     def __init__(
         self, stage: Recorded, drive: Recorded, patterns: Sequence[str], points: int, omit: Sequence[str] = ()
     ) -> None:
-        self._names = {prefix: _chosen(prefix, unit, patterns, omit) for prefix, unit in (("", stage), (DRIVE, drive))}
-        everything = [prefix + name for prefix, unit in (("", stage), (DRIVE, drive)) for name in unit.outputs()]
+        sides = (("", stage), (DRIVE, drive))
+        everything = [prefix + name for prefix, unit in sides for name in unit.outputs()]
         unfit = [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in everything)]
         if unfit:
             raise CouplingError(f"nothing to record for {', '.join(unfit)}; there are {', '.join(everything)}")
-        units = {"": stage, DRIVE: drive}
-        self._logs = {prefix: units[prefix].log(list(names), points) for prefix, names in self._names.items() if names}
-        self._take = [log.take for log in self._logs.values()]
+        self._logs: list[tuple[str, dict[str, Variable], Log]] = []
+        for prefix, unit in sides:
+            asked = {name: v for name, v in unit.outputs().items() if _fits(prefix + name, patterns)}
+            names = {name: v for name, v in asked.items() if not _fits(prefix + name, omit)}
+            if names:
+                self._logs.append((prefix, names, unit.log(list(names), points)))
+        self._take = [log.take for _, _, log in self._logs]
         self._time: list[float] = []
 
     @property
@@ -232,19 +238,11 @@ class Recorder:
     def trace(self, meta: dict[str, Any]) -> Trace:
         """Everything recorded so far."""
         channels = {}
-        for prefix, log in self._logs.items():
-            for column, (name, about) in zip(log.rows()[: self.count].T, self._names[prefix].items(), strict=True):
+        for prefix, names, log in self._logs:
+            for column, (name, about) in zip(log.rows()[: self.count].T, names.items(), strict=True):
                 values = np.round(column).astype(np.int64) if about.whole else np.ascontiguousarray(column)
                 channels[prefix + name] = Channel(values, about.unit, about.description)
         return Trace(np.array(self._time), channels, meta)
-
-
-def _chosen(prefix: str, unit: Recorded, patterns: Sequence[str], omit: Sequence[str]) -> dict[str, Variable]:
-    return {
-        name: about
-        for name, about in unit.outputs().items()
-        if _fits(prefix + name, patterns) and not _fits(prefix + name, omit)
-    }
 
 
 def _fits(name: str, patterns: Sequence[str]) -> bool:

@@ -165,17 +165,14 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
         Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed),
         Inertia("final_drive", car.final_drive_inertia, w=_wheel_speed(scene, shafts)),
     )
+    flywheel = Spring("dmf", {"engine": 1.0, "secondary": -1.0}, car.dmf_stiffness, car.dmf_damping)
     return Network(
         (engine, secondary, disc, final_drive, *nodes),
-        (_dual_mass_flywheel(car), _half_shafts(car), tyres),
+        (flywheel, _half_shafts(car), tyres),
         (Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak),),
         sources,
         torque_ports={shafts.input: "disc", shafts.output: "final_drive"},
     )
-
-
-def _dual_mass_flywheel(car: PassengerCar) -> Spring:
-    return Spring("dmf", {"engine": 1.0, "secondary": -1.0}, car.dmf_stiffness, car.dmf_damping)
 
 
 def _half_shafts(car: PassengerCar) -> Spring:

@@ -130,19 +130,14 @@ def switch(dynamics: Dynamics, mode: Mode, found: Found, x: np.ndarray) -> Mode:
     at_rest = [k for k, sign in enumerate(signs) if sign == 0]
     if signs[found.number] == 0:
         at_rest.remove(found.number)
-        torque = _stick_torque(dynamics, mode, found)
-        signs[found.number] = 1 if torque > 0 else -1
+        m = dynamics.matrices(mode)
+        row = len(m.c) - 2 * dynamics.n_clutches + found.number
+        signs[found.number] = 1 if m.c[row] @ found.x + m.d[row] @ found.u > 0 else -1  # by the torque that held it
         _stop(dynamics, x, [found.number, *at_rest])
     else:
         at_rest.append(found.number)
         _stop(dynamics, x, at_rest)
     return resolve(dynamics, (tuple(signs), tuple(gaps)), sorted(at_rest), x, found.u, found.capacity)
-
-
-def _stick_torque(dynamics: Dynamics, mode: Mode, found: Found) -> float:
-    m, n_c = dynamics.matrices(mode), dynamics.n_clutches
-    row = len(m.c) - 2 * n_c + found.number
-    return float(m.c[row] @ found.x + m.d[row] @ found.u)
 
 
 def _stop(dynamics: Dynamics, x: np.ndarray, clutches: list[int]) -> None:

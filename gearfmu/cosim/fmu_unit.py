@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from ctypes import CFUNCTYPE, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from gearfmu.cosim.units import Variable
+from gearfmu.cosim.units import RowLog, Variable
 from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
 from gearfmu.kernel.build import SUFFIX, host_platform
@@ -77,60 +78,26 @@ class FmuHandle:
     real: bool
 
 
-class FmuLog:
-    """Rows that the FMU writes itself, one table for each FMI type."""
-
-    def __init__(self, unit: FmuUnit, names: Sequence[str], points: int) -> None:
-        self._unit, self._width, self._points, self._count = unit, len(names), points, 0
-        self._groups = unit.resolve(names).groups
-        self._tables = [np.zeros((points, len(group.places)), dtype=group.view.dtype) for group in self._groups]
-        self._writes = [
-            (group, len(group.places), table.ctypes.data, table.strides[0])
-            for group, table in zip(self._groups, self._tables, strict=True)
-        ]
-
-    def take(self) -> None:
-        """Keep the present outputs."""
-        if self._count == self._points:
-            raise CouplingError(f"the log holds {self._count} times and no more")
-        for group, width, address, stride in self._writes:
-            self._unit.read(group.call, group.references, width, address + self._count * stride)
-        self._count += 1
-
-    def rows(self) -> np.ndarray:
-        """(times, names) kept so far."""
-        found = np.zeros((self._count, self._width))
-        for group, table in zip(self._groups, self._tables, strict=True):
-            found[:, group.places] = table[: self._count]
-        return found
-
-
 class FmuUnit:
     """Unit of an FMU.
 
-    path : the .fmu; parameters : start values by name, numbers, booleans or the items of an enumeration; folder :
-    where to unpack (a temporary one if None). Raises FmuError when the FMU cannot be loaded, knows no such variable
-    or refuses a call; SimulationError when it discards a step. `close` (or the end of a with block) frees the
-    instance.
+    path : the .fmu, unpacked into a temporary folder; parameters : start values by name, numbers, booleans or the items
+    of an enumeration. Raises FmuError when the FMU cannot be loaded, knows no such variable or refuses a call;
+    SimulationError when it discards a step. `close` frees the instance.
     """
 
-    def __init__(
-        self,
-        path: str | Path,
-        parameters: Mapping[str, float | bool | str] | None = None,
-        folder: str | Path | None = None,
-    ) -> None:
+    def __init__(self, path: str | Path, parameters: Mapping[str, float | bool | str] | None = None) -> None:
         self.path = Path(path)
         self.messages: list[str] = []
-        self._own_folder = None if folder else tempfile.mkdtemp(prefix="gearfmu-")
+        self._folder = tempfile.mkdtemp(prefix="gearfmu-")
         try:
-            self._load(str(folder or self._own_folder))
-            self.instantiate(parameters or {})
+            self._load(self._folder)
+            self._instantiate(parameters or {})
         except GearfmuError:
-            self._remove_folder()
+            shutil.rmtree(self._folder, ignore_errors=True)
             raise
         except Exception as error:  # whatever a damaged file or a foreign binary makes of it
-            self._remove_folder()
+            shutil.rmtree(self._folder, ignore_errors=True)
             raise FmuError(f"{self.path}: cannot be loaded: {error} {self._last_message()}") from error
 
     def _load(self, folder: str) -> None:
@@ -157,7 +124,7 @@ class FmuUnit:
         del self.messages[:-MESSAGES_KEPT]
 
     # -- life ----------------------------------------------------------------------------------------------------------
-    def instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
+    def _instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
         """A fresh instance with these start values."""
         self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         self._component = c_void_p(self._fmu.component)
@@ -183,13 +150,7 @@ class FmuUnit:
         if self._fmu.component is not None:
             self._fmu.freeInstance()
             self._fmu.component = None
-        self._remove_folder()
-
-    def __enter__(self) -> FmuUnit:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     # -- variables -----------------------------------------------------------------------------------------------------
     def outputs(self) -> dict[str, Variable]:
@@ -232,20 +193,16 @@ class FmuUnit:
     def get(self, handle: FmuHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer, one call a type."""
         for group in handle.groups:
-            self.read(group.call, group.references, len(group.places), group.values)
+            getter = self._getters[group.call]
+            if getter(self._component, group.references, len(group.places), group.values) > fmi2Warning:
+                raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
             if not handle.real:
                 handle.buffer[group.places] = group.view
         return handle.buffer
 
-    def read(self, call: str, references: object, count: int, address: object) -> None:
-        """Values of variables of one type (Real, Integer, Boolean) to an address, which must have room for them.
-        Raises FmuError when the FMU refuses."""
-        if self._getters[call](self._component, references, count, address) > fmi2Warning:
-            raise FmuError(f"{self.path}: fmi2Get{call} refused. {self._last_message()}")
-
-    def log(self, names: Sequence[str], points: int) -> FmuLog:
+    def log(self, names: Sequence[str], points: int) -> RowLog:
         """Keeps these outputs at up to `points` times."""
-        return FmuLog(self, names, points)
+        return RowLog(partial(self.get, self.resolve(names)), len(names), points)
 
     def step(self, time: float, h: float) -> None:
         """fmi2DoStep. Raises SimulationError with outcome and last successful time on discard, FmuError on error."""
@@ -294,10 +251,6 @@ class FmuUnit:
 
     def _last_message(self) -> str:
         return self.messages[-1] if self.messages else "The FMU gave no message."
-
-    def _remove_folder(self) -> None:
-        if self._own_folder:
-            shutil.rmtree(self._own_folder, ignore_errors=True)
 
 
 def outcome_of(message: str) -> str:

@@ -37,7 +37,7 @@ def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Stage | None = None) -> S
         raise SpecError([Problem(str(opened.path), f"kind of stage {opened.model.name}", own_kind, remedy)])
     if usual is not None and not opened.problems_of(usual):
         return scene
-    return scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": opened.model.name})})
+    return scene.with_stage(name=opened.model.name)
 
 
 def fitted(

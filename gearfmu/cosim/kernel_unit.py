@@ -6,13 +6,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.units import Variable
+from gearfmu.cosim.units import RowLog, Variable
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel
@@ -25,26 +26,6 @@ class KernelHandle(NamedTuple):
     references: Any  # ctypes array of unsigned 32-bit integers
     values: Any  # ctypes array that the kernel reads and fills
     buffer: np.ndarray  # the same memory
-
-
-class KernelLog:
-    """Rows that the kernel writes itself."""
-
-    def __init__(self, kernel: Kernel, references: Any, points: int) -> None:
-        self._get, self._references, self._count = kernel.get_many, references, 0
-        self._table = np.zeros((points, len(references)))
-        self._address, self._stride = self._table.ctypes.data, self._table.strides[0]
-
-    def take(self) -> None:
-        """Keep the present outputs."""
-        if self._count == len(self._table):
-            raise CouplingError(f"the log holds {self._count} times and no more")
-        self._get(self._references, self._address + self._count * self._stride)
-        self._count += 1
-
-    def rows(self) -> np.ndarray:
-        """(times, names) kept so far."""
-        return self._table[: self._count]
 
 
 class KernelUnit:
@@ -107,9 +88,9 @@ class KernelUnit:
         self.kernel.get_many(handle.references, handle.values)
         return handle.buffer
 
-    def log(self, names: Sequence[str], points: int) -> KernelLog:
+    def log(self, names: Sequence[str], points: int) -> RowLog:
         """Keeps these outputs at up to `points` times."""
-        return KernelLog(self.kernel, self.resolve(names).references, points)
+        return RowLog(partial(self.get, self.resolve(names)), len(names), points)
 
     def step(self, time: float, h: float) -> None:
         """One communication step."""

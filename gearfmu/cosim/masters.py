@@ -215,10 +215,22 @@ class _Exchange:
         return self.stage.resolve([f"{shaft}.{key}" for shaft in self.cut.shafts])
 
 
-class _Exchanging:
-    """State that both masters of a cut save: the drivetrain, torques held on it, work done on it."""
+class _CutMaster:
+    """What both masters of a cut share: the start, and a state of drivetrain, torques held on it, work done on it.
+    first: the torque output that is held from the start; second_order: whether the scheme is, with all inputs of the
+    stage connected."""
 
-    ports: Ports
+    def __init__(self, cut: Cut, first: str, second_order: bool) -> None:
+        everything = cut.wiring.motion == KEYS and cut.wiring.rates
+        self.order = 2 if everything and second_order else 1
+        self.exchange = _Exchange(cut)
+        self.ports, self.stage = self.exchange.ports, cut.stage
+        self._first = self.exchange.torque(first)
+
+    def begin(self, time: float) -> None:
+        """Initialise both units."""
+        self.exchange.begin(time)
+        self.ports.hold(self.stage.get(self._first).tolist())
 
     def save(self) -> Any:
         """State of drivetrain and ports."""
@@ -231,19 +243,12 @@ class _Exchanging:
         self.ports.unit.restore(drive)
 
 
-class GsMean(_Exchanging):
+class GsMean(_CutMaster):
     """Master `gs_mean`."""
 
     def __init__(self, cut: Cut) -> None:
-        self.order = 2 if _everything(cut.wiring) else 1
-        self.exchange = _Exchange(cut)
-        self.ports, self.stage = self.exchange.ports, cut.stage
-        self._tau, self._mean = self.exchange.torque("tau"), self.exchange.torque("tau_mean")
-
-    def begin(self, time: float) -> None:
-        """Initialise both units."""
-        self.exchange.begin(time)
-        self.ports.hold(self.stage.get(self._tau).tolist())
+        super().__init__(cut, "tau", second_order=True)
+        self._mean = self.exchange.torque("tau_mean")
 
     def step(self, time: float, h: float) -> None:
         """One communication step of both units."""
@@ -253,33 +258,20 @@ class GsMean(_Exchanging):
         self.ports.step(self.stage.get(self._mean).tolist(), time, h)
 
 
-class Jacobi(_Exchanging):
+class Jacobi(_CutMaster):
     """Master `jacobi`."""
 
     def __init__(self, cut: Cut) -> None:
-        self.exchange = _Exchange(cut)
-        self.ports, self.stage = self.exchange.ports, cut.stage
-        self._held = self.exchange.torque(cut.wiring.held)
-        self.order = 2 if _everything(cut.wiring) and cut.wiring.held == "tau_next" else 1
-
-    def begin(self, time: float) -> None:
-        """Initialise both units."""
-        self.exchange.begin(time)
-        self.ports.hold(self.stage.get(self._held).tolist())
+        super().__init__(cut, cut.wiring.held, second_order=cut.wiring.held == "tau_next")
 
     def step(self, time: float, h: float) -> None:
         """One communication step of both units."""
-        tau = self.stage.get(self._held).tolist()
+        tau = self.stage.get(self._first).tolist()
         self.ports.hold(tau)
         self.ports.now(self.exchange.motion)
         self.exchange.send(time, h)
         self.stage.step(time, h)
         self.ports.step(tau, time, h)
-
-
-def _everything(wiring: Wiring) -> bool:
-    """Whether all inputs of the stage are connected."""
-    return wiring.motion == KEYS and wiring.rates
 
 
 Master = GsMean | Jacobi | TorqueMaster

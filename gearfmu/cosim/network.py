@@ -22,7 +22,6 @@ import numpy as np
 from scipy.linalg import expm
 
 from gearfmu.cosim.signals import Signal
-from gearfmu.errors import CouplingError
 
 
 @dataclass(frozen=True)
@@ -94,53 +93,6 @@ class Network:
     sources: tuple[Source, ...] = ()
     torque_ports: Mapping[str, str] = field(default_factory=dict)
     motion_ports: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        problems = [*_name_problems(self), *_node_problems(self), *_value_problems(self)]
-        if problems:
-            raise CouplingError("; ".join(problems))
-
-
-def _name_problems(network: Network) -> list[str]:
-    parts = (*network.nodes, *network.springs, *network.clutches, *network.sources)
-    names = [part.name for part in parts]
-    return [f"{name!r} names two parts; give each its own name" for name in sorted(set(names)) if names.count(name) > 1]
-
-
-def _node_problems(network: Network) -> list[str]:
-    known = {node.name for node in network.nodes}
-    used = [(spring.name, name) for spring in network.springs for name in spring.on]
-    used += [(clutch.name, name) for clutch in network.clutches for name in (clutch.a, clutch.b)]
-    used += [(source.name, source.node) for source in network.sources]
-    used += [*network.torque_ports.items(), *network.motion_ports.items()]
-    problems = [
-        f"{part}: there is no node {name!r}; known: {', '.join(sorted(known))}"
-        for part, name in used
-        if name not in known
-    ]
-    driven = {node.name for node in network.nodes if isinstance(node, Driven)}
-    return problems + [
-        f"port {port}: node {name!r} is an inertia; a motion needs a driven node"
-        for port, name in network.motion_ports.items()
-        if name in known - driven
-    ]
-
-
-def _value_problems(network: Network) -> list[str]:
-    problems = [
-        f"{node.name}: inertia {node.inertia} kg·m² must be positive"
-        for node in network.nodes
-        if isinstance(node, Inertia) and not node.inertia > 0
-    ]
-    for spring in network.springs:
-        problems += [
-            f"{spring.name}: {key} = {getattr(spring, key)} must not be negative"
-            for key in ("k", "c", "backlash")
-            if not getattr(spring, key) >= 0
-        ]
-    return problems + [
-        f"{clutch.name}: peak {clutch.peak} must be at least 1" for clutch in network.clutches if not clutch.peak >= 1
-    ]
 
 
 Mode = tuple[tuple[int, ...], tuple[int, ...]]
@@ -256,15 +208,12 @@ class Dynamics:
         self, a: np.ndarray, b: np.ndarray, spring: tuple[np.ndarray, np.ndarray], clutch: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
         n, nx, nu = self.n, self.states, self.inputs
-        zeros = np.zeros((2 * n, nu))
-        spring_u, extension, slip = (
-            np.zeros((len(spring[0]), nu)),
-            np.zeros((len(spring[0]), nx)),
-            np.zeros((self.n_clutches, nx)),
-        )
+        springs, clutches = len(spring[0]), self.n_clutches
+        spring_u, extension, slip = np.zeros((springs, nu)), np.zeros((springs, nx)), np.zeros((clutches, nx))
         spring_u[:, -1], extension[:, :n], slip[:, n : 2 * n] = spring[1], self.extension, self.slip
         c = np.vstack([np.eye(2 * n, nx), a[n:], spring[0], extension, clutch[0], slip])
-        d = np.vstack([zeros, b[n:], spring_u, np.zeros_like(spring_u), clutch[1], np.zeros((self.n_clutches, nu))])
+        rest = [b[n:], spring_u, np.zeros_like(spring_u), clutch[1], np.zeros((clutches, nu))]
+        d = np.vstack([np.zeros((2 * n, nu)), *rest])
         return c, d
 
 

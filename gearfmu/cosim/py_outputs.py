@@ -103,12 +103,11 @@ class Outputs:
 
     def _special_outputs(self) -> dict[str, Special]:
         network, d = self.dynamics.network, self.dynamics
-        found: dict[str, Special] = {
-            f"{network.nodes[node].name}.tau_mean": partial(_mean, k) for k, node in enumerate(d.driven)
-        }
-        found |= {f"{clutch.name}.locked": partial(_locked, k) for k, clutch in enumerate(network.clutches)}
-        found |= {f"{source.name}.tau": partial(_source, source.name) for source in network.sources}
-        return found | {"energy.work": _work, "energy.stored": self.energy}
+        driven, clutches = [network.nodes[node].name for node in d.driven], [part.name for part in network.clutches]
+        found = {f"{name}.tau_mean": _of_states(lambda s, k: s.tau_mean[k], k) for k, name in enumerate(driven)}
+        found |= {f"{name}.locked": _of_states(lambda s, k: s.mode[0][k] == 0, k) for k, name in enumerate(clutches)}
+        found |= {f"{source.name}.tau": partial(_of_source, source.name) for source in network.sources}
+        return found | {"energy.work": _of_states(lambda s, k: s.work), "energy.stored": self.energy}
 
     def energy(self, table: Table) -> np.ndarray:
         """(k,) kinetic energy of the inertias and potential energy of the springs, J."""
@@ -149,17 +148,10 @@ def _combined(row: np.ndarray, table: np.ndarray) -> np.ndarray:
     return total
 
 
-def _mean(k: int, table: Table) -> np.ndarray:
-    return np.array([state.tau_mean[k] for state in table.states])
+def _of_states(read: Callable[[State, int], float], k: int = 0) -> Special:
+    """What is read off a state alone, of its k-th part."""
+    return lambda table: np.array([read(state, k) for state in table.states])
 
 
-def _locked(k: int, table: Table) -> np.ndarray:
-    return np.array([float(state.mode[0][k] == 0) for state in table.states])
-
-
-def _source(name: str, table: Table) -> np.ndarray:
+def _of_source(name: str, table: Table) -> np.ndarray:
     return table.sources[name]
-
-
-def _work(table: Table) -> np.ndarray:
-    return np.array([state.work for state in table.states])

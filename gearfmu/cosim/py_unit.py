@@ -92,14 +92,14 @@ class PyUnit:
         self._x0, self._u0, self._u1 = np.split(self._z, [d.states, d.states + d.inputs])
         self._u0[-1] = self._u1[-1] = 1.0
         self._port_nodes = [d.node[node] for node in network.torque_ports.values()]
-        self._state = self._start(0.0)
+        self.state = self._start(0.0)  # everything that changes; not to be changed from outside
 
     # -- life ----------------------------------------------------------------------------------------------------------
     def initialize(self, time: float) -> None:
         """Start at `time` from the initial angles and speeds of the nodes; what motion ports were given before
         replaces that of their nodes."""
-        d, given = self.dynamics, self._state
-        self._state = state = self._start(time)
+        d, given = self.dynamics, self.state
+        self.state = state = self._start(time)
         state.torque, state.motion = given.torque, given.motion
         for k in self._motion_ports.values():
             node = d.driven[k]
@@ -108,21 +108,16 @@ class PyUnit:
 
     def save(self) -> State:
         """A copy of everything that changes."""
-        return self._state.copy()
+        return self.state.copy()
 
     def restore(self, state: State) -> None:
         """Back to a saved state."""
-        self._state = state.copy()
-
-    @property
-    def state(self) -> State:
-        """Everything that changes; not to be changed from outside."""
-        return self._state
+        self.state = state.copy()
 
     @property
     def events(self) -> tuple[Event, ...]:
         """Instants at which a clutch locked or slipped or a backlash closed or opened, in order."""
-        return self._state.events
+        return self.state.events
 
     # -- variables -----------------------------------------------------------------------------------------------------
     def resolve(self, names: Sequence[str]) -> Handle:
@@ -148,13 +143,13 @@ class PyUnit:
 
     def log(self, names: Sequence[str], points: int) -> NetworkLog:
         """Keeps these outputs at up to `points` times."""
-        return NetworkLog(self._outputs, names, lambda: self._state)
+        return NetworkLog(self._outputs, names, lambda: self.state)
 
     def set(self, handle: Handle, values: Sequence[float] | np.ndarray) -> None:
         """Inputs for the next step."""
         if handle.inputs is None:
             raise CouplingError(f"not all of {', '.join(handle.names)} are inputs")
-        state = self._state
+        state = self.state
         torque, motion = list(state.torque), state.motion.copy()
         for (kind, k), value in zip(handle.inputs, values, strict=True):
             if kind == "torque":
@@ -167,7 +162,7 @@ class PyUnit:
         """Values (k,) at the current time, in the handle's buffer."""
         if handle.outputs is None:
             raise CouplingError(f"not all of {', '.join(handle.names)} are outputs")
-        state, rows = self._state, self._rows(handle)
+        state, rows = self.state, self._rows(handle)
         if rows.shape[1] > self.dynamics.states:
             np.dot(rows, np.concatenate([state.x, self._inputs(state.time, state.x)]), out=handle.buffer)
         else:
@@ -178,9 +173,9 @@ class PyUnit:
 
     def _rows(self, handle: Handle) -> np.ndarray:
         """Rows of the outputs on [x, u], or on x alone when no input reaches them, kept for each mode."""
-        key = (handle.names, self._state.mode)
+        key = (handle.names, self.state.mode)
         if key not in self._output_rows:
-            m, states = self.dynamics.matrices(self._state.mode), self.dynamics.states
+            m, states = self.dynamics.matrices(self.state.mode), self.dynamics.states
             rows = np.zeros((len(handle.names), states + self.dynamics.inputs))
             assert handle.outputs is not None, "`get` refuses others"
             linear = np.setdiff1d(np.arange(len(handle.names)), handle.special)
@@ -191,18 +186,22 @@ class PyUnit:
     # -- stepping ------------------------------------------------------------------------------------------------------
     def step(self, time: float, h: float) -> None:
         """From `time` to time + h."""
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         if d.n_driven:
             self._start_motion(h)
         count = max(1, math.ceil(h / self.micro_step - 1e-9)) if self.micro_step else 1
         for k in range(count):
-            (self._hybrid_step if self._hybrid else self._smooth_step)(time + h * k / count, h / count)
+            start, part = time + h * k / count, h / count
+            if self._hybrid:
+                self._hybrid_step(start, part)
+            else:  # straight through preset memory
+                self._advance(self._foreseen(start, part).dot(self._z))
         state.time = time + h
         if d.n_driven:
             self._end_motion(h)
 
     def _start_motion(self, h: float) -> None:
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         state.x = state.x.copy()
         state.x[2 * d.n :] = 0.0
         for k in self._motion_ports.values():
@@ -210,20 +209,16 @@ class PyUnit:
             state.x[d.n + d.driven[k]] = w + (phi - state.x[d.driven[k]]) / h
 
     def _end_motion(self, h: float) -> None:
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         state.tau_mean = state.x[2 * d.n :] / h
         for k in self._motion_ports.values():
             _, w, a = state.motion[k]
             state.x[d.n + d.driven[k]] = w + a * h
 
-    def _smooth_step(self, time: float, h: float) -> None:
-        """One micro-step without clutches and backlash: straight through preset memory."""
-        self._advance(self._foreseen(time, h).dot(self._z))
-
     def _foreseen(self, time: float, h: float) -> np.ndarray:
         """Preset memory [x, u at the start, u at the end] of a step under the held torques, sources at its end by
         predictor and corrector, and the matrix that makes the state at its end of it."""
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         s, n = d.transition(state.mode, h), d.n
         self._x0[:] = state.x
         if d.n_driven:
@@ -247,7 +242,7 @@ class PyUnit:
 
     def complete(self, tau: Sequence[float], time: float, h: float) -> None:
         """The step just foreseen, under these torques of the torque ports instead of the held ones."""
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         for node, new, held in zip(self._port_nodes, tau, state.torque, strict=True):
             change = new - held
             self._u0[node] += change
@@ -258,7 +253,7 @@ class PyUnit:
             state.tau_mean = state.x[2 * d.n :] / h
 
     def _hybrid_step(self, time: float, h: float) -> None:
-        state, d, done = self._state, self.dynamics, 0.0
+        state, d, done = self.state, self.dynamics, 0.0
         for _ in range(MAX_EVENTS):
             start, rest = time + done, h - done
             capacity = self._capacity(start, time + h)
@@ -284,8 +279,8 @@ class PyUnit:
     ) -> tuple[np.ndarray, np.ndarray]:
         """State at the end of a step in the present mode, and the input there with the sources at that state."""
         d = self.dynamics
-        s = (d.transition if keep else d.transition_once)(self._state.mode, h)
-        self._x0[:], self._u0[:], self._u1[:] = self._state.x, u0, u1
+        s = (d.transition if keep else d.transition_once)(self.state.mode, h)
+        self._x0[:], self._u0[:], self._u1[:] = self.state.x, u0, u1
         x1 = s.dot(self._z)
         if self.network.sources:
             self._node_torques(u1, time + h, x1.tolist())
@@ -294,7 +289,7 @@ class PyUnit:
         return x1, u1
 
     def _advance(self, x1: np.ndarray) -> None:
-        state, d = self._state, self.dynamics
+        state, d = self.state, self.dynamics
         for k in self._motion_ports.values():
             impulse, node = 2 * d.n + k, d.driven[k]
             state.work -= (x1[impulse] - state.x[impulse]) * 0.5 * (state.x[d.n + node] + x1[d.n + node])
@@ -305,17 +300,9 @@ class PyUnit:
         d, nodes = self.dynamics, self.network.nodes
         x = np.array([p.phi for p in nodes] + [p.w for p in nodes] + [0.0] * d.n_driven, dtype=float)
         motion = np.array([[nodes[k].phi, nodes[k].w, 0.0] for k in d.driven], dtype=float).reshape(-1, 3)
-        state = State(
-            time,
-            x,
-            ((0,) * d.n_clutches, (0,) * len(d.gaps)),
-            (0.0,) * len(self._torque_ports),
-            motion,
-            np.zeros(d.n_driven),
-            0.0,
-            (),
-        )
-        self._state = state
+        mode, torque = ((0,) * d.n_clutches, (0,) * len(d.gaps)), (0.0,) * len(self._torque_ports)
+        state = State(time, x, mode, torque, motion, np.zeros(d.n_driven), 0.0, ())
+        self.state = state
         state.mode = self._mode_of(time, x)
         return state
 
@@ -327,7 +314,7 @@ class PyUnit:
 
     def _node_torques(self, u: np.ndarray, time: float, x: Sequence[float]) -> None:
         """Port torques and sources into the first n places of u (zero where there are none)."""
-        n, torque = self.dynamics.n, self._state.torque
+        n, torque = self.dynamics.n, self.state.torque
         for node, ports, sources in self._loads:
             total = 0.0
             for port in ports:
@@ -342,15 +329,11 @@ class PyUnit:
         u[-1] = 1.0
         self._node_torques(u, time, x.tolist())
         if d.n_driven:
-            u[self._clutches.stop : -1] = self._state.motion[:, 2]
+            u[self._clutches.stop : -1] = self.state.motion[:, 2]
         if d.n_clutches:
-            u[self._clutches] = self._state.mode[0] * (self._capacity(time, time)[0] if capacity is None else capacity)
+            u[self._clutches] = self.state.mode[0] * (self._capacity(time, time)[0] if capacity is None else capacity)
         return u
 
     def _capacity(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
         ends = [clutch.capacity.ends(t0, t1) for clutch in self.network.clutches]
         return np.array([max(e[0], 0.0) for e in ends]), np.array([max(e[1], 0.0) for e in ends])
-
-    def energy(self) -> float:
-        """Kinetic energy of the inertias and potential energy of the springs, J."""
-        return self._outputs.special(self._outputs.position["energy.stored"], self._state)

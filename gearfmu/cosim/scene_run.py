@@ -11,7 +11,7 @@ import platform
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ from gearfmu.stagefile.forms.turning import meshings, require_driven, shafts_of
 from gearfmu.stagefile.stage import load_stage
 
 WHOLE = Wiring()
+OF_FRAMES = ("scene", "description", "stage", "level", "fmu_path")  # of a run's meta, in that of its frames
 
 
 @dataclass(frozen=True)
@@ -90,14 +91,12 @@ def run(
     scene: Staged | SceneSpec | str,
     out_dir: str | Path | None = None,
     unit: str = "fmu",
-    fmu_path: str | Path | None = None,
     verify: bool = False,
     progress: Progress | None = None,
 ) -> Trace:
     """Run a scene (or the scene file or shipped scene of that name; or one whose stage is assembled already).
 
-    unit : "fmu" (exported into out_dir) or "kernel". fmu_path : an FMU exported earlier, whose stage is run in place of
-    the scene's (`Staged.of_fmu`).
+    unit : "fmu" (of `Staged.of_fmu`, else exported into out_dir) or "kernel".
     verify : run again with half the communication step and estimate the coupling error. progress : called with
     the part done, 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
     [deformation]. The trace's meta is the summary: outcome "ok" or the reason of an early end, last good time,
@@ -106,7 +105,8 @@ def run(
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
-    staged = scene if isinstance(scene, Staged) else _staged(scene, fmu_path)
+    named = load_scene(scene) if isinstance(scene, str) else scene
+    staged = named if isinstance(named, Staged) else Staged.of(named)
     scene = staged.scene
     with stage_source(staged, unit, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
@@ -121,18 +121,13 @@ def run(
         meta["warnings"] = [*staged.remarks, *meta["warnings"]]
         if result.frames is not None and out_dir is not None:
             meta["deformation"] = FILE_NAME
-            frames = result.frames.frames(gear_hashes(source.model), _frame_meta(meta))
-            frames.save(Path(out_dir) / FILE_NAME)
+            told = {name: meta[name] for name in OF_FRAMES if name in meta} | {"model": source.model.hash}
+            result.frames.frames(gear_hashes(source.model), told).save(Path(out_dir) / FILE_NAME)
     trace = Trace(result.trace.time, result.trace.channels, meta)
     if out_dir is not None:
         trace.save(Path(out_dir) / "trace.h5")
         write_text(Path(out_dir) / "summary.json", json.dumps(meta, indent=1, sort_keys=True, allow_nan=False) + "\n")
     return trace
-
-
-def _staged(scene: SceneSpec | str, fmu_path: str | Path | None) -> Staged:
-    spec = load_scene(scene) if isinstance(scene, str) else scene
-    return Staged.of(spec) if fmu_path is None else Staged.of_fmu(spec, fmu_path)
 
 
 def origin(staged: Staged) -> dict[str, Any]:
@@ -143,11 +138,6 @@ def origin(staged: Staged) -> dict[str, Any]:
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     return Staged.of(scene).model
-
-
-def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
-    told = ("scene", "description", "stage", "level", "fmu_path")
-    return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
 def drive_of(scene: SceneSpec, stage: Stage) -> Drive:
@@ -196,16 +186,17 @@ def run_once(
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
     try:
-        return run_coupled(*_coupled(scene, drive, (stage, source.model), (progress, wiring, frames)))
+        plan = replace(_plan(scene, drive), progress=progress, frames=frames)
+        return run_coupled(_cut(scene, drive, stage, source.model, wiring), plan)
     finally:
         stage.close()
 
 
-def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None = None) -> CoupledRun:
+def coupled_run(scene: SceneSpec, source: UnitSource) -> CoupledRun:
     """A run of the scene that is stepped from outside; not begun."""
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
-    return CoupledRun(*_coupled(scene, drive, (stage, source.model), (progress, WHOLE, None)))
+    return CoupledRun(_cut(scene, drive, stage, source.model, WHOLE), _plan(scene, drive))
 
 
 def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
@@ -222,31 +213,24 @@ def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
     }
 
 
-def _coupled(
-    scene: SceneSpec,
-    drive: Drive,
-    of: tuple[Unit, StageModel],
-    how: tuple[Progress | None, Wiring, FramePlan | None],
-) -> tuple[Cut | Loaded, Plan]:
-    """The cut and how it is stepped. of: the stage and its model; how: progress, wiring, frames."""
-    (stage, model), (progress, wiring, frames), coupling = of, how, scene.coupling
-    parameters = _parameters(scene, drive)
-    cut: Cut | Loaded
-    if callable(drive.partner):
-        network = drive.partner(lambda torques: _rest(model, parameters, torques))
-        cut = Cut(stage, PyUnit(network, coupling.micro_step or None), tuple(drive.ports), drive.signals, wiring)
-    else:
+def _plan(scene: SceneSpec, drive: Drive) -> Plan:
+    coupling = scene.coupling
+    return Plan(coupling.master, coupling.step, scene.steps, scene.record, omit=drive.silent)
+
+
+def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel, wiring: Wiring) -> Cut | Loaded:
+    """stage: of the model."""
+    if not callable(drive.partner):
         speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
-        cut = Loaded(stage, ShaftLoads(drive.partner), speeds)
-    return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, drive.silent, frames)
+        return Loaded(stage, ShaftLoads(drive.partner), speeds)
 
+    def rest(torques: Mapping[str, float]) -> Mapping[str, float]:
+        kernel = KernelUnit(model.blob, _parameters(scene, drive)).kernel
+        kernel.prepare()
+        return kernel.rest(torques)
 
-def _rest(
-    model: StageModel, parameters: Mapping[str, float | str], torques: Mapping[str, float]
-) -> Mapping[str, float]:
-    kernel = KernelUnit(model.blob, parameters).kernel
-    kernel.prepare()
-    return kernel.rest(torques)
+    drivetrain = PyUnit(drive.partner(rest), scene.coupling.micro_step or None)
+    return Cut(stage, drivetrain, tuple(drive.ports), drive.signals, wiring)
 
 
 def verified(
@@ -268,11 +252,7 @@ def verified(
 
 def _verifying(scene: SceneSpec, source: Source, steps: tuple[float, float], progress: Progress | None) -> Result:
     """A run with another communication and internal step; CouplingError when it does not reach the end."""
-    changed = {
-        "coupling": scene.coupling.model_copy(update={"step": steps[0]}),
-        "stage": scene.stage.model_copy(update={"h": steps[1]}),
-    }
-    result = run_once(scene.model_copy(update=changed), source, progress)
+    result = run_once(scene.with_coupling(step=steps[0]).with_stage(h=steps[1]), source, progress)
     if result.outcome != OK:
         raise CouplingError(
             f"no coupling error: the run with a communication step of {steps[0]:g} s stopped at "
@@ -285,11 +265,8 @@ def _part(progress: Progress | None, start: float, end: float) -> Progress | Non
     return None if progress is None else lambda fraction: progress(start + (end - start) * fraction)
 
 
-TORQUES = (
-    "{}.shaft.tau",
-    "{}.tau",
-    "{}.w",
-)  # whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
+# whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
+TORQUES = ("{}.shaft.tau", "{}.tau", "{}.w")
 COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "retried_steps": "solver.retried_steps"}
 
 

@@ -23,15 +23,14 @@ import numpy as np
 
 from gearfmu.cosim.drive import Drive, Loads, frequencies_of
 from gearfmu.cosim.signals import Ramp
-from gearfmu.cosim.units import Unit, Variable
-from gearfmu.errors import CouplingError, Problem, SpecError
+from gearfmu.cosim.units import RowLog, Unit, Variable
+from gearfmu.errors import Problem, SpecError
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import turns, undriven
 from gearfmu.stagefile.tables.connections import PortSpec
 
-ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on
 
 
@@ -85,31 +84,11 @@ class ShaftLoads:
         torques = {f"{name}.tau": Variable("N.m", "mean torque on the stage over the last step") for name in self.laws}
         return torques | {f"{name}.work": Variable("J", "work done on the stage since the start") for name in self.laws}
 
-    def log(self, names: Sequence[str], points: int) -> LoadLog:
+    def log(self, names: Sequence[str], points: int) -> RowLog:
         """Keeps these outputs at up to `points` times."""
         known = list(self.outputs())
-        return LoadLog(self, [known.index(name) for name in names], np.zeros((points, len(names))))
-
-
-@dataclass
-class LoadLog:
-    """Rows of torques and works."""
-
-    loads: ShaftLoads
-    places: list[int]
-    table: np.ndarray
-    count: int = 0
-
-    def take(self) -> None:
-        """Keep the present outputs."""
-        if self.count == len(self.table):
-            raise CouplingError(f"the log holds {self.count} times and no more")
-        self.table[self.count] = np.concatenate([self.loads.tau, self.loads.work])[self.places]
-        self.count += 1
-
-    def rows(self) -> np.ndarray:
-        """(times, names) kept so far."""
-        return self.table[: self.count]
+        places = [known.index(name) for name in names]
+        return RowLog(lambda: np.concatenate([self.tau, self.work])[places], len(names), points)
 
 
 @dataclass(frozen=True)
@@ -140,7 +119,7 @@ class TorqueMaster:
 
     def __post_init__(self) -> None:
         stage, names = self.cut.stage, list(self.cut.drive.laws)
-        self.order = ORDERS["gs_mean" if self.foreseen else "jacobi"]
+        self.order = 2 if self.foreseen else 1
         self._tau: Any = stage.resolve([f"{name}.tau" for name in names])
         self._phi: Any = stage.resolve([f"{name}.phi" for name in names])
         self._w: Any = stage.resolve([f"{name}.w" for name in names])

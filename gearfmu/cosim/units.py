@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from gearfmu.errors import CouplingError
 
 
 class Variable(NamedTuple):
@@ -27,6 +29,24 @@ class Log(Protocol):
         """(times, names) kept so far."""
 
 
+class RowLog:
+    """Rows of what `read` gives, (names,), at up to `points` times."""
+
+    def __init__(self, read: Callable[[], np.ndarray], names: int, points: int) -> None:
+        self._read, self._table, self._count = read, np.zeros((points, names)), 0
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+        if self._count == len(self._table):
+            raise CouplingError(f"the log holds {self._count} times and no more")
+        self._table[self._count] = self._read()
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+        return self._table[: self._count]
+
+
 class Recorded(Protocol):
     """What a recorder asks of either side of a coupling."""
 
@@ -34,7 +54,7 @@ class Recorded(Protocol):
     def log(self, names: Sequence[str], points: int) -> Log: ...
 
 
-class Unit(Protocol):
+class Unit(Recorded, Protocol):
     """One side of a coupling.
 
     `resolve` is called once for each set of names and returns a handle with its own buffers; `get` fills and returns
@@ -43,12 +63,10 @@ class Unit(Protocol):
     SimulationError when the unit cannot go on.
     """
 
-    def outputs(self) -> Mapping[str, Variable]: ...
     def initialize(self, time: float) -> None: ...
     def resolve(self, names: Sequence[str]) -> Any: ...
     def set(self, handle: Any, values: Sequence[float] | np.ndarray) -> None: ...
     def get(self, handle: Any) -> np.ndarray: ...
-    def log(self, names: Sequence[str], points: int) -> Log: ...
     def step(self, time: float, h: float) -> None: ...
     def save(self) -> Any: ...
     def restore(self, state: Any) -> None: ...

@@ -79,9 +79,8 @@ def model_description(identity: Identity, variables: Sequence[Variable]) -> byte
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", {"name": name, "description": text})
-    ET.SubElement(
-        root, "DefaultExperiment", {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)}
-    )
+    experiment = {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)}
+    ET.SubElement(root, "DefaultExperiment", experiment)
     listed = ET.SubElement(root, "ModelVariables")
     for variable in variables:
         _add_variable(listed, variable, identity.nominals)
@@ -231,21 +230,11 @@ def terminals_and_icons(variables: Sequence[Variable]) -> bytes:
     root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     terminals = ET.SubElement(root, "Terminals")
     for shaft, names in shafts(variables).items():
-        terminal = ET.SubElement(
-            terminals,
-            "Terminal",
-            {
-                "name": shaft,
-                "matchingRule": "bus",
-                "terminalKind": KIND,
-                "description": f"rotational flange of shaft {shaft}; all angles about +z",
-            },
-        )
+        flange = f"rotational flange of shaft {shaft}; all angles about +z"
+        about = {"name": shaft, "matchingRule": "bus", "terminalKind": KIND, "description": flange}
+        terminal = ET.SubElement(terminals, "Terminal", about)
         for name in names:
-            ET.SubElement(
-                terminal,
-                "TerminalMemberVariable",
-                {"variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"},
-            )
+            member = {"variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"}
+            ET.SubElement(terminal, "TerminalMemberVariable", member)
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

@@ -127,7 +127,7 @@ def _native_files(model: StageModel, libraries: Mapping[str, Path], extras: Extr
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
     code = source_files() if extras.get("sources") else {}
     identifier = content_identifier(model.name, [model.blob, *binaries.values(), *code.values()])
-    files = _common_files(model, identifier, extras, sources=tuple(compiled(list(code))))
+    files = _common_files(model, identifier, extras, sources=tuple(name for name in code if name.endswith(".c")))
     files |= {f"sources/{name}": content for name, content in code.items()}
     if code:
         files["sources/buildDescription.xml"] = build_description(identifier, list(code))
@@ -214,19 +214,15 @@ def source_files() -> dict[str, bytes]:
     }
 
 
-def compiled(names: list[str]) -> list[str]:
-    """Those of the files that a compiler is given."""
-    return [name for name in names if name.endswith(".c")]
-
-
 def build_description(identifier: str, names: list[str]) -> bytes:
     """buildDescription.xml for these files."""
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     options = {"language": "C99", "compiler": "gcc", "compilerOptions": COMPILER_OPTIONS}
     files = ET.SubElement(configuration, "SourceFileSet", options)
-    for name in compiled(names):
-        ET.SubElement(files, "SourceFile", {"name": name})
+    for name in names:
+        if name.endswith(".c"):  # the others are included
+            ET.SubElement(files, "SourceFile", {"name": name})
     ET.SubElement(files, "IncludeDirectory", {"name": "."})
     ET.SubElement(configuration, "Library", {"name": "m", "external": "true"})
     ET.indent(root)

@@ -116,7 +116,8 @@ class Plan:
             segments = tuple(_segment(item) for item in raw.pop("segments"))
             return cls(**raw | {"segments": segments, "notes": tuple(raw.get("notes", ()))})
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise _no_plan(path, f"is no plan ({error}): make it again with `gearfmu plan`") from error
+            remedy = f"is no plan ({error}): make it again with `gearfmu plan`"
+            raise SpecError([Problem(str(path), "", "", remedy)]) from error
 
 
 def _segment(raw: Mapping[str, Any]) -> Segment:
@@ -124,10 +125,6 @@ def _segment(raw: Mapping[str, Any]) -> Segment:
     lines = tuple(Line(**line) for line in raw.get("lines", ()))
     points = tuple(Point(**point) for point in raw.get("points", ()))
     return Segment(**{**raw, "choice": choice, "lines": lines, "points": points, "notes": tuple(raw.get("notes", ()))})
-
-
-def _no_plan(path: Path, remedy: str) -> SpecError:
-    return SpecError([Problem(str(path), "", "", remedy)])
 
 
 def _toml(table: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel
@@ -31,8 +30,7 @@ class Choice:
     def of(self, scene: SceneSpec) -> SceneSpec:
         """The scene with this choice."""
         effects = scene.stage.effects.model_copy(update=dict.fromkeys(self.off, False))
-        update: dict[str, Any] = {"level": self.level, "h": self.h, "slices": self.slices, "effects": effects}
-        return scene.model_copy(update={"stage": scene.stage.model_copy(update=update)})
+        return scene.with_stage(level=self.level, h=self.h, slices=self.slices, effects=effects)
 
     def without(self, effect: str) -> Choice:
         """The choice with this effect off."""
@@ -59,6 +57,11 @@ class Knob:
     share: float
     kept: str = ""
     effect: Effect | None = None
+
+    @property
+    def by_nature(self) -> bool:
+        """Whether it is kept by its nature: no trial shows its error."""
+        return bool(self.effect and self.effect.kept)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.planning.request import Output, Request
+from gearfmu.stage import Trace
 
 NESTED = (0.4, 0.7, 1.0)
 SAFETY, SAFETY_LOSS = 1.25, 2.0  # without and with loss of contact
@@ -36,6 +37,12 @@ class Signals:
         """From a share of the samples to another."""
         cut = {name: v[round(start * v.size) : round(end * v.size)] for name, v in self.values.items()}
         return Signals(cut, self.interval)
+
+
+def signals_of(part: Trace, request: Request, interval: float) -> Signals:
+    """The judged outputs of a trace whose samples are `interval` s apart."""
+    values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in request.outputs}
+    return Signals(values, interval)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from gearfmu.planning.choice import LEAST_SHARE, MODES, SLICED, STEP, Choice, Kn
 from gearfmu.planning.formulas import Conditions, predicted
 from gearfmu.planning.judge import FAILED, SAFETY, SAFETY_LOSS, error, silent_outputs, trend
 from gearfmu.planning.request import Request
-from gearfmu.planning.search import UNSEEN, Bench, Found, Measured, Pair, measurable, pairs, search
+from gearfmu.planning.search import UNSEEN, Bench, Found, Measured, Pair, pairs, search
 from gearfmu.planning.segments import Part, parts
 from gearfmu.planning.trials import Task, Trial, prime, run_trials
 from gearfmu.planning.windows import GROWN, GROWN_LOST, LONGEST, QUIET, Noise, mesh_frequency, quiet_enough
@@ -36,14 +36,13 @@ class PlanError(GearfmuError):
 
 @dataclass(frozen=True)
 class Job:
-    """What a plan is made of. least_share: effects that cost less of a step stay on; force: effects that are candidates
-    nevertheless; tell: is told what is done."""
+    """What a plan is made of. force: effects that are candidates though they cost little; tell: is told what is
+    done."""
 
     scene: SceneSpec
     model: StageModel
     request: Request
     runner: Runner
-    least_share: float = LEAST_SHARE
     force: tuple[str, ...] = ()
     tell: Tell = field(default=lambda text: None)
 
@@ -51,7 +50,7 @@ class Job:
     def identity(self) -> str:
         """Hex digest of what decides the plan: scene, model, request, policy, kernel, format."""
         kernel = hashlib.sha256(library_path().read_bytes()).hexdigest()
-        asked = (self.scene.hash, self.model.hash, sorted(self.request.plain.items()), self.least_share, self.force)
+        asked = (self.scene.hash, self.model.hash, sorted(self.request.plain.items()), LEAST_SHARE, self.force)
         return hashlib.sha256(f"{FORMAT} {asked} {kernel}".encode()).hexdigest()
 
 
@@ -72,7 +71,7 @@ class _Made:
 
     def __init__(self, job: Job, part: Part) -> None:
         self.job, self.part = job, part
-        self.space: Space = space(job.scene, job.model, job.least_share, job.force)
+        self.space: Space = space(job.scene, job.model, force=job.force)
         self.text = job.scene.model_dump_json()
         prime(self.text, job.scene, job.model)
         task = Task(self.text, self.space.full, part.window, job.request, priced=True)
@@ -80,7 +79,7 @@ class _Made:
         full = run_trials([task], job.runner)[0]
         if full.outcome != OK:
             raise PlanError(f"the full model does not run through {part.name}: {full.outcome}: {full.message}")
-        self.bench = Bench(self.text, part.window, job.request, full, job.runner, cpu=full.cpu)
+        self.bench = Bench(self.text, part.window, job.request, full, job.runner)
 
     def segment(self) -> Segment:
         """Window, noise, search, slow growth, reasons."""
@@ -90,7 +89,8 @@ class _Made:
         self._refuse_silence()
         self._refuse_chaos(noise, looser)
         safety = SAFETY_LOSS if full.loses_contact else SAFETY
-        known = Conditions(job.model, job.request, full.force, self.part.speed, self._mesh_hz(), full)
+        speed = self.part.speed
+        known = Conditions(job.model, job.request, full.force, speed, mesh_frequency(job.model, speed), full)
         found, priced, notes = self._search(known, safety)
         own = self._own()
         lines = tuple(self._lines(found, known, safety))
@@ -133,9 +133,6 @@ class _Made:
         if own.choice != chosen.choice and bound < FAILED:
             made.append(Point(f"the scene's own, {own.choice.words}", own.price, bound, False))
         return (*made, Point(f"full model, {full.choice.words}", full.price, 0.0, False))
-
-    def _mesh_hz(self) -> float:
-        return mesh_frequency(self.job.model, self.part.speed)
 
     def _own(self) -> Trial:
         """What the scene asks for itself."""
@@ -200,7 +197,7 @@ class _Made:
     # -- reasons -------------------------------------------------------------------------------------------------------
     def _lines(self, found: Found, known: Conditions, safety: float) -> Iterator[Line]:
         """A line for every knob, with what the search measured of it."""
-        names = [n for n in measurable(self.space.knobs) if n not in found.refused]
+        names = [k.name for k in self.space.knobs if not k.by_nature and k.name not in found.refused]
         names.sort(key=lambda name: name not in self.job.force)  # what was asked about is measured in any case
         known_pairs = pairs(self.space, self.bench, found.chosen.choice, names, UNSEEN + len(self.job.force))
         known_pairs |= {n: (lower, found.tried_from[n]) for n, lower in found.refused.items()}
@@ -210,48 +207,30 @@ class _Made:
     def _line(self, knob: Knob, found: Found, pair: Pair | None, known: Conditions, most: float) -> Line:
         """pair: two measured sets that differ by one step of this knob, where there are such."""
         chosen, lower = found.chosen, found.refused.get(knob.name)
-        verdict = _verdict(knob, chosen.choice)
-        formula = predicted(knob, self.space.cheapest(knob.name), known) if not _by_nature(knob) else math.nan
-        alone, saved = (math.nan, math.nan) if pair is None else (self._between(*pair), _saved(*pair))
+        verdict = _setting(knob, chosen.choice)
+        formula = predicted(knob, self.space.cheapest(knob.name), known) if not knob.by_nature else math.nan
+        alone = saved = math.nan
+        if pair is not None:
+            poorer, richer = pair
+            alone = error(poorer.trial.signals, richer.trial.signals, self.job.request).whole
+            saved = 1.0 - poorer.price / richer.price
         if knob.kept:
             return Line(knob.name, verdict, "policy", knob.kept, formula, alone, saved)
         if lower is None:
             reason = f"the set without it is {chosen.bound:.2g} budgets"
         elif math.isinf(lower.bound):
-            reason = f"{_step_down(knob, lower.choice)} does not reach the end of the window"
+            reason = f"{_setting(knob, lower.choice)} does not reach the end of the window"
         elif lower.bound > most:
-            reason = f"{_step_down(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
+            reason = f"{_setting(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
         else:
-            reason = f"{_step_down(knob, lower.choice)} saves nothing"
+            reason = f"{_setting(knob, lower.choice)} saves nothing"
         return Line(knob.name, verdict, "measured", reason, formula, alone, saved)
 
-    def _between(self, lower: Measured, richer: Measured) -> float:
-        """Distance of two runs, budgets."""
-        return error(lower.trial.signals, richer.trial.signals, self.job.request).whole
 
-
-def _saved(lower: Measured, richer: Measured) -> float:
-    """Share of the richer set's price that the step down saves on this stage."""
-    return 1.0 - lower.price / richer.price
-
-
-def _by_nature(knob: Knob) -> bool:
-    return bool(knob.effect and knob.effect.kept)
-
-
-def _verdict(knob: Knob, choice: Choice) -> str:
-    if knob.name == MODES:
-        return choice.level
-    if knob.name == STEP:
-        return f"{1e6 * choice.h:.3g} µs"
-    if knob.name == SLICED:
-        return str(choice.slices)
-    return "off" if knob.name in choice.off else "on"
-
-
-def _step_down(knob: Knob, lower: Choice) -> str:
-    """What the step down is."""
-    return {MODES: lower.level, STEP: f"{1e6 * lower.h:.3g} µs", SLICED: f"{lower.slices}"}.get(knob.name, "off")
+def _setting(knob: Knob, choice: Choice) -> str:
+    """What a choice says of a knob."""
+    ladders = {MODES: choice.level, STEP: f"{1e6 * choice.h:.3g} µs", SLICED: str(choice.slices)}
+    return ladders.get(knob.name, "off" if knob.name in choice.off else "on")
 
 
 def _noise_notes(noise: Noise, lost: bool) -> Iterator[str]:

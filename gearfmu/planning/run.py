@@ -74,9 +74,7 @@ class PlannedRun:
 
 def planned_scene(plan: Plan) -> SceneSpec:
     """The scene of a plan, with the communication step that was planned for."""
-    scene = load_scene(plan.scene)
-    coupling = scene.coupling.model_copy(update={"step": plan.step})
-    return scene.model_copy(update={"coupling": coupling})
+    return load_scene(plan.scene).with_coupling(step=plan.step)
 
 
 def planned_stage(plan: Plan, fmu: Path | None = None) -> Staged:
@@ -107,8 +105,7 @@ def run_planned(
     staged = planned_stage(plan, None if unit in UNITS else Path(unit))
     with stage_source(staged, "fmu" if staged.fmu is not None else str(unit), out) as source:
         road = Road(staged.scene, staged.model, source.fmu_path)
-        spots = SpotChecks(plan, road) if verify else None
-        done = _Runner(road, plan.segments, spots, progress).go()
+        done = _Runner(road, plan.segments, SpotChecks(plan, road, verify), progress).go()
         trace = done.trace(_meta(road, done) | origin(staged))
     events = {name: [asdict(item) for item in getattr(done, name)] for name in ("trips", "checks")}
     trace.meta["plan"] = strict(asdict(plan) | events)
@@ -144,9 +141,7 @@ def _meta(road: Road, done: PlannedRun) -> dict[str, Any]:
 class _Runner:
     """A planned run on its way. before: where it stood one communication step before the end of the last leg."""
 
-    def __init__(
-        self, road: Road, segments: Sequence[Segment], spots: SpotChecks | None, progress: Progress | None
-    ) -> None:
+    def __init__(self, road: Road, segments: Sequence[Segment], spots: SpotChecks, progress: Progress | None) -> None:
         self.road, self.segments, self.spots = road, segments, spots
         self.tell = progress or (lambda part: None)
         self.done, self.wires = PlannedRun(), Wires(road.model)
@@ -189,7 +184,7 @@ class _Runner:
                 return run
             self.tell(run.at / self.steps)
             for spot, check in self._checked(run, segment):
-                better = None if check.kept or replans == MOST_REPLANS else self._better(spot)
+                better = None if check.kept or replans == MOST_REPLANS else self.spots.better(spot, self._choice)
                 self.done.checks.append(check if better is None else replace(check, answer=better.words))
                 if better is not None:
                     replans += 1
@@ -234,8 +229,7 @@ class _Runner:
     # -- spot checks ---------------------------------------------------------------------------------------------------
     def _checked(self, run: CoupledRun, segment: Segment) -> Iterator[tuple[Spot, Check]]:
         """Checks begin that are due; one whose window is over is judged."""
-        if self.spots is None or self._before is None:
-            return
+        assert self._before is not None, "a leg was kept"
         self.spots.look(run.at, segment, Mark(self._choice, self._before, len(self.done.legs)))
         spot = self.spots.over(run.at)
         if spot is not None:
@@ -243,13 +237,8 @@ class _Runner:
             self.spots.done(spot)
             yield spot, check
 
-    def _better(self, spot: Spot) -> Choice | None:
-        assert self.spots is not None, "there was a check"
-        return self.spots.better(spot, self._choice)
-
     def _back_to(self, run: CoupledRun, spot: Spot, better: Choice) -> CoupledRun:
         """Back to where a check began, on with a richer set; the same window is checked again."""
-        assert self.spots is not None, "there was a check"
         self.spots.back_to(spot)
         self.spots.begun.insert(0, spot)
         del self.done.legs[spot.mark.legs :]
@@ -258,6 +247,6 @@ class _Runner:
 
     def _rest(self) -> None:
         """Checks of a run that came to its end and were not looked at yet: told, and no more."""
-        while self.spots is not None and self.done.outcome == OK and (spot := self.spots.over(self.steps)) is not None:
+        while self.done.outcome == OK and (spot := self.spots.over(self.steps)) is not None:
             self.done.checks.append(self.spots.judged(spot, self.done.trace({})))
             self.spots.done(spot)

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from dataclasses import dataclass, replace
 
 from gearfmu.planning.choice import MODES, SLICED, STEP, Choice, Knob, Space
 from gearfmu.planning.formulas import CERTAIN, Conditions, predicted
@@ -41,27 +40,37 @@ class Measured:
         return self.trial.price
 
 
-@dataclass
-class Bench:
-    """What trials of one window share, and what is measured there already."""
+class Measures:
+    """Choices with their errors, each measured once. make: measures new ones."""
 
-    scene: str
-    window: Window
-    request: Request
-    full: Trial
-    runner: Runner
-    known: dict[Choice, Measured] = field(default_factory=dict)
-    cpu: float = 0.0
+    def __init__(self, make: Callable[[list[Choice]], list[Measured]]) -> None:
+        self._make, self.known = make, dict[Choice, Measured]()
 
     def measure(self, choices: Iterable[Choice]) -> list[Measured]:
-        """Errors and prices; of what is new by trials side by side."""
+        """Errors and prices."""
         wanted = list(dict.fromkeys(choices))
         new = [choice for choice in wanted if choice not in self.known]
-        tasks = [Task(self.scene, choice, self.window, self.request) for choice in new]
-        for choice, trial in zip(new, run_trials(tasks, self.runner), strict=True):
-            self.cpu += trial.cpu
-            self.known[choice] = Measured(choice, trial, error(trial.signals, self.full.signals, self.request))
+        self.known.update(zip(new, self._make(new), strict=True))
         return [self.known[choice] for choice in wanted]
+
+    def one(self, choice: Choice) -> Measured:
+        """`measure` of one."""
+        return self.measure([choice])[0]
+
+
+class Bench(Measures):
+    """What trials of one window share, and what is measured there already; new choices side by side."""
+
+    def __init__(self, scene: str, window: Window, request: Request, full: Trial, runner: Runner) -> None:
+        super().__init__(self._by_trials)
+        self.scene, self.window, self.request, self.full, self.runner = scene, window, request, full, runner
+        self.cpu = full.cpu
+
+    def _by_trials(self, choices: list[Choice]) -> list[Measured]:
+        tasks = [Task(self.scene, choice, self.window, self.request) for choice in choices]
+        trials = run_trials(tasks, self.runner)
+        self.cpu += sum(trial.cpu for trial in trials)
+        return [Measured(t.choice, t, error(t.signals, self.full.signals, self.request)) for t in trials]
 
     def widen(self, window: Window) -> None:
         """Another window: the full model is run again, what was measured is forgotten."""
@@ -78,10 +87,6 @@ class Bench:
         found = run_trials([task], self.runner)[0]
         self.cpu += found.cpu
         return found
-
-    def one(self, choice: Choice) -> Measured:
-        """`measure` of one."""
-        return self.measure([choice])[0]
 
 
 @dataclass(frozen=True)
@@ -115,14 +120,6 @@ def begin(space: Space, known: Conditions, most: float) -> Choice:
 
 
 Order = Callable[[list[tuple[Knob, Choice]], Choice], list[Choice]]
-
-
-class Measures(Protocol):
-    """What `restored` needs of a Bench."""
-
-    def measure(self, choices: Iterable[Choice]) -> list[Measured]: ...
-
-    def one(self, choice: Choice) -> Measured: ...
 
 
 def _worst_first(known: Conditions) -> Order:
@@ -199,11 +196,6 @@ def _seen(space: Space, bench: Bench, chosen: Choice, name: str) -> Iterator[Pai
     for choice in (chosen, space.richer(chosen, name), *reversed(known)):
         if choice in known and (lower := space.cheaper(choice, name)) in known:
             yield known[lower], known[choice]
-
-
-def measurable(knobs: Sequence[Knob]) -> list[str]:
-    """Knobs whose error a trial can show: all but those that are kept by their nature."""
-    return [knob.name for knob in knobs if not (knob.effect and knob.effect.kept)]
 
 
 def _said(what: str, measured: Measured) -> str:

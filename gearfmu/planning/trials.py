@@ -19,11 +19,11 @@ from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.scene_run import coupled_run, stage_model
 from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import Choice
-from gearfmu.planning.judge import Signals
+from gearfmu.planning.judge import Signals, signals_of
 from gearfmu.planning.request import Request
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.study.bench import Kept, Price, Replay, recorded_run, replayed_price
+from gearfmu.study.bench import Kept, KeptSource, Price, Replay, recorded_run, replayed_price
 from gearfmu.study.ladder import fitting
 from gearfmu.sweeps.points import program
 from gearfmu.sweeps.runners import Lost, Runner
@@ -155,19 +155,6 @@ class _Timed(Kept):
         return clock.perf_counter() - started
 
 
-@dataclass
-class _TimedSource:
-    """A Source whose unit is kept."""
-
-    model: StageModel
-    settle: float
-    made: _Timed | None = None
-
-    def unit(self, parameters: Mapping[str, float | bool | str]) -> _Timed:
-        self.made = _Timed(self.model.blob, parameters, self.settle)
-        return self.made
-
-
 _known: dict[str, tuple[SceneSpec, StageModel]] = {}
 
 
@@ -191,7 +178,7 @@ def _base(text: str) -> Replay:
     scene, model = scene_and_model(text)
     part = shortened(scene, BASE_STEPS * scene.coupling.step).model_copy(update={"settle": 0.0})
     choice = Choice("fast", 0.0, scene.stage.slices, scene.stage.effects.off)
-    return Replay(recorded_run(choice.of(part), model).recording)
+    return Replay(recorded_run(choice.of(part), model)[1].recording())
 
 
 @lru_cache(maxsize=2)
@@ -229,52 +216,41 @@ def _run(task: Task) -> Trial:
     step, meshes = scene.coupling.step, [mesh.name for mesh in model.stage.engagements]
     first, last = (round(t / step) for t in (task.window.start, task.window.end))
     at = max(1, round((task.window.start - task.window.settle) / step))
-    source = _TimedSource(model, task.window.start)
+    source = KeptSource(model, task.window.start, _Timed)
     watched = [f"{mesh}.{key}" for mesh in meshes for key in MESH_CHANNELS]
     scene = _recording(scene, [*task.request.channels, *watched, *SOLVER])
     started = clock.process_time()
     before: CoupledRun = _pilot(task.scene, at)
     if task.through is not None:
-        before = _one_step(before, coupled_run(task.through.of(scene), Source(model)))
+        through = coupled_run(task.through.of(scene), Source(model))
+        through.take_over(before)
+        through.advance(through.at + 1)
+        before = through
     run = coupled_run(task.choice.of(scene), source)
     run.take_over(before)
-    run.new_recorder(last - run.at)
-    run.advance(max(first, run.at))
-    run.new_recorder(last - run.at)
-    run.record()
-    run.advance(last)
+    trace = run.window(first, last)
     spent = clock.process_time() - started
-    assert source.made is not None, "the run made its unit"
-    price = _price(task, source.made, model)
-    return replace(_judged(task, run.recorder.trace({}), meshes, price), run=spent)
+    return replace(_judged(task, trace, meshes, _price(task, source.made)), run=spent)
 
 
-def _price(task: Task, unit: _Timed, model: StageModel) -> Price:
+def _price(task: Task, unit: _Timed) -> Price:
     """By replay of the first BASE_STEPS of the window, or as the run itself was timed."""
     step = scene_and_model(task.scene)[0].coupling.step
     if not task.priced:
         realtime = unit.realtime(step)
         return Price(realtime, realtime / _base_realtime(task.scene))
-    recording = unit.recording(model.blob, step)
+    recording = unit.recording()
     short = replace(recording, values=recording.values[: recording.first + BASE_STEPS])
     return replayed_price(Replay(short), _base(task.scene), LOOKED_AT)
-
-
-def _one_step(before: CoupledRun, run: CoupledRun) -> CoupledRun:
-    """The run after one step from the state of another."""
-    run.take_over(before)
-    run.advance(run.at + 1)
-    return run
 
 
 def _judged(task: Task, part: Trace, meshes: Sequence[str], price: Price) -> Trial:
     """Results from the trace of the window."""
     interval = float(part.time[1] - part.time[0])
-    values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in task.request.outputs}
     lost = max(float(part[f"{mesh}.open_time"][-1] - part[f"{mesh}.open_time"][0]) for mesh in meshes)
     sides = [(np.abs(part[f"{mesh}.force_drive"]), np.abs(part[f"{mesh}.force_coast"])) for mesh in meshes]
     both = any(a.max() > 0 and b.max() > 0 for a, b in sides)  # one side carries in loaded running
     carrying = [max(pair, key=np.mean) for pair in sides]
     drive = min(float(side.min() / max(side.mean(), 1e-300)) for side in carrying)
-    head = (task.choice, OK, "", Signals(values, interval), lost, both, drive, float(np.mean(carrying[0])))
-    return Trial(*head, price.cpu_ratio, price.realtime_factor)
+    signals, force = signals_of(part, task.request, interval), float(np.mean(carrying[0]))
+    return Trial(task.choice, OK, "", signals, lost, both, drive, force, price.cpu_ratio, price.realtime_factor)

@@ -4,19 +4,17 @@ the budget there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-
-import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun, Saved
 from gearfmu.errors import SimulationError
 from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice, Knob, space
-from gearfmu.planning.judge import FAILED, Signals, error
+from gearfmu.planning.judge import FAILED, Signals, error, signals_of
 from gearfmu.planning.request import request_of
 from gearfmu.planning.road import Road
-from gearfmu.planning.search import Measured, restored
+from gearfmu.planning.search import Measured, Measures, restored
 from gearfmu.planning.trials import Trial
 from gearfmu.stage import Trace
 
@@ -60,13 +58,13 @@ class Spot:
 
 
 class SpotChecks:
-    """CHECKS windows a segment, judged as soon as the run has gone through them."""
+    """CHECKS windows a segment, judged as soon as the run has gone through them; none where they are not wanted."""
 
-    def __init__(self, plan: Plan, road: Road) -> None:
+    def __init__(self, plan: Plan, road: Road, wanted: bool = True) -> None:
         self.road, self.asked = road, request_of(road.scene, road.model, plan.request)
         self.step = road.scene.coupling.step
         self.space = space(road.scene, road.model)
-        self.due = {segment.name: list(_starts(segment)) for segment in plan.segments}
+        self.due = {segment.name: list(_starts(segment)) if wanted else [] for segment in plan.segments}
         self.begun: list[Spot] = []
 
     def look(self, at: int, segment: Segment, mark: Mark) -> None:
@@ -86,7 +84,8 @@ class SpotChecks:
     def judged(self, spot: Spot, trace: Trace) -> Check:
         """How far the run was from the full model. trace: of the run, the window at least."""
         allowed = 1.0 + spot.segment.noise
-        far = FAILED if spot.full is None else error(self._of(trace, spot), self._signals(spot.full), self.asked).whole
+        part = trace.window((spot.first - 0.1) * self.step, (spot.last + 0.1) * self.step)
+        far = FAILED if spot.full is None else error(self._signals(part), self._signals(spot.full), self.asked).whole
         return Check(spot.segment.name, spot.first * self.step, far, allowed, far <= allowed)
 
     def done(self, spot: Spot) -> None:
@@ -104,9 +103,9 @@ class SpotChecks:
         None where the full model runs already, or fails."""
         if spot.full is None or choice == self.space.full:
             return None
-        bench = _FromState(self, spot)
-        now = bench.one(choice)
-        found = restored(self.space, bench, now, 1.0 / spot.segment.safety, lambda text: None, _dearest_first)
+        bench = Measures(lambda new: [self.trial(spot, tried) for tried in new])
+        now, most = bench.one(choice), 1.0 / spot.segment.safety
+        found = restored(self.space, bench, now, most, lambda text: None, _dearest_first)
         return self.space.all_richer(choice) if found.choice == choice else found.choice
 
     def trial(self, spot: Spot, choice: Choice) -> Measured:
@@ -122,41 +121,12 @@ class SpotChecks:
         run = self.road.kernel(choice, tuple(self.asked.channels))
         try:
             run.take_over(before)
-            run.new_recorder(first - run.at)
-            run.advance(first)
-            run.new_recorder(last - first)
-            run.record()
-            run.advance(last)
+            return run.window(first, last)
         except SimulationError:
             return None
-        return run.recorder.trace({})
-
-    def _of(self, trace: Trace, spot: Spot) -> Signals:
-        return self._signals(trace.window((spot.first - 0.1) * self.step, (spot.last + 0.1) * self.step))
 
     def _signals(self, part: Trace) -> Signals:
-        values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in self.asked.outputs}
-        return Signals(values, self.step)
-
-
-class _FromState:
-    """What `restored` measures with: sets over the window of a check."""
-
-    def __init__(self, checks: SpotChecks, spot: Spot) -> None:
-        self.checks, self.spot = checks, spot
-        self.known: dict[Choice, Measured] = {}
-
-    def measure(self, choices: Iterable[Choice]) -> list[Measured]:
-        """Errors against the full model from the same state."""
-        wanted = list(choices)
-        for choice in wanted:
-            if choice not in self.known:
-                self.known[choice] = self.checks.trial(self.spot, choice)
-        return [self.known[choice] for choice in wanted]
-
-    def one(self, choice: Choice) -> Measured:
-        """`measure` of one."""
-        return self.measure([choice])[0]
+        return signals_of(part, self.asked, self.step)
 
 
 def _dearest_first(steps: list[tuple[Knob, Choice]], now: Choice) -> list[Choice]:

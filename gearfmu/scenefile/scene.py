@@ -137,6 +137,14 @@ class SceneSpec(Spec):
         """Number of communication steps."""
         return round(self.duration / self.coupling.step)
 
+    def with_coupling(self, **changes: Any) -> SceneSpec:
+        """The scene with other fields of [coupling], SI."""
+        return self.model_copy(update={"coupling": self.coupling.model_copy(update=changes)})
+
+    def with_stage(self, **changes: Any) -> SceneSpec:
+        """The scene with other fields of [stage], SI."""
+        return self.model_copy(update={"stage": self.stage.model_copy(update=changes)})
+
 
 def shipped_scenes() -> list[str]:
     """Names of the scenes that come with the package."""

@@ -12,7 +12,7 @@ import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
-from gearfmu.kernel import Kernel
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.assembly.model import integrator_of
@@ -91,7 +90,7 @@ class Kept(KernelUnit):
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
         super().__init__(blob, parameters)
-        self.parameters, self.settle = dict(parameters), settle
+        self.blob, self.parameters, self.settle, self.interval = blob, dict(parameters), settle, 0.0
         self.now: dict[str, float] = {}
         self.rows: list[list[float]] = []
         self.before, self.first, self.state = 0, -1, b""
@@ -107,28 +106,32 @@ class Kept(KernelUnit):
     def note(self, time: float, h: float) -> None:
         """Keep the inputs of the step that comes, and the state before it where replays begin."""
         if not self.rows:
-            self.before = round(time / h)
+            self.before, self.interval = round(time / h), h
         if self.first < 0 and time >= self.settle * (1.0 - 1e-12):
             self.first, self.state = len(self.rows), self.save()
         self.rows.append(list(self.now.values()))
 
-    def recording(self, blob: bytes, step: float) -> Recording:
+    def recording(self) -> Recording:
         """Recording of this unit."""
-        known = (blob, self.parameters, tuple(self.now), np.array(self.rows), step)
+        known = (self.blob, self.parameters, tuple(self.now), np.array(self.rows), self.interval)
         return Recording(*known, max(self.first, 0), self.state, self.before)
 
 
+AnyKept = TypeVar("AnyKept", bound=Kept)
+
+
 @dataclass
-class KeptSource:
-    """A Source whose unit is kept, with its inputs."""
+class KeptSource(Generic[AnyKept]):
+    """A Source whose units are of this kind; `made` is the last."""
 
     model: StageModel
     settle: float
-    unit_made: Kept | None = None
+    kind: type[AnyKept]
+    made: AnyKept = field(init=False)
 
-    def unit(self, parameters: Mapping[str, float | bool | str]) -> Kept:
-        self.unit_made = Kept(self.model.blob, parameters, self.settle)
-        return self.unit_made
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> AnyKept:
+        self.made = self.kind(self.model.blob, parameters, self.settle)
+        return self.made
 
 
 def models_for(
@@ -140,34 +143,21 @@ def models_for(
     return assemble(in_drivetrain(scene, stage), bodies or load_bodies(stage), rolls)
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """A coupled run, with what plays its stage back, and the kernel that integrated it."""
-
-    result: Result
-    recording: Recording
-    kernel: Kernel
-
-
-def recorded_run(scene: SceneSpec, model: StageModel) -> Recorded:
-    """A coupled run of the scene as it is, by the kernel, with its inputs kept; the state that a replay begins at is
-    that after the scene's settling time. ModelError when the kernel refuses it, with the kernel's reason."""
-    source = KeptSource(model, scene.settle)
-    result = run_once(scene, source)
-    kept = source.unit_made
-    assert kept is not None, "the run made its unit"
-    return Recorded(result, kept.recording(model.blob, scene.coupling.step), kept.kernel)
+def recorded_run(scene: SceneSpec, model: StageModel) -> tuple[Result, Kept]:
+    """A coupled run of the scene as it is, by the kernel, and its stage with its inputs; the state that a replay begins
+    at is that after the scene's settling time. ModelError when the kernel refuses it, with the kernel's reason."""
+    source = KeptSource(model, scene.settle, Kept)
+    return run_once(scene, source), source.made
 
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     """A coupled run of the scene at `point`. ModelError when the kernel refuses it, with the kernel's reason."""
     effects = scene.stage.effects.model_copy(update=dict.fromkeys(point.off, False))
-    choice: dict[str, Any] = {"level": point.level, "integrator": point.integrator, "h": point.h}
-    choice |= {"slices": point.slices, "effects": effects}
-    changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
-    done = recorded_run(changed, model)
-    result, facts, end = done.result, done.result.facts, float(done.result.trace.time[-1])
-    clutch = any(name.endswith(".clutch.capacity") for name in done.kernel.variables)
+    fields = {name: getattr(point, name) for name in ("level", "integrator", "h", "slices")}
+    changed = scene.with_stage(**fields, effects=effects).model_copy(update={"record": ("*",)})
+    result, stage = recorded_run(changed, model)
+    facts, end = result.facts, float(result.trace.time[-1])
+    clutch = any(name.endswith(".clutch.capacity") for name in stage.kernel.variables)
     integrator = integrator_of(point.level, point.integrator, clutch)
     return Run(
         point,
@@ -177,8 +167,8 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         int(facts["solver.n_dyn"]),
         result.outcome,
         int(result.trace["solver.status"][-1]),
-        done.kernel.warning,
-        done.recording,
+        stage.kernel.warning,
+        stage.recording(),
     )
 
 

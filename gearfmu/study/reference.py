@@ -3,7 +3,6 @@ fifth of the error of the finest point of the study."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.refinement import twice
 from gearfmu.stage.run.trace import TraceError
-from gearfmu.study.bench import Point, measure
+from gearfmu.study.bench import Point, Run, measure
 from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
 from gearfmu.study.norm import Errors, Signals, errors, kept_signals
 
@@ -36,25 +35,20 @@ class Reference:
         return self.moved.below(SHARE, self.finest)
 
 
-def make_reference(
-    scene: SceneSpec, model: StageModel, slices: int, quick: bool = False, progress: Callable[[str], None] | None = None
-) -> Reference:
+def make_reference(scene: SceneSpec, model: StageModel, slices: int, quick: bool = False) -> Reference:
     """Run the scene with ever smaller steps until `reached`, or at most to FINEST; a helical stage with twice the
     slices."""
-    step, tell = scene.coupling.step, progress or (lambda text: None)
     slices = twice(model.stage, slices)
 
-    def run(h: float) -> Signals:
-        tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")
-        return measure(scene, model, Point("full", h=h, slices=slices)).signals
+    def run(h: float) -> Run:
+        return measure(scene, model, Point("full", h=h, slices=slices))
 
-    h = fitting(step, min(QUICK_STEPS if quick else STEPS))
-    finest, h = run(h), h / FIRST
-    coarse = run(h)
+    h = fitting(scene.coupling.step, min(QUICK_STEPS if quick else STEPS))
+    finest, h = run(h).signals, h / FIRST
+    coarse = run(h).signals
     while True:
         h /= 2
-        tell(f"reference, {slices} slices, {1e6 * h:.3g} µs")
-        made = measure(scene, model, Point("full", h=h, slices=slices))
+        made = run(h)
         found = Reference(made.signals, h, made.n_dyn, errors(coarse, made.signals), errors(finest, made.signals))
         if found.reached or h / 2 < FINEST:
             return found

@@ -142,7 +142,8 @@ class _Study:
         """References first, then the points."""
         wanted = self.wanted()
         slices = sorted({point.slices for point in wanted})
-        missing = [point for point in wanted if not self._known(point)]
+        known = self.tables[Row].of(self.scene.name)
+        missing = [point for point in wanted if not any(_is_at(row, point) for row in known)]
         self._write_facts()
         references = self.references(slices)
         for done, (point, found) in enumerate(self._each(_price_of, missing)):
@@ -163,10 +164,6 @@ class _Study:
         for point in found:
             once.setdefault((point.level, point.integrator, f"{point.h:.6g}", point.slices), point)
         return list(once.values())
-
-    def _known(self, point: Point) -> bool:
-        rows = self.tables[Row].of(self.scene.name)
-        return any(_is_at(row, point) for row in rows)
 
     def references(self, slices: list[int]) -> dict[int, Reference]:
         """Reference by number of slices, made or taken from the folder."""

@@ -8,6 +8,8 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from pydantic import TypeAdapter
+
 from gearfmu.errors import Problem, SpecError
 from gearfmu.files import written_whole
 
@@ -78,7 +80,8 @@ def read_rows(path: Path, kind: type[AnyRow]) -> list[AnyRow]:
     if list(reader.fieldnames or ()) != names or any(None in line.values() for line in found):
         columns = ",".join(reader.fieldnames or ())
         raise SpecError([Problem(str(path), "header", columns, f"remove it, or give another folder: {names} is read")])
-    return [kind(**{f.name: _value(str(f.type), line[f.name]) for f in fields(kind)}) for line in found]
+    row = TypeAdapter(kind)
+    return [row.validate_python(line) for line in found]
 
 
 def write_rows(path: Path, kind: type[AnyRow], rows: Iterable[AnyRow]) -> None:
@@ -111,12 +114,6 @@ class KeptTable:
         if len(kept) < len(self.rows):
             self.rows = kept
             write_rows(self.path, self.kind, self.rows)
-
-
-def _value(kind: str, text: str) -> Any:
-    if kind == "bool":
-        return text == "true"
-    return text if kind == "str" else int(text) if kind == "int" else float(text)
 
 
 def _plain(values: tuple) -> list[Any]:

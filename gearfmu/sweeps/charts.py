@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,22 +50,34 @@ def fixed(table: SweepTable, free: Sequence[str]) -> tuple[np.ndarray, str]:
     return mask, ", ".join(f"{name} = {table[name][first]}" for name in held)
 
 
+def at_most(values: np.ndarray, count: int) -> np.ndarray:
+    """So many of the values, evenly spaced, first and last among them; all where there are no more."""
+    return values[np.unique(np.linspace(0, values.size - 1, min(values.size, count)).round().astype(int))]
+
+
+def on_grid(
+    table: SweepTable, axes: Sequence[str], rows: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values of these rows over the first two keys: ticks to the right (m,) and upwards (n,), values (n, m), NaN where
+    a point is missing."""
+    x, y = (ticks_of(table, key)[rows] for key in axes[:2])
+    right, up = np.unique(x), np.unique(y)
+    grid = np.full((up.size, right.size), np.nan)
+    grid[np.searchsorted(up, y), np.searchsorted(right, x)] = values[rows]
+    return right, up, grid
+
+
 def _harris(table: SweepTable, path: Path) -> Path:
     rows, _ = fixed(table, [TORQUE])
     some = np.flatnonzero(rows)[np.argsort(table[TORQUE][rows])]
-    chosen = some[np.unique(np.linspace(0, some.size - 1, min(some.size, MOST_CURVES)).round().astype(int))]
-    parts = [_curve(table.curves, row) for row in chosen]
+    chosen = at_most(some, MOST_CURVES)
+    parts = [{name: v[table.curves["point"] == row] for name, v in table.curves.items()} for row in chosen]
     ends = ("te_um", "mesh_stiffness_N_per_um", "stage_stiffness_N_per_um")
     te, mesh, stage = ([part[n] for n in table.curves if n.endswith(end) for part in parts] for end in ends)
     none, count = np.zeros((0, 0, 0)), len(parts)
     curves = 1e-6 * np.array(te[:count]), 1e6 * np.array(mesh[:count]), 1e6 * np.array(stage[:count])
     write_plot(TeResult(table[TORQUE][chosen], parts[0]["position"], *curves, none, none, ("",) * count), path)
     return path
-
-
-def _curve(curves: Mapping[str, np.ndarray], row: int) -> dict[str, np.ndarray]:
-    own = curves["point"] == row
-    return {name: values[own] for name, values in curves.items()}
 
 
 def _orders(table: SweepTable, path: Path) -> Path:
@@ -108,10 +120,7 @@ def _levels(table: SweepTable, axes: list[str], path: Path) -> Path:
 
 def _map(figure: Figure, axis: Axes, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
     """One colour map: the first key to the right, the second upwards."""
-    x, y = (ticks_of(table, key)[rows] for key in axes[:2])
-    right, up = np.unique(x), np.unique(y)
-    grid = np.full((up.size, right.size), np.nan)
-    grid[np.searchsorted(up, y), np.searchsorted(right, x)] = level(table[name][rows])
+    right, up, grid = on_grid(table, axes, rows, level(table[name]))
     image = axis.pcolormesh(right, up, grid, shading="nearest")
     axis.grid(False)
     axis.set_ylabel(label_of(axes[1]))

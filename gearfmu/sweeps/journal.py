@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from gearfmu.report.results import strict
 from gearfmu.sweeps.points import Outcome
 
 
@@ -29,11 +30,11 @@ class Journal:
 
     def add(self, identity: str, outcome: Outcome) -> None:
         """One more point; its trace is not kept here."""
-        plain = asdict(replace(outcome, trace=None))
+        known = self._known[identity] = replace(outcome, trace=None)
+        plain = asdict(known)
         del plain["trace"]
-        self._known[identity] = replace(outcome, trace=None)
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"identity": identity, **_strict(plain)}, ensure_ascii=False) + "\n")
+            file.write(json.dumps({"identity": identity, **strict(plain)}, ensure_ascii=False) + "\n")
 
 
 def _lines(path: Path) -> list[tuple[str, Outcome]]:
@@ -45,15 +46,6 @@ def _lines(path: Path) -> list[tuple[str, Outcome]]:
         except (ValueError, KeyError, TypeError):
             continue
     return found
-
-
-def _strict(value: object) -> Any:
-    """Numbers that are not finite become null."""
-    if isinstance(value, dict):
-        return {key: _strict(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_strict(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _with_nan(entry: dict[str, Any]) -> dict[str, Any]:

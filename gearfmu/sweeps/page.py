@@ -13,7 +13,7 @@ from gearfmu.files import write_text
 from gearfmu.report import page
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.metrics import level
-from gearfmu.sweeps.charts import MOST_CURVES, label_of, numeric_axes, ticks_of
+from gearfmu.sweeps.charts import MOST_CURVES, at_most, fixed, label_of, numeric_axes, on_grid, ticks_of
 from gearfmu.sweeps.table import NO_NUMBERS, SweepTable
 
 GROUPS = (  # part of a column's name, what it is, its unit, whether it is a level
@@ -76,7 +76,7 @@ def _te(table: SweepTable) -> Plot | None:
     if not names:
         return None
     points = np.unique(table.curves["point"])
-    chosen = points[np.unique(np.linspace(0, points.size - 1, min(points.size, MOST_CURVES)).round().astype(int))]
+    chosen = at_most(points, MOST_CURVES)
     curves = []
     for point in chosen.tolist():
         own = table.curves["point"] == point
@@ -127,17 +127,11 @@ def _curves(table: SweepTable, axis: str, name: str, kind: tuple[str, bool]) -> 
 
 def _map(table: SweepTable, axes: Sequence[str], name: str, kind: tuple[str, bool]) -> Panel:
     """A result over two keys; further keys are held at the first point's values."""
-    held = [other for other in table.axes if other not in axes[:2]]
-    rows = table["outcome"] == "ok"
-    for other in held:
-        rows = rows & (table[other] == table[other][int(np.argmax(rows))])
-    x, y = (ticks_of(table, key)[rows].astype(float) for key in axes[:2])
-    right, up = np.unique(x), np.unique(y)
-    grid = np.full((up.size, right.size), np.nan)
-    grid[np.searchsorted(up, y), np.searchsorted(right, x)] = _values(table, name, kind[1])[rows]
+    rows, _ = fixed(table, axes[:2])
+    right, up, grid = on_grid(table, axes, rows, _values(table, name, kind[1]))
     low, high = float(np.nanmin(grid)), float(np.nanmax(grid))
     high = high if high > low else low + (abs(low) or 1.0) * 1e-6
-    heat = Heat(right, up, grid, low, high, kind[0])
+    heat = Heat(right.astype(float), up.astype(float), grid, low, high, kind[0])
     return Panel(f"{_plain(name)}: {label_of(axes[1])}", (), heat, height=260)
 
 

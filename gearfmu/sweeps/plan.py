@@ -23,14 +23,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import GearfmuError
-from gearfmu.quantities import to_si
+from gearfmu.quantities import NUMBER, to_si
 from gearfmu.scenefile.scene import SceneSpec, StageChoice, full_key, scene_path, shipped_scenes
 from gearfmu.stagefile.reading.base import Quantity, read_toml
 from gearfmu.stagefile.reading.files import find_stage, quantity_at, read_layers
 from gearfmu.stagefile.stage import stage_class
 
 _RANGE = re.compile(r"\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*(\S.*?)?\s*$")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 
 RUN, SIMULATE, TE = "run", "simulate", "te"
 OWN = {  # keys of a stage that is computed alone, with their units
@@ -121,12 +120,9 @@ def split(what: str, values: Values) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _grid(over: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
-    lists = [list(value) if _several(value) else [value] for value in over.values()]
+    one = (str, bytes, Mapping)
+    lists = [[v] if isinstance(v, one) or not hasattr(v, "__iter__") else list(v) for v in over.values()]
     return tuple(dict(zip(over, values, strict=True)) for values in itertools.product(*lists)) if over else ()
-
-
-def _several(value: object) -> bool:
-    return not isinstance(value, (str, bytes, Mapping)) and hasattr(value, "__iter__")
 
 
 def _file(subject: str | os.PathLike[str]) -> tuple[Path, bool]:
@@ -160,13 +156,13 @@ def _range(found: re.Match[str], text: str) -> list[Any]:
 
 def _list(text: str) -> list[Any]:
     items = [item.strip() for item in text.split(",") if item.strip()]
-    last = _NUMBER.match(items[-1])
+    last = NUMBER.match(items[-1])
     unit = last[2] if last else ""
     return [_item(item, unit) for item in items]
 
 
 def _item(text: str, unit: str) -> Any:
-    match = _NUMBER.match(text)
+    match = NUMBER.match(text)
     if not match:
         return {"true": True, "false": False}.get(text, text)
     number, own = match[1], match[2] or unit

@@ -48,7 +48,7 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
     _prepare([p for p in points if isinstance(p, _Point)], runner, told)
     outcomes: list[Outcome | None] = [_kept(p, journal, out, traces) for p in points]
     open_ = [(n, p) for n, p in enumerate(points) if outcomes[n] is None and isinstance(p, _Point)]
-    tasks = [_task(plan, point, traces) for _, point in open_]
+    tasks = [Task(str(plan.subject), plan.what, p.values, p.variant, traces, program()) for _, p in open_]
     failed, done = sum(known is not None and known.name != OK for known in outcomes), len(points) - len(open_)
     for number, result in runner(compute, tasks):
         (n, point), outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
@@ -122,10 +122,6 @@ def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) ->
     if known is None or known.name != OK or (traces and not (out / trace_name(point.identity)).is_file()):
         return None
     return known
-
-
-def _task(plan: Plan, point: _Point, traces: bool) -> Task:
-    return Task(str(plan.subject), plan.what, point.values, point.variant, traces, program())
 
 
 def _keep(point: _Point, outcome: Outcome, journal: Journal, out: Path) -> Outcome:

@@ -84,8 +84,8 @@ class SweepTable:
     @property
     def files(self) -> list[Path]:
         """Files of table and curves in the folder."""
-        names = ["sweep", "curves"] if self.curves else ["sweep"]
-        return [self.folder / f"{name}{table_suffix()}" for name in names]
+        suffix = ".parquet" if has("pyarrow") else ".csv"
+        return [self.folder / f"{name}{suffix}" for name in (("sweep", "curves") if self.curves else ("sweep",))]
 
     def write(self) -> None:
         """Write these files."""
@@ -102,11 +102,6 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     with written_whole(path) as temporary:
         parquet.write_table(arrow.table({name: arrow.array(v.tolist()) for name, v in columns.items()}), temporary)
     return path
-
-
-def table_suffix() -> str:
-    """ ".parquet" where pyarrow is installed, else ".csv"."""
-    return ".parquet" if has("pyarrow") else ".csv"
 
 
 def column(values: Sequence[object]) -> np.ndarray:

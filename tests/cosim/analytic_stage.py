@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
+from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Constant, Signal
 
 R1, R2 = 0.0338, 0.0507  # m, base radii of 16/24 teeth, m = 4.5 mm
@@ -91,3 +92,8 @@ class Smooth:
 
     def ends(self, t0: float, t1: float) -> tuple[float, float]:
         return self.function(t0), self.function(t1)
+
+
+def energy_of(unit: PyUnit) -> float:
+    """J, of the network."""
+    return float(unit.get(unit.resolve(["energy.stored"]))[0])

@@ -102,7 +102,7 @@ def test_an_fmu_of_another_kind_of_stage_is_refused_by_name(plain: Path) -> None
         of_scene(scene, opened)
     assert of_scene(scene, opened, spec) is scene  # named with --stage it is wanted
     with pytest.raises(SpecError, match=r"kind of stage fzg_c = external_pair: scene planetary_paper"):
-        cosim.run("planetary_paper", fmu_path=plain)
+        cosim.run(Staged.of_fmu(load_scene("planetary_paper"), plain))
 
 
 def test_an_fmu_of_another_stage_than_the_named_one_is_refused(plain: Path) -> None:
@@ -113,8 +113,8 @@ def test_an_fmu_of_another_stage_than_the_named_one_is_refused(plain: Path) -> N
 
 def test_the_stage_of_the_scene_need_not_be_there(plain: Path) -> None:
     scene = short("pair_loaded")
-    scene = scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": "gone/stage.toml"})})
-    assert cosim.run(scene, fmu_path=plain).meta["stage"] == "fzg_c"
+    scene = scene.with_stage(name="gone/stage.toml")
+    assert cosim.run(Staged.of_fmu(scene, plain)).meta["stage"] == "fzg_c"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from gearfmu import cosim, fmu
 from gearfmu.cosim.frames import frame_plan
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.scene_run import run_once, stage_model
+from gearfmu.cosim.scene_run import Staged, run_once, stage_model
 from gearfmu.errors import CouplingError, SpecError
 from gearfmu.scenefile.deformation import DeformationChoice
 from gearfmu.scenefile.scene import SceneSpec, load_scene
@@ -67,6 +67,6 @@ def test_an_fmu_that_does_not_tell_is_refused(tmp_path: Path) -> None:
     path = fmu.export(model, tmp_path / "pair.fmu")
     asked = closure(gears=("wheel",), times=(1e-3,))
     with pytest.raises(SpecError, match=r"pair.fmu: observed gears = none.*--observe wheel"):
-        cosim.run(asked, fmu_path=path)
+        cosim.run(Staged.of_fmu(asked, path))
     with pytest.raises(CouplingError, match="--observe wheel"):
         run_once(asked, Source(model), frames=frame_plan(asked, asked.deformation))

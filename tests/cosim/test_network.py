@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from analytic_stage import R1, R2, Plant
+from analytic_stage import R1, R2, Plant, energy_of
 from scipy.linalg import eigh
 
-from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
+from gearfmu.cosim.network import Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.signals import Constant, Ramp
+from gearfmu.cosim.signals import Ramp
 from gearfmu.errors import CouplingError
 
 
@@ -68,14 +68,15 @@ def test_rattle_between_two_flanks_has_the_closed_form_period():
     impacts."""
     speed, j1, j2, k, backlash = 10.0, 0.001, 0.004, 2e8, 1e-4
     unit = started(rattle(speed, j1, j2, k, backlash), micro_step=2e-5)
-    before, contact, flight = unit.energy(), math.pi / math.sqrt(k * (R1**2 / j1 + R2**2 / j2)), backlash / (R1 * speed)
+    contact, flight = math.pi / math.sqrt(k * (R1**2 / j1 + R2**2 / j2)), backlash / (R1 * speed)
+    before = energy_of(unit)
     for n in range(200):
         unit.step(n * 1e-3, 1e-3)
     closings = [event.time for event in unit.events if event.what != "open"]
     first, period = contact_start(unit), contact + flight
     assert len(closings) > 400
     assert np.allclose(closings, first + period * np.arange(len(closings)), rtol=0, atol=1e-9)
-    assert unit.energy() == pytest.approx(before, rel=1e-9)
+    assert energy_of(unit) == pytest.approx(before, rel=1e-9)
 
 
 def contact_start(unit: PyUnit) -> float:
@@ -113,7 +114,7 @@ def test_a_jump_of_the_given_angle_is_blended_over_the_step():
     unit.step(0.0, 1e-3)
     phi, work = unit.get(unit.resolve(["out.phi", "energy.work"]))
     assert phi == pytest.approx(0.01 + 2.0 * 1e-3, abs=1e-15)
-    assert work == pytest.approx(unit.energy(), rel=1e-6)
+    assert work == pytest.approx(energy_of(unit), rel=1e-6)
 
 
 def test_sources_converge_with_second_order():
@@ -158,26 +159,6 @@ def test_restored_state_gives_the_same_bits():
     other.restore(state)
     assert onward(other) == first
     assert len(unit.get(handle)) == len(names)
-
-
-def test_every_problem_of_a_network_is_told_at_once():
-    with pytest.raises(CouplingError) as told:
-        Network(
-            (Inertia("a", -1.0), Inertia("b", 1.0), Inertia("b", 1.0)),
-            (Spring("s", {"a": 1.0, "x": -1.0}, -5.0),),
-            (Clutch("c", "a", "y", Constant(1.0), peak=0.5),),
-            motion_ports={"pinion": "a"},
-        )
-    for part in (
-        "'b' names two parts",
-        "'x'",
-        "'y'",
-        "inertia -1.0",
-        "k = -5.0",
-        "peak 0.5",
-        "a motion needs a driven node",
-    ):
-        assert part in str(told.value)
 
 
 def test_unknown_variables_and_outputs_as_inputs_are_refused():

@@ -23,10 +23,6 @@ def scene(name: str, duration: float, **stage) -> SceneSpec:
     return load_scene(name, {"duration": duration, "settle": 0.0} | {f"stage.{key}": v for key, v in stage.items()})
 
 
-def with_step(given: SceneSpec, step: float) -> SceneSpec:
-    return given.model_copy(update={"coupling": given.coupling.model_copy(update={"step": step})})
-
-
 def test_a_run_leaves_trace_and_summary_with_the_promised_fields(tmp_path):
     trace = cosim.run(scene("pair_loaded", 2e-3, level="fast"), tmp_path, unit="kernel", verify=True)
     read, summary = Trace.load(tmp_path / "trace.h5"), json.loads((tmp_path / "summary.json").read_text())
@@ -63,7 +59,7 @@ def test_coupling_error_does_not_count_the_internal_step():
     """20 µs holds 7 internal steps, half of it 3.5: a plain comparison would mostly see another internal step."""
     rig = scene("pair_light", 0.02, level="fast")
     source = Source(stage_model(rig))
-    own, halved = run_once(rig, source), run_once(with_step(rig, 0.5 * rig.coupling.step), source)
+    own, halved = run_once(rig, source), run_once(rig.with_coupling(step=0.5 * rig.coupling.step), source)
     assert round(rig.coupling.step / own.facts["solver.h"]) % 2 == 1
     plain = coupling_errors(own.trace, halved.trace, 2, Window(0.0, steady=False))["pinion.tau"].relative
     estimate = verified(rig, source, own)["pinion.tau"].relative

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -86,7 +88,7 @@ def test_logs_write_what_get_gives(model, tmp_path):
     """FMU and kernel: reals, integers and booleans of some steps, and no more rows than there is room for."""
     scene = load_scene("clutch_closure")
     parameters = {"level": "rigid", "slices": 1, "h": H} | drive_of(scene, model.stage).start()
-    with FmuUnit(fmu.export(model, tmp_path / "stage.fmu"), parameters) as stage:
+    with closing(FmuUnit(fmu.export(model, tmp_path / "stage.fmu"), parameters)) as stage:
         stage.set(stage.resolve(["pinion.w", "wheel.w"]), [202.0, -100.0])
         stage.initialize(0.0)
         for unit in (stage, started(model)):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gearfmu import cosim
-from gearfmu.commands.runs import DEMO_STEP, with_step
+from gearfmu.commands.runs import DEMO_STEP
 from gearfmu.report.plots_nvh import octave_table, sampling_warning
 from gearfmu.report.signals import window_of_interest
 from gearfmu.scenefile.scene import load_scene
@@ -16,7 +16,7 @@ from gearfmu.stage.run.trace import Trace
 
 def closure(step: float, folder: Path) -> Trace:
     """The first half of the demo's scene."""
-    scene = with_step(load_scene("clutch_closure"), step)
+    scene = load_scene("clutch_closure").with_coupling(step=step)
     return cosim.run(scene.model_copy(update={"duration": 0.2}), folder, unit="kernel")
 
 
