@@ -15,7 +15,7 @@ from gearfmu.cosim.given_fmu import fitted, of_scene
 from gearfmu.cosim.scene_run import Staged, drive_of
 from gearfmu.errors import BodyError, SpecError
 from gearfmu.fmu.opened import OpenedFmu
-from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.run.trace import Trace
 
