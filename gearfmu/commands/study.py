@@ -11,7 +11,7 @@ import click
 from gearfmu.commands.shared import FOLDER, progress_bar
 
 if TYPE_CHECKING:
-    from gearfmu.study import Row
+    from gearfmu.study.table import Row
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
 
@@ -28,8 +28,8 @@ def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
     from gearfmu.commands.models import bodies_for_motion
     from gearfmu.report.study import write_chart
     from gearfmu.scenefile.scene import load_scene
-    from gearfmu.study import Job
-    from gearfmu.study import study as run_study
+    from gearfmu.study.run import Job
+    from gearfmu.study.run import study as run_study
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):
