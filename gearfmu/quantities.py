@@ -127,7 +127,7 @@ def _registry() -> pint.UnitRegistry:
 
 
 HEADER = Path(__file__).parent / "kernel" / "src" / "model" / "gk_ranges.h"
-_ROW = re.compile(r"^#define GK_(LOW|HIGH)_(\w+) (\S+)", re.MULTILINE)
+_ROW = re.compile(r"^#define GK_(\w+) (\S+)", re.MULTILINE)
 _ROUNDING = 1e-12  # relative: a limit in degrees or millimetres is not exact in SI
 _DEGREE = math.pi / 180
 
@@ -179,17 +179,18 @@ def in_range(field: str, value: float, name: str) -> float:
 @cache
 def kernel_limits() -> dict[str, tuple[float, float]]:
     """(lowest, highest) of every row of the kernel's header by its name, SI."""
-    found: dict[str, dict[str, float]] = {}
-    for end, name, number in _ROW.findall(HEADER.read_text(encoding="utf-8")):
-        found.setdefault(name, {})[end] = float(number)
-    return {name: (ends["LOW"], ends["HIGH"]) for name, ends in found.items()}
+    names = [name.removeprefix("LOW_") for name in _header() if name.startswith("LOW_")]
+    return {name: (kernel_number(f"LOW_{name}"), kernel_number(f"HIGH_{name}")) for name in names}
 
 
 def kernel_number(name: str) -> float:
-    """A number of the kernel's header that is no limit."""
-    found = re.search(rf"^#define GK_{name} (\S+)", HEADER.read_text(encoding="utf-8"), re.MULTILINE)
-    assert found is not None, name
-    return float(found[1])
+    """A number of the kernel's header."""
+    return float(_header()[name])
+
+
+@cache
+def _header() -> dict[str, str]:
+    return dict(_ROW.findall(HEADER.read_text(encoding="utf-8")))
 
 
 def range_of(name: str) -> Range:

@@ -11,8 +11,7 @@ from evidence.study.sets import SetRow, ladder
 from gearfmu.files import written_whole
 from gearfmu.report.study import draw
 from gearfmu.report.style import COLOURS, panels, styled
-from gearfmu.study import Row
-from gearfmu.study.table import read_rows
+from gearfmu.study.table import Row, read_rows
 
 HERE = Path(__file__).resolve().parent
 PICTURE = HERE.parents[1] / "docs" / "pictures" / "cost.svg"

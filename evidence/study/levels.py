@@ -19,8 +19,9 @@ from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.stage.run.trace import write_columns
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.study import Job, Row, default_rows
 from gearfmu.study.norm import Signals
+from gearfmu.study.run import Job, default_rows
+from gearfmu.study.table import Row
 
 
 def price(row: Row, reference: Signals, bodies: str) -> dict[str, object]:

@@ -49,7 +49,7 @@ def load(stage: PathLike, changes: Changes | None = None) -> Stage:
 
 def loaded_stage(stage: PathLike | Stage) -> Stage:
     """`load`, unless it is loaded already."""
-    return stage if isinstance(stage, Stage) else load(stage)
+    return load(stage) if isinstance(stage, (str, os.PathLike)) else stage
 
 
 def load_scene(scene: PathLike, changes: Changes | None = None) -> SceneSpec:

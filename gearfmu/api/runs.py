@@ -169,7 +169,7 @@ def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None
     if stage is None:
         return spec, None
     own = loaded_stage(stage)
-    return spec.with_stage(name=str(own.source if isinstance(stage, Stage) else stage)), own
+    return spec.with_stage(name=str(own.source if own is stage else stage)), own
 
 
 def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progress: Progress | None) -> Staged:

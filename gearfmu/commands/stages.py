@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +34,9 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.stagefile.stage import load_stage
 
     spec = load_stage(stage)
-    for name in _chosen(spec.files, only):
+    if only is not None and only not in spec.files:
+        raise click.BadParameter(f"no gear '{only}'; the stage has {', '.join(spec.files)}", param_hint="--gear")
+    for name in spec.files if only is None else [only]:
         sector, table = body_sector(spec, name, scale), spec.by_file[name]
         flank: tuple[float, ...] = ()
         if isinstance(table, GearBody | RingBody) and table.imported is None:
@@ -103,9 +104,3 @@ def _cost(body: Body, kept: bool) -> str:
         + f"{made['cpu_s']:g} s CPU time"
         + ("" if memory is None else f" and {memory:g} GB")
     )
-
-
-def _chosen(names: Sequence[str], only: str | None) -> list[str]:
-    if only is not None and only not in names:
-        raise click.BadParameter(f"no gear '{only}'; the stage has {', '.join(names)}", param_hint="--gear")
-    return [name for name in names if only in (None, name)]

@@ -11,8 +11,7 @@ import click
 from gearfmu.commands.shared import FOLDER, progress_bar
 
 if TYPE_CHECKING:
-    from gearfmu.scenefile.scene import SceneSpec
-    from gearfmu.study import Row
+    from gearfmu.study.table import Row
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
 
@@ -27,28 +26,22 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE over the internal step and the slices."""
     from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.report.study import write_chart
     from gearfmu.scenefile.scene import load_scene
+    from gearfmu.study.run import Job
+    from gearfmu.study.run import study as run_study
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):
         bodies_for_motion(name)
     for spec in specs:
-        _errors(spec, out, quick, jobs)
-
-
-def _errors(spec: SceneSpec, out: Path, quick: bool, jobs: int) -> None:
-    """Measure the scene's points and write table and chart."""
-    from gearfmu.report.study import write_chart
-    from gearfmu.study import Job
-    from gearfmu.study import study as run_study
-
-    with progress_bar(spec.name) as progress:
-        found = run_study(Job(spec, out, quick, workers=jobs), progress)
-    click.echo(error_table(found.rows))
-    for note in found.notes:
-        click.echo(f"- {note}")
-    written = write_chart(found.rows, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
-    click.echo(", ".join(map(str, [out / "study.csv", *written])))
+        with progress_bar(spec.name) as progress:
+            found = run_study(Job(spec, out, quick, workers=jobs), progress)
+        click.echo(error_table(found.rows))
+        for note in found.notes:
+            click.echo(f"- {note}")
+        written = write_chart(found.rows, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
+        click.echo(", ".join(map(str, [out / "study.csv", *written])))
 
 
 def error_table(rows: Sequence[Row]) -> str:

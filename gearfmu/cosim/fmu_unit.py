@@ -36,7 +36,8 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from gearfmu.cosim.units import RowLog, Variable
+from gearfmu.cosim.kernel_unit import RowLog
+from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
 from gearfmu.kernel.build import SUFFIX, host_platform

@@ -47,7 +47,11 @@ def fitted(
     `scene_run`. SpecError with every port that does not fit, and every gear that the scene records and the FMU does not
     show."""
     export = f"export it with `gearfmu export {opened.model.name} --scene SCENE`"
-    problems = list(_recording(scene, opened, export))
+    recorded = scene.deformation.gears if scene.deformation is not None else ()
+    problems = []
+    if missing := [gear for gear in recorded if gear not in opened.observed]:
+        remedy = f"scene {scene.name} records how {', '.join(missing)} moves: {export}, or with --observe {missing[0]}"
+        problems.append(Problem(str(opened.path), "observed gears", ", ".join(opened.observed) or "none", remedy))
     own: Mapping[str, PortSpec] = opened.model.stage.ports
     try:
         drive = drive_of(scene, opened.model.stage)
@@ -72,15 +76,6 @@ def _usual(scene: SceneSpec) -> Stage | None:
         return load_stage(scene.stage.name)
     except SpecError:
         return None
-
-
-def _recording(scene: SceneSpec, opened: OpenedFmu, export: str) -> Iterator[Problem]:
-    gears = scene.deformation.gears if scene.deformation is not None else ()
-    missing = [gear for gear in gears if gear not in opened.observed]
-    if missing:
-        shown = ", ".join(opened.observed) or "none"
-        remedy = f"scene {scene.name} records how {', '.join(missing)} moves: {export}, or with --observe {missing[0]}"
-        yield Problem(str(opened.path), "observed gears", shown, remedy)
 
 
 def _misfits(scene: SceneSpec, opened: OpenedFmu, name: str, wanted: PortSpec, export: str) -> Iterator[Problem]:

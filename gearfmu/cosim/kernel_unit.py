@@ -4,19 +4,21 @@ makes the unit of a run."""
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.units import RowLog, Variable
+from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel
+
+if TYPE_CHECKING:
+    from gearfmu.cosim.fmu_unit import FmuUnit
 
 
 class KernelHandle(NamedTuple):
@@ -26,6 +28,24 @@ class KernelHandle(NamedTuple):
     references: Any  # ctypes array of unsigned 32-bit integers
     values: Any  # ctypes array that the kernel reads and fills
     buffer: np.ndarray  # the same memory
+
+
+class RowLog:
+    """Rows of what `read` gives, (names,), at up to `points` times."""
+
+    def __init__(self, read: Callable[[], np.ndarray], names: int, points: int) -> None:
+        self._read, self._table, self._count = read, np.zeros((points, names)), 0
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+        if self._count == len(self._table):
+            raise CouplingError(f"the log holds {self._count} times and no more")
+        self._table[self._count] = self._read()
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+        return self._table[: self._count]
 
 
 class KernelUnit:
@@ -132,4 +152,6 @@ class Source:
         """A fresh instance with these start values."""
         if self.fmu_path is None:
             return KernelUnit(self.model.blob, parameters)
+        from gearfmu.cosim.fmu_unit import FmuUnit
+
         return FmuUnit(self.fmu_path, parameters)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.linalg import expm
@@ -131,27 +132,12 @@ class Dynamics:
         self.states = 2 * self.n + self.n_driven
         self.inputs = self.n + self.n_clutches + self.n_driven + 1
         self.output_names = _output_names(network)
-        self._modes: dict[Mode, ModeMatrices] = {}
-        self._transitions: dict[tuple[Mode, float], np.ndarray] = {}
-
-    def matrices(self, mode: Mode) -> ModeMatrices:
-        """Matrices of one mode."""
-        if mode not in self._modes:
-            self._modes[mode] = self._build(mode)
-        return self._modes[mode]
-
-    def transition(self, mode: Mode, h: float) -> np.ndarray:
-        """S (states, states + 2·inputs) with x(h) = S [x(0), u(0), u(h)], exact for an input that is linear in time."""
-        key = (mode, h)
-        if key not in self._transitions:
-            if len(self._transitions) >= CACHE_SIZE:
-                self._transitions.clear()
-            self._transitions[key] = self.transition_once(mode, h)
-        return self._transitions[key]
+        self.matrices = cache(self._build)  # of one mode
+        self.transition = lru_cache(maxsize=CACHE_SIZE)(self.transition_once)  # kept; at an event it is used once
 
     def transition_once(self, mode: Mode, h: float) -> np.ndarray:
-        """As `transition`, without keeping it (for steps that end at an event). Van Loan, IEEE Trans. Autom. Control
-        23 (1978) 395."""
+        """S (states, states + 2·inputs) with x(h) = S [x(0), u(0), u(h)], exact for an input that is linear in time.
+        Van Loan, IEEE Trans. Autom. Control 23 (1978) 395."""
         m, nx, nu = self.matrices(mode), self.states, self.inputs
         block = np.zeros((nx + 2 * nu, nx + 2 * nu))
         block[:nx, :nx], block[:nx, nx : nx + nu] = m.a * h, m.b * h

@@ -23,7 +23,7 @@ class State:
     motion: np.ndarray  # (d, 3) φ, w, a of the driven nodes at the start of the step
     tau_mean: np.ndarray  # (d,) N·m
     work: float  # J, of the motion ports on the network since the start
-    events: tuple[Event, ...]
+    events: tuple[Event, ...]  # when a clutch locked or slipped, or a backlash closed or opened, in order
 
     def copy(self) -> State:
         """The same values, from now on their own."""

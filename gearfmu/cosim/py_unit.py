@@ -114,11 +114,6 @@ class PyUnit:
         """Back to a saved state."""
         self.state = state.copy()
 
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """Instants at which a clutch locked or slipped or a backlash closed or opened, in order."""
-        return self.state.events
-
     # -- variables -----------------------------------------------------------------------------------------------------
     def resolve(self, names: Sequence[str]) -> Handle:
         """Handle of variables; raises CouplingError with the known names."""

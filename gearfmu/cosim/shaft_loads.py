@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.drive import Drive, Loads, frequencies_of
+from gearfmu.cosim.kernel_unit import RowLog
 from gearfmu.cosim.signals import Ramp
-from gearfmu.cosim.units import RowLog, Unit, Variable
+from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import Problem, SpecError
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-
-from gearfmu.errors import CouplingError
 
 
 class Variable(NamedTuple):
@@ -27,24 +25,6 @@ class Log(Protocol):
 
     def rows(self) -> np.ndarray:
         """(times, names) kept so far."""
-
-
-class RowLog:
-    """Rows of what `read` gives, (names,), at up to `points` times."""
-
-    def __init__(self, read: Callable[[], np.ndarray], names: int, points: int) -> None:
-        self._read, self._table, self._count = read, np.zeros((points, names)), 0
-
-    def take(self) -> None:
-        """Keep the present outputs."""
-        if self._count == len(self._table):
-            raise CouplingError(f"the log holds {self._count} times and no more")
-        self._table[self._count] = self._read()
-        self._count += 1
-
-    def rows(self) -> np.ndarray:
-        """(times, names) kept so far."""
-        return self._table[: self._count]
 
 
 class Recorded(Protocol):

@@ -92,6 +92,11 @@ class _Made:
         speed = self.part.speed
         known = Conditions(job.model, job.request, full.force, speed, mesh_frequency(job.model, speed), full)
         found, priced, notes = self._search(known, safety)
+        if full.loses_contact and noise.split > QUIET:
+            notes.append(
+                f"noise floor: two halves of the full model's window differ by {noise.split:.2g} budgets: no window up "
+                f"to {LONGEST:g} s, or in the part, says more"
+            )
         own = self._own()
         lines = tuple(self._lines(found, known, safety))
         return Segment(
@@ -114,7 +119,7 @@ class _Made:
             error(own.signals, full.signals, job.request).whole,
             lines,
             self._points(found.chosen, own),
-            (*notes, *_noise_notes(noise, full.loses_contact)),
+            tuple(notes),
         )
 
     def _noise(self, noise: Noise) -> float:
@@ -231,11 +236,3 @@ def _setting(knob: Knob, choice: Choice) -> str:
     """What a choice says of a knob."""
     ladders = {MODES: choice.level, STEP: f"{1e6 * choice.h:.3g} µs", SLICED: str(choice.slices)}
     return ladders.get(knob.name, "off" if knob.name in choice.off else "on")
-
-
-def _noise_notes(noise: Noise, lost: bool) -> Iterator[str]:
-    if lost and noise.split > QUIET:
-        yield (
-            f"noise floor: two halves of the full model's window differ by {noise.split:.2g} budgets: no window up to "
-            f"{LONGEST:g} s, or in the part, says more"
-        )

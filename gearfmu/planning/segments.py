@@ -55,19 +55,13 @@ def parts(scene: SceneSpec, model: StageModel, request: Request) -> Iterator[Par
     edges = cuts(trace, model)
     for number, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
         speed = float(np.mean(np.abs(_speed(trace, model)[(trace.time >= start) & (trace.time <= end)])))
-        yield _transient(f"part {number + 1}", (start, end), scene, (model, request, speed, torque))
-
-
-def _transient(
-    name: str, span: tuple[float, float], scene: SceneSpec, known: tuple[StageModel, Request, float, float]
-) -> Part:
-    """A part of a transient scene; its window lies in it, after settling where it is long enough."""
-    start, end = span
-    length, settle = first_window(*known)
-    room = end - start
-    settle = min(settle, 0.4 * room)
-    length = min(whole_periods(scene, known[0], max(length, min(LOOKED_AT, room))), room - settle)
-    return Part(name, start, end, "transient", Window(start + settle, length, settle), room - settle, known[2])
+        length, settle = first_window(model, request, speed, torque)
+        room = end - start
+        settle = min(settle, 0.4 * room)
+        longest = room - settle
+        length = min(whole_periods(scene, model, max(length, min(LOOKED_AT, room))), longest)
+        window = Window(start + settle, length, settle)  # in the part, after settling where it is long enough
+        yield Part(f"part {number + 1}", start, end, "transient", window, longest, speed)
 
 
 def _pilot_run(scene: SceneSpec, model: StageModel) -> Trace:

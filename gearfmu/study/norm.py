@@ -107,18 +107,18 @@ STOPPED = Errors(float("nan"), float("nan"), float("nan"), float("nan"))
 
 def errors(found: Signals, wanted: Signals) -> Errors:
     """Errors of a run against a reference of the same samples; NaN when it stopped early."""
-    samples = len(wanted.te)
-    if len(found.te) != samples:
+    if len(found.te) != len(wanted.te):
         return STOPPED
-    te, mean = _relative(found.te.reshape(samples, -1), wanted.te.reshape(samples, -1), wanted)
-    force, _ = _relative(found.force.reshape(samples, -1), wanted.force.reshape(samples, -1), wanted)
+    te, mean = _relative(found.te, wanted.te, wanted)
+    force, _ = _relative(found.force, wanted.force, wanted)
     first = range(0, wanted.bearing.shape[1], 2)
     sides = [_relative(found.bearing[:, k : k + 2], wanted.bearing[:, k : k + 2], wanted)[0] for k in first]
     return Errors(te, mean, force, max(sides))
 
 
 def _relative(found: np.ndarray, wanted: np.ndarray, scale: Signals) -> tuple[float, float]:
-    """Errors of alternating part and mean of (n, k) components of one quantity, root of the sum of squares."""
+    """Errors of alternating part and mean of (n,) or (n, k) components of one quantity, root of the sum of squares."""
+    found, wanted = (values.reshape(len(values), -1) for values in (found, wanted))
     ac = [alternating(column, scale.interval, scale.steady) for column in wanted.T]
     size = float(np.sqrt(sum(rms(column) ** 2 for column in ac)))
     difference = found - wanted

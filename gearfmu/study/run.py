@@ -70,35 +70,27 @@ class Job:
         return window(self.scene, self.quick)
 
 
-@dataclass(frozen=True)
-class _Bench:
-    """What every point of a scene shares in one process."""
-
-    scene: SceneSpec
-    model: StageModel
-    base: Run
-
-
 @lru_cache(maxsize=1)
-def _bench(text: str) -> _Bench:
+def _bench(text: str) -> tuple[SceneSpec, StageModel, Run]:
+    """What every point of a scene shares in one process: scene, model, the run that prices are compared with."""
     scene = SceneSpec.model_validate_json(text)
     model = models_for(scene)
-    return _Bench(scene, model, measure(scene, model, base_point(scene)))
+    return scene, model, measure(scene, model, base_point(scene))
 
 
 def _price_of(text: str, point: Point) -> tuple[Run, Price] | str:
     """A measured point without its recording, or why the kernel refuses it."""
-    bench = _bench(text)
+    scene, model, base = _bench(text)
     try:
-        run = measure(bench.scene, bench.model, point)
+        run = measure(scene, model, point)
     except ModelError as error:
         return str(error)
-    return replace(run, recording=None), paired_price(run, bench.base)
+    return replace(run, recording=None), paired_price(run, base)
 
 
 def _reference_of(text: str, slices: int, quick: bool) -> Reference:
-    bench = _bench(text)
-    return make_reference(bench.scene, bench.model, slices, quick)
+    scene, model, _ = _bench(text)
+    return make_reference(scene, model, slices, quick)
 
 
 def identity(scene: SceneSpec, model: StageModel, kernel: str) -> str:

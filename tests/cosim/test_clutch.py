@@ -42,8 +42,8 @@ def test_constant_capacity_locks_at_the_closed_form_instant(slip):
     sign = math.copysign(1.0, slip)
     instant = abs(slip) / (capacity * (1 / J1 + 1 / J2) - sign * drive / J1)
     advance(unit, 1e-2, 100)
-    assert [(event.part, event.what) for event in unit.events] == [("clutch", "lock")]
-    assert unit.events[0].time == pytest.approx(instant, abs=1e-13)
+    assert [(event.part, event.what) for event in unit.state.events] == [("clutch", "lock")]
+    assert unit.state.events[0].time == pytest.approx(instant, abs=1e-13)
     speed, slip_now, torque, locked = unit.get(unit.resolve(["a.w", "clutch.slip", "clutch.tau", "clutch.locked"]))
     assert speed == pytest.approx((J1 * slip + drive * 1.0) / (J1 + J2), abs=1e-11)
     assert abs(slip_now) < 1e-13 and locked == 1.0
@@ -55,7 +55,7 @@ def test_capacity_ramp_locks_at_the_closed_form_instant():
     rate = 900.0
     unit = two_inertias(Ramp(((0.0, 0.0), (1.0, rate))), w1=30.0)
     advance(unit, 3e-3, 200)
-    assert unit.events[0].time == pytest.approx(math.sqrt(2 * 30.0 / (rate * (1 / J1 + 1 / J2))), abs=1e-12)
+    assert unit.state.events[0].time == pytest.approx(math.sqrt(2 * 30.0 / (rate * (1 / J1 + 1 / J2))), abs=1e-12)
 
 
 @pytest.mark.parametrize("peak", [1.0, 1.3])
@@ -65,8 +65,9 @@ def test_breaks_loose_when_the_sticking_torque_exceeds_the_static_capacity(peak)
     unit = two_inertias(Constant(capacity), lambda t, phi, w: rate * t, peak=peak)
     advance(unit, 7e-3, 50)
     instant = peak * capacity * (J1 + J2) / (J2 * rate)
-    assert [event.what for event in unit.events] == ["slip"]
-    assert unit.events[0].time == pytest.approx(instant, abs=1e-10)  # TORQUE_TOLERANCE over the rate of the torque
+    assert [event.what for event in unit.state.events] == ["slip"]
+    rounding = 1e-10  # TORQUE_TOLERANCE over the rate of the torque
+    assert unit.state.events[0].time == pytest.approx(instant, abs=rounding)
     expected = 0.5 * rate * instant**2 / (J1 + J2) + capacity / J2 * (0.35 - instant)
     assert unit.get(unit.resolve(["b.w"]))[0] == pytest.approx(expected, abs=1e-8)
 
@@ -75,8 +76,8 @@ def test_sticks_through_a_reversal_of_torque_and_slips_both_ways():
     """±60 N·m, 1 Hz, against 30 N·m: slips forward, sticks, slips backward, as often as the drive turns over."""
     unit = two_inertias(Constant(30.0), lambda t, phi, w: 60.0 * math.sin(2 * math.pi * t))
     advance(unit, 1e-3, 3000)
-    assert [event.what for event in unit.events] == ["slip", "lock"] * 5 + ["slip"]
-    loose = [event.time for event in unit.events[::2]]
+    assert [event.what for event in unit.state.events] == ["slip", "lock"] * 5 + ["slip"]
+    loose = [event.time for event in unit.state.events[::2]]
     assert loose[0] == pytest.approx(math.asin(30.0 * (J1 + J2) / J2 / 60.0) / (2 * math.pi), abs=1e-6)
 
 
@@ -84,7 +85,7 @@ def test_a_jump_of_capacity_between_steps_is_exact():
     """Nothing before the jump, the closed form after it."""
     unit = two_inertias(Ramp(((0.1, 0.0), (0.1, 20.0))), w1=10.0)
     advance(unit, 1e-2, 100)
-    assert unit.events[0].time == pytest.approx(0.1 + 10.0 / (20.0 * (1 / J1 + 1 / J2)), abs=1e-12)
+    assert unit.state.events[0].time == pytest.approx(0.1 + 10.0 / (20.0 * (1 / J1 + 1 / J2)), abs=1e-12)
 
 
 @settings(max_examples=30)

@@ -49,7 +49,7 @@ def run() -> tuple[PyUnit, dict[str, list[float]]]:
 
 def test_events_within_1e_4_s(run):
     """Every lock and slip that Dymola reports happens, at its instant."""
-    events = run[0].events
+    events = run[0].state.events
     expected = [
         ("clutch1", "lock", "clutch1_lock"),
         ("clutch1", "slip", "clutch1_slip"),
@@ -65,7 +65,7 @@ def test_events_within_1e_4_s(run):
 
 def test_nothing_else_happens(run):
     """Between 0.4 s and 1.25 s there are exactly the events of the reference."""
-    after = [(event.part, event.what) for event in run[0].events if 0.5 < event.time < 1.25]
+    after = [(event.part, event.what) for event in run[0].state.events if 0.5 < event.time < 1.25]
     assert after == [
         ("clutch2", "lock"),
         ("clutch1", "lock"),

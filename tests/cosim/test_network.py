@@ -72,7 +72,7 @@ def test_rattle_between_two_flanks_has_the_closed_form_period():
     before = energy_of(unit)
     for n in range(200):
         unit.step(n * 1e-3, 1e-3)
-    closings = [event.time for event in unit.events if event.what != "open"]
+    closings = [event.time for event in unit.state.events if event.what != "open"]
     first, period = contact_start(unit), contact + flight
     assert len(closings) > 400
     assert np.allclose(closings, first + period * np.arange(len(closings)), rtol=0, atol=1e-9)
@@ -80,7 +80,7 @@ def test_rattle_between_two_flanks_has_the_closed_form_period():
 
 
 def contact_start(unit: PyUnit) -> float:
-    return next(event.time for event in unit.events if event.what != "open")
+    return next(event.time for event in unit.state.events if event.what != "open")
 
 
 def test_prescribed_motion_through_a_spring_has_its_closed_form():
@@ -152,10 +152,10 @@ def test_restored_state_gives_the_same_bits():
         return b"".join(rows)
 
     first = onward(unit)
-    events = unit.events
+    events = unit.state.events
     unit.restore(state)
-    assert unit.events == tuple(event for event in events if event.time <= 0.015)
-    assert onward(unit) == first and unit.events == events
+    assert unit.state.events == tuple(event for event in events if event.time <= 0.015)
+    assert onward(unit) == first and unit.state.events == events
     other.restore(state)
     assert onward(other) == first
     assert len(unit.get(handle)) == len(names)

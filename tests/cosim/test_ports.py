@@ -58,7 +58,7 @@ def test_ahead_changes_nothing():
         ports.begin(0.0)
         before, motion = unit.state.x.copy(), np.zeros(3 * len(ports.tau))
         ports.ahead(0.0, 1e-3, motion)
-        assert np.array_equal(unit.state.x, before) and unit.state.time == 0.0 and unit.events == ()
+        assert np.array_equal(unit.state.x, before) and unit.state.time == 0.0 and unit.state.events == ()
 
 
 def test_ahead_ends_where_the_step_ends():
@@ -101,6 +101,6 @@ def test_log_gives_what_get_gives(kind):
         log.take()
         rows.append(unit.get(handle).copy())
         unit.step(n * 2e-4, 2e-4)
-    assert kind != "clutch" or unit.events
+    assert kind != "clutch" or unit.state.events
     scale = np.abs(rows).max(axis=0)
     assert np.all(np.abs(log.rows() - rows) <= 1e-12 * (1.0 + scale))  # accelerations: rounding of terms that cancel

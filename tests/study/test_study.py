@@ -16,11 +16,12 @@ from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu.kernel import Kernel
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.teeth import ROLLS
-from gearfmu.study import Job, ReferenceRow, Row, bench, study
+from gearfmu.study import bench
 from gearfmu.study.bench import Point, Price, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.norm import errors as errors_of
-from gearfmu.study.table import read_rows, write_rows
+from gearfmu.study.run import Job, study
+from gearfmu.study.table import ReferenceRow, Row, read_rows, write_rows
 
 COLUMNS = (
     "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
