@@ -12,6 +12,7 @@ from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
+    LOAD_RULE,
     PITCH_SPEED,
     STRIP_PER_MODULE,
     Draft,
@@ -97,12 +98,12 @@ def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     ratio = gears[1].teeth / gears[0].teeth
     torques = [shaft_torque(model, gear.component) for gear in gears]
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
-    why = "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"
-    known = (found, "REXS external_load, the largest of all load cases")
-    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), why))
+    known = (found and rounded_up(found, 3), "REXS external_load, the largest of all load cases")
+    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), LOAD_RULE))
     put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     speeds = [shaft_speed(model, gear.component) for gear in gears]
-    known = (speeds[0] or (speeds[1] * ratio if speeds[1] else None), "REXS shaft, the largest of all load cases")
+    found = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
+    known = (found and rounded_up(found, 4), "REXS shaft, the largest of all load cases")
     put_limit(draft, "speed_max", known, (PITCH_SPEED / gears[0].reference_radius, "20 m/s at the reference circle"))
 
 

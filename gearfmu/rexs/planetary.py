@@ -224,9 +224,9 @@ def _put_loads(
     ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
     sharing: Any = draft.at("set.load_sharing")
-    known = (torque and torque * ratio, "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
+    known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
     assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
     put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
-    known = (speed and speed / ratio, "REXS shaft of the sun, over 1 + z_ring/z_sun")
+    known = (speed and rounded_up(speed / ratio, 4), "REXS shaft of the sun, over 1 + z_ring/z_sun")
     assumed = PITCH_SPEED / sun.reference_radius / ratio
     put_limit(draft, "speed_max", known, (assumed, "20 m/s at the sun's reference circle"))
