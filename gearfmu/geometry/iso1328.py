@@ -29,8 +29,8 @@ class Tolerances:
 
     @classmethod
     def of(cls, tolerance_class: int, reference_diameter: float, module: float, face_width: float) -> Tolerances:
-        """Class A = 1 … 11, reference diameter d, normal module m_n and face width b in m: formulas (5) to
-        (7) and (10)."""
+        """Class A = 1 … 11, reference diameter d, normal module m_n and face width b in m: formulas (5)
+        to (7) and (10)."""
         d, m, b = (length / _MM for length in (reference_diameter, module, face_width))
         step = math.sqrt(2.0) ** (tolerance_class - 5)
         cumulative = 0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12

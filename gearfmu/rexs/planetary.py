@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry.mesh import MOUNTS, set_ratio
@@ -223,7 +222,7 @@ def _put_loads(
     sun, planet, ring = gears
     ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
-    sharing: Any = draft.at("set.load_sharing")
+    sharing = draft.at("set.load_sharing")
     known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
     assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
     put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
