@@ -265,25 +265,18 @@ def _missing_files(layers: Layers) -> list[Problem]:
     with the stage file."""
     return [
         Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
-        for place, section in _sections(layers.tables).items()
+        for place, section in _sections(layers.tables)
         for field in FILES
         if isinstance(name := section.get(field), str) and name
         if not (path := layers.named(f"{place}.{field}", name)).is_file()
     ]
 
 
-def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The tables `import` and `reduced` of a stage file by their place."""
-    bodies = {
-        f"{group}.{name}": table
-        for group in ("gears", "bodies")
-        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
-    }
-    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
-    found = {
-        f"{place}.{key}": table.get(key)
-        for place, table in bodies.items()
-        if isinstance(table, dict)
-        for key in ("import", "reduced")
-    }
-    return {place: section for place, section in found.items() if isinstance(section, dict)}
+def _sections(tables: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Place and table of every `import` and `reduced` of a stage file."""
+    groups = {"gears.": tables.get("gears"), "bodies.": tables.get("bodies")}
+    for prefix, bodies in (groups | {"": {name: tables.get(name) for name in (*HANDS, "carrier")}}).items():
+        for name, table in bodies.items() if isinstance(bodies, dict) else ():
+            for key in ("import", "reduced") if isinstance(table, dict) else ():
+                if isinstance(section := table.get(key), dict):
+                    yield f"{prefix}{name}.{key}", section
