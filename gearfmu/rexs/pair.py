@@ -32,10 +32,12 @@ def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Compon
     """The draft of a pair; what cannot be read is in the model's problems."""
     read = [gear_of(model, component) for component in pair]
     distance = model.si(stage, "center_distance", "m")
-    if not distance:
+    if distance is None:
         model.refuse(stage, "center_distance", "", "this attribute is missing: add it")
+    elif distance <= 0.0:
+        model.refuse(stage, "center_distance", f"{1e3 * distance:g} mm", "must be above zero: both gears are external")
     gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
-    if len(gears) < 2 or not distance:
+    if len(gears) < 2 or distance is None or distance <= 0.0:
         return Draft({})
     draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
     _put_pair(model, draft, stage, gears)

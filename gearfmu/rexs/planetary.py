@@ -35,7 +35,9 @@ def draft_set(model: RexsModel, stage: Component) -> Draft:
     found = _parts(model, meshes)
     distance = _distance(model, meshes)
     if found is None or distance is None:
-        remedy = "needs cylindrical_stage parts with a center_distance that join one sun, planets and one ring_gear"
+        remedy = (
+            "needs cylindrical_stage parts with a center_distance, not zero, that join one sun, planets and a ring_gear"
+        )
         model.problems.append(Problem(str(model.path), str(stage), "", remedy))
         return Draft({})
     components, planets = found
@@ -86,7 +88,7 @@ def _distance(model: RexsModel, meshes: list[Component]) -> float | None:
         shown = f"{1e3 * min(found):g} to {1e3 * max(found):g} mm"
         remedy = "sun and ring have the same distance to all planets here"
         model.refuse(meshes[0], "center_distance", shown, remedy)
-    return found[0] if found else None
+    return found[0] if found and all(found) else None
 
 
 def _check_planets(model: RexsModel, planets: list[Component], first: RexsGear) -> None:
