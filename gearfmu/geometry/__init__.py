@@ -4,6 +4,5 @@ from __future__ import annotations
 
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.mesh import PairGeometry
-from gearfmu.geometry.relief import ReliefCurve
 
-__all__ = ["GearGeometry", "PairGeometry", "ReliefCurve"]
+__all__ = ["GearGeometry", "PairGeometry"]

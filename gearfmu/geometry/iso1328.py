@@ -19,33 +19,23 @@ _MM, _UM = 1e-3, 1e-6
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Of one gear and class, m: single pitch f_pT, total cumulative pitch F_pT, profile slope f_HαT (±) and form f_fαT,
-    total profile F_αT, helix slope f_HβT (±) and form f_fβT, total helix F_βT, runout F_rT."""
+    """Of one gear and class, m: single pitch f_pT, total cumulative pitch F_pT, profile slope f_HαT (±), helix slope
+    f_HβT (±)."""
 
     single_pitch: float
     cumulative_pitch: float
     profile_slope: float
-    profile_form: float
-    profile: float
     helix_slope: float
-    helix_form: float
-    helix: float
-    runout: float
 
     @classmethod
     def of(cls, tolerance_class: int, reference_diameter: float, module: float, face_width: float) -> Tolerances:
-        """Class A = 1 … 11, reference diameter d, normal module m_n and face width b in m: formulas (5) to (12) and
-        F_rT = 0.9 F_pT."""
+        """Class A = 1 … 11, reference diameter d, normal module m_n and face width b in m: formulas (5)
+        to (7) and (10)."""
         d, m, b = (length / _MM for length in (reference_diameter, module, face_width))
         step = math.sqrt(2.0) ** (tolerance_class - 5)
         cumulative = 0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12
-        profile = (0.4 * m + 0.001 * d + 4, 0.55 * m + 5)
-        helix = (0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4, 0.07 * math.sqrt(d) + 0.45 * math.sqrt(b) + 4)
-        exact = (
-            0.001 * d + 0.4 * m + 5, cumulative, *profile, math.hypot(*profile), *helix, math.hypot(*helix),
-            0.9 * cumulative,
-        )  # fmt: skip
-        return cls(*(_UM * rounded(step * value) for value in exact))
+        profile, helix = 0.4 * m + 0.001 * d + 4, 0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4
+        return cls(*(_UM * rounded(step * value) for value in (0.001 * d + 0.4 * m + 5, cumulative, profile, helix)))
 
 
 def rounded(tolerance: float) -> float:

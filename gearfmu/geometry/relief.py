@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -25,17 +24,9 @@ def relief_depth(kind: Kind, amount: float, length: float, share: np.ndarray) ->
     return along**2 / (radius + np.sqrt(radius**2 - along**2))
 
 
-@dataclass(frozen=True)
-class ReliefCurve:
-    """Relief δ(s), of size `amount` (m) at the roll `end` and nothing before `start` (ISO 21771: tip relief C_a, root
-    relief C_f); `end` may lie on either side of `start`. Shapes: `relief_depth`."""
-
-    amount: float
-    start: float
-    end: float
-    kind: Kind = "parabolic"
-
-    def depth(self, roll: ArrayLike) -> np.ndarray:
-        """δ (m), positive into the tooth, at rolls of any shape."""
-        share = np.maximum((np.asarray(roll, float) - self.start) / (self.end - self.start), 0.0)
-        return relief_depth(self.kind, self.amount, abs(self.end - self.start), share)
+def relief_at(roll: ArrayLike, amount: float, start: float, end: float, kind: Kind = "parabolic") -> np.ndarray:
+    """Relief δ (m), positive into the tooth, at rolls of any shape: `amount` (m) at the roll `end`, nothing before
+    `start` (ISO 21771: tip relief C_a, root relief C_f), on either side of which `end` may lie. Shapes: `relief_depth`.
+    """
+    share = np.maximum((np.asarray(roll, float) - start) / (end - start), 0.0)
+    return relief_depth(kind, amount, abs(end - start), share)

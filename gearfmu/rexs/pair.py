@@ -12,6 +12,7 @@ from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
+    LOAD_RULE,
     PITCH_SPEED,
     STRIP_PER_MODULE,
     Draft,
@@ -31,10 +32,12 @@ def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Compon
     """The draft of a pair; what cannot be read is in the model's problems."""
     read = [gear_of(model, component) for component in pair]
     distance = model.si(stage, "center_distance", "m")
-    if not distance:
+    if distance is None:
         model.refuse(stage, "center_distance", "", "this attribute is missing: add it")
+    elif distance <= 0.0:
+        model.refuse(stage, "center_distance", f"{1e3 * distance:g} mm", "must be above zero: both gears are external")
     gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
-    if len(gears) < 2 or not distance:
+    if len(gears) < 2 or distance is None or distance <= 0.0:
         return Draft({})
     draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
     _put_pair(model, draft, stage, gears)
@@ -97,12 +100,12 @@ def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     ratio = gears[1].teeth / gears[0].teeth
     torques = [shaft_torque(model, gear.component) for gear in gears]
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
-    why = "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"
-    known = (found, "REXS external_load, the largest of all load cases")
-    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), why))
+    known = (found and rounded_up(found, 3), "REXS external_load, the largest of all load cases")
+    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), LOAD_RULE))
     put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     speeds = [shaft_speed(model, gear.component) for gear in gears]
-    known = (speeds[0] or (speeds[1] * ratio if speeds[1] else None), "REXS shaft, the largest of all load cases")
+    found = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
+    known = (found and rounded_up(found, 4), "REXS shaft, the largest of all load cases")
     put_limit(draft, "speed_max", known, (PITCH_SPEED / gears[0].reference_radius, "20 m/s at the reference circle"))
 
 

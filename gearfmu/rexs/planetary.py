@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry.mesh import MOUNTS, set_ratio
@@ -36,7 +35,9 @@ def draft_set(model: RexsModel, stage: Component) -> Draft:
     found = _parts(model, meshes)
     distance = _distance(model, meshes)
     if found is None or distance is None:
-        remedy = "needs cylindrical_stage parts with a center_distance that join one sun, planets and one ring_gear"
+        remedy = (
+            "needs cylindrical_stage parts with a center_distance, not zero, that join one sun, planets and a ring_gear"
+        )
         model.problems.append(Problem(str(model.path), str(stage), "", remedy))
         return Draft({})
     components, planets = found
@@ -87,7 +88,7 @@ def _distance(model: RexsModel, meshes: list[Component]) -> float | None:
         shown = f"{1e3 * min(found):g} to {1e3 * max(found):g} mm"
         remedy = "sun and ring have the same distance to all planets here"
         model.refuse(meshes[0], "center_distance", shown, remedy)
-    return found[0] if found else None
+    return found[0] if found and all(found) else None
 
 
 def _check_planets(model: RexsModel, planets: list[Component], first: RexsGear) -> None:
@@ -223,10 +224,10 @@ def _put_loads(
     sun, planet, ring = gears
     ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
-    sharing: Any = draft.at("set.load_sharing")
-    known = (torque and torque * ratio, "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
+    sharing = draft.at("set.load_sharing")
+    known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
     assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
     put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
-    known = (speed and speed / ratio, "REXS shaft of the sun, over 1 + z_ring/z_sun")
+    known = (speed and rounded_up(speed / ratio, 4), "REXS shaft of the sun, over 1 + z_ring/z_sun")
     assumed = PITCH_SPEED / sun.reference_radius / ratio
     put_limit(draft, "speed_max", known, (assumed, "20 m/s at the sun's reference circle"))

@@ -264,26 +264,24 @@ def _missing_files(layers: Layers) -> list[Problem]:
     """A problem for every file that a section `import` or `reduced` names and that is not there, whatever else is wrong
     with the stage file."""
     return [
-        Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
-        for place, section in _sections(layers.tables).items()
-        for field in FILES
-        if isinstance(name := section.get(field), str) and name
-        if not (path := layers.named(f"{place}.{field}", name)).is_file()
+        Problem(str(layers.path), field, name, f"no file {path}: write it relative to the stage file")
+        for field, name, path in named_files(layers)
+        if not path.is_file() and not field.endswith(".topography")
     ]
 
 
-def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The tables `import` and `reduced` of a stage file by their place."""
-    bodies = {
-        f"{group}.{name}": table
-        for group in ("gears", "bodies")
-        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
-    }
-    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
-    found = {
-        f"{place}.{key}": table.get(key)
-        for place, table in bodies.items()
-        if isinstance(table, dict)
-        for key in ("import", "reduced")
-    }
-    return {place: section for place, section in found.items() if isinstance(section, dict)}
+def named_files(layers: Layers) -> Iterator[tuple[str, str, Path]]:
+    """Field, text and path of every file that a stage file names for its bodies."""
+    tables = layers.tables
+    groups = {"gears.": tables.get("gears"), "bodies.": tables.get("bodies")}
+    for prefix, bodies in (groups | {"": {name: tables.get(name) for name in (*HANDS, "carrier")}}).items():
+        for name, table in bodies.items() if isinstance(bodies, dict) else ():
+            if not isinstance(table, dict):
+                continue
+            sections: dict[str, Any] = {"": {"topography": table.get("topography")}}
+            sections |= {f"{key}.": table.get(key) for key in ("import", "reduced")}
+            for inner, section in sections.items():
+                for field in ("topography", *FILES) if isinstance(section, dict) else ():
+                    if isinstance(text := section.get(field), str) and text:
+                        place = f"{prefix}{name}.{inner}{field}"
+                        yield place, text, layers.named(place, text)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from fzg import PAIR, PINION, WHEEL, gear
 
-from gearfmu.geometry import PairGeometry, ReliefCurve, involute
+from gearfmu.geometry import PairGeometry, involute
 from gearfmu.geometry.mesh import contact_modulus, half_width
+from gearfmu.geometry.relief import relief_at
 
 LOOSE = PairGeometry((PINION, WHEEL), 91.7e-3, 3e-4)
 OTHER = PairGeometry((gear(21, 0.3, 106e-3, 30e-3), gear(34, -0.1, 160e-3, 40e-3)), 124.8e-3, 1e-4)
@@ -115,15 +116,15 @@ def test_a_centre_distance_below_the_base_circles_is_refused() -> None:
 
 def test_reliefs_of_all_kinds_reach_their_amount_at_the_tip() -> None:
     start, kinds = PAIR.outer_single_contact(0), ("linear", "parabolic", "arc")
-    linear, parabolic, arc = (ReliefCurve(15e-6, start, PINION.s_a, kind) for kind in kinds)
-    for curve in (linear, parabolic, arc):
-        assert curve.depth(PINION.s_a) == pytest.approx(15e-6, rel=1e-12)
-        assert (curve.depth(start), curve.depth(1e-3)) == (0, 0)
     roll = np.linspace(start, PINION.s_a, 50)
-    assert linear.depth(roll) ** 2 == pytest.approx(15e-6 * parabolic.depth(roll), abs=1e-24)
+    linear, parabolic, arc = (relief_at(roll, 15e-6, start, PINION.s_a, kind) for kind in kinds)
+    for depth in (linear, parabolic, arc):
+        assert (depth[0], depth[-1]) == (0, pytest.approx(15e-6, rel=1e-12))
+    assert all(relief_at(1e-3, 15e-6, start, PINION.s_a, kind) == 0 for kind in kinds), "nothing before the start"
+    assert linear**2 == pytest.approx(15e-6 * parabolic, abs=1e-24)
     radius = ((PINION.s_a - start) ** 2 + 15e-6**2) / (2 * 15e-6)  # tangent where it begins, its centre below
-    assert (roll - start) ** 2 + (radius - arc.depth(roll)) ** 2 == pytest.approx(np.full(50, radius**2), rel=1e-15)
-    assert arc.depth(roll) == pytest.approx(parabolic.depth(roll), abs=1e-9)
+    assert (roll - start) ** 2 + (radius - arc) ** 2 == pytest.approx(np.full(50, radius**2), rel=1e-15)
+    assert arc == pytest.approx(parabolic, abs=1e-9)
 
 
 def test_hertz_half_width_is_consistent_with_its_peak_pressure() -> None:

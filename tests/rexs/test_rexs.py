@@ -173,6 +173,19 @@ def test_planets_that_differ_are_refused(tmp_path: Path) -> None:
         draft_from_rexs(path)
 
 
+@pytest.mark.parametrize(
+    "path, distance, why",
+    [
+        (PAIR, "-91.5", "-91.5 mm: must be above"),
+        (PAIR, "0", "0 mm: must"),
+        (SET, "0", "needs cylindrical_stage parts"),
+    ],
+)
+def test_a_centre_distance_that_no_stage_has_is_refused(tmp_path: Path, path: Path, distance: str, why: str) -> None:
+    with pytest.raises(SpecError, match=why):
+        draft_from_rexs(changed(tmp_path, path, (r'(id="center_distance" unit="mm">)[-\d.]+', rf"\g<1>{distance}")))
+
+
 def test_planets_that_are_not_equally_spaced_keep_their_places(tmp_path: Path) -> None:
     path = changed(tmp_path, SET, (r'("rotating_angle_around_neg_u_axis" unit="deg">)180', r"\g<1>185"))
     assert stage_of(path, tmp_path).set.positions == (0, 18, 37, 54)

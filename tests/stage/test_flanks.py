@@ -16,7 +16,7 @@ from by_hand import Pair
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.relief import ReliefCurve
+from gearfmu.geometry.relief import relief_at
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
 from gearfmu.stage.assembly.blob import read_blob, write_blob
@@ -70,7 +70,7 @@ def depth_by_hand(gear: GearSpec, shape: GearGeometry, roll: float) -> float:
         depth += gear.profile.crowning * x**2 - gear.profile.slope * x / 2
     for relief, end in ((gear.tip_relief, shape.s_a), (gear.root_relief, shape.s_form)):
         if relief is not None:
-            depth += float(ReliefCurve(relief.amount, float(relief.start_roll), end, relief.kind).depth(roll))
+            depth += float(relief_at(roll, relief.amount, float(relief.start_roll), end, relief.kind))
     return depth
 
 

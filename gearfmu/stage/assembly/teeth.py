@@ -19,7 +19,7 @@ from gearfmu.body import Body
 from gearfmu.body.body import Flank
 from gearfmu.errors import ModelError
 from gearfmu.geometry.iso1328 import Draw, Tolerances, draw, seed_of
-from gearfmu.geometry.relief import ReliefCurve, relief_depth
+from gearfmu.geometry.relief import relief_at, relief_depth
 from gearfmu.stage.assembly.blob import gear_numbers
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape
@@ -201,10 +201,10 @@ class FlankField:
             material += gear.profile.slope * x / 2 - gear.profile.crowning * x**2
         if gear.tip_relief is not None and gear.tip_relief.kind != "parabolic":
             tip = gear.tip_relief
-            material -= ReliefCurve(tip.amount, tip.start_roll, shape.s_a, tip.kind).depth(roll)
+            material -= relief_at(roll, tip.amount, tip.start_roll, shape.s_a, tip.kind)
         if gear.root_relief is not None:
             root = gear.root_relief
-            material -= ReliefCurve(root.amount, root.start_roll, shape.s_form, root.kind).depth(roll)
+            material -= relief_at(roll, root.amount, root.start_roll, shape.s_form, root.kind)
         return material
 
     def _height(self, roll: np.ndarray) -> np.ndarray:
@@ -254,7 +254,7 @@ class FlankField:
             whole = whole - np.array([np.interp(z, x, side) for side in lead["lead0"]])[None, :, :, None]
         relief = self.gear.tip_relief
         if relief is not None and relief.kind == "parabolic":
-            whole = whole - ReliefCurve(relief.amount, relief.start_roll, self.shape.s_a).depth(roll)
+            whole = whole - relief_at(roll, relief.amount, relief.start_roll, self.shape.s_a)
         return whole
 
     @property

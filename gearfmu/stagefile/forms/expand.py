@@ -200,7 +200,7 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
 
 def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
-    common: dict[str, Any] = {"backlash": spec.set.backlash, **_contact(spec.contact)}
+    common = _contact(spec.contact) | {"backlash": spec.set.backlash}
     torque, relative = spec.mesh_torque, (spec.speed_max or 0.0) * z_r  # teeth past a planet in the carrier's axes
     moves = spec.contact is not None and spec.speed_max is not None
     made = EngagementSpec if moves else partial(EngagementSpec.model_construct, misalignment=None)

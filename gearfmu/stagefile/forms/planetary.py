@@ -42,7 +42,7 @@ from gearfmu.stagefile.tables.connections import (
     SupportSpec,
 )
 from gearfmu.stagefile.tables.housing import HousingBody, Method
-from gearfmu.stagefile.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
+from gearfmu.stagefile.tables.imported import ELSEWHERE, CarrierImportSpec, ImportSpec, RingImportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
@@ -94,9 +94,7 @@ class SetGearSpec(Toothing):
     bearing: Bearing | None = entry(
         "of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion", None
     )
-    imported: ImportSpec | None = entry(
-        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
-    )
+    imported: ImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
 
 class MountsSpec(LaterFields):
@@ -131,9 +129,7 @@ class RingSpec(Toothing):
     modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
     mounts: MountsSpec | None = entry("elastic mounts; none when the table is absent", None)
     body: BodySpec = entry("mesh and reduction")
-    imported: RingImportSpec | None = entry(
-        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
-    )
+    imported: RingImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
 
 class CarrierMeshSpec(Spec):
@@ -174,9 +170,7 @@ class CarrierSpec(Spec):
     modes: Annotated[Count, Whole("carrier_modes")] = entry("number of oscillators stored", 120)
     mesh: CarrierMeshSpec = entry("element counts", default_factory=CarrierMeshSpec)
     bearing: Bearing | None = entry("between its bore and the ground; for motion", None)
-    imported: CarrierImportSpec | None = entry(
-        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
-    )
+    imported: CarrierImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
     def coupling_of(self, interface: str) -> str:
         """Kind of coupling of "bore", "bolt0" …; rigid where the file says nothing."""

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.reading.files import find_stage, read_layers
+from gearfmu.stagefile.reading.files import find_stage, put_at, read_layers
 
 LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
+LOAD_RULE = "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"
 PITCH_SPEED = 20.0  # m/s at the pitch circle
 BACKLASH_PER_MODULE = 0.02
 STRIP_PER_MODULE = 0.12
@@ -53,11 +54,7 @@ class Draft:
 
     def put(self, place: str, value: Any, origin: str) -> None:
         """Write a value, or a whole table, and where it is from."""
-        *way, key = place.split(".")
-        table = self.tables
-        for step in way:
-            table = table.setdefault(step, {})
-        table[key] = value
+        put_at(self.tables, place, value)
         self._mark(tuple(place.split(".")), value, origin)
 
     def assume(self, place: str, value: Any, why: str) -> None:
@@ -107,15 +104,11 @@ def put_shafts(draft: Draft, torques: dict[str, float]) -> None:
 
 
 def put_limit(draft: Draft, field: str, known: tuple[float | None, str], usual: tuple[float, str]) -> float:
-    """Puts `torque_max` (N·m) or `speed_max` (rad/s), rounded up, and returns it: as known, with its origin, else the
-    usual one, with the rule behind it."""
-    unit, digits = {"torque_max": ("N*m", 3), "speed_max": ("rad/s", 4)}[field]
-    if known[0]:
-        value = rounded_up(known[0], digits)
-        draft.put(field, f"{value:g} {unit}", known[1])
-    else:
-        value = rounded_up(usual[0], 2)
-        draft.assume(field, f"{value:g} {unit}", usual[1])
+    """Puts `torque_max` (N·m) or `speed_max` (rad/s), for which the model is made, and returns it: as known, with its
+    origin, else the usual one rounded up, with the rule behind it."""
+    value = known[0] or rounded_up(usual[0], 2)
+    origin = known[1] if known[0] else f"{draft.word}: {usual[1]}"
+    draft.put(field, f"{value:.10g} {'N*m' if field == 'torque_max' else 'rad/s'}", origin)
     return value
 
 

@@ -7,6 +7,7 @@ import os
 import re
 import secrets
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
@@ -18,8 +19,8 @@ from gearfmu.errors import SpecError
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
 from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml
-from gearfmu.stagefile.reading.files import find_stage, read_layers
-from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.reading.files import Layers, find_stage, put_at, read_layers
+from gearfmu.stagefile.stage import load_stage, named_files
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
 _DESCRIPTION = "made like {like}; describe it here in one line"
@@ -41,7 +42,7 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
         text = _renamed(source, name, str(like))
     else:
         own = {"name": name, "description": _DESCRIPTION.format(like=like)}
-        text = stage_text(read_layers(source).tables | own, _HEAD.format(name=name, origin=f'made like "{like}"'))
+        text = stage_text(_whole(read_layers(source)) | own, _HEAD.format(name=name, origin=f'made like "{like}"'))
     return _write_new(target, text)
 
 
@@ -80,15 +81,28 @@ def _target(name: str, folder: str | os.PathLike[str]) -> Path:
     return Path(folder) / name / "stage.toml"
 
 
+def _whole(layers: Layers) -> dict[str, Any]:
+    """What the file says, with the files that it names by their whole paths."""
+    tables = deepcopy(layers.tables)
+    for field, _, path in named_files(layers):
+        put_at(tables, field, path.resolve().as_posix())
+    return tables
+
+
 def _renamed(source: Path, name: str, like: str) -> str:
-    """The file of a general stage, which has its comments already, under another name and description; its base by its
-    whole path."""
+    """The file of a general stage, which has its comments already, under another name and description; its base and the
+    files that it names itself by their whole paths."""
     text, base = source.read_text(encoding="utf-8-sig"), read_toml(source).get("base")
     values = {"name": name, "description": _DESCRIPTION.format(like=like)}
     if base is not None:
         values["base"] = (source.parent / base).resolve().as_posix()
     for key, value in values.items():
         text = re.sub(rf'^{key} = ".*"', f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
+    layers = read_layers(source)
+    for field, named, path in named_files(layers):
+        if layers.holder(field) == source:
+            key = field.rpartition(".")[2]
+            text = text.replace(f'{key} = "{named}"', f'{key} = "{path.resolve().as_posix()}"')
     return text
 
 
@@ -116,12 +130,12 @@ def _exists(target: Path) -> SpecError:
 
 
 def _table(
-    kind: type[BaseModel], raw: dict[str, Any], place: tuple[str, ...], marks: Mapping[str, str]
+    kind: type[BaseModel], raw: dict[str, Any], place: tuple[str, ...], marks: Mapping[str, str], several: bool = False
 ) -> Iterator[str]:
-    """Lines of one table: its own fields first, then its sub-tables."""
-    fields = {
-        key: field for key, field in fields_by_key(kind).items() if key != "source" and not (key == "name" and place)
-    }
+    """Lines of one table: its own fields first, then its sub-tables. several: it is one of [[place]], which say their
+    names themselves."""
+    left_out = {"source"} if several or not place else {"source", "name"}
+    fields = {key: field for key, field in fields_by_key(kind).items() if key not in left_out}
     for key, field in fields.items():
         if model_of_table(field.annotation) is None:
             mark = marks.get(".".join((*place, key)), "")
@@ -130,14 +144,16 @@ def _table(
         inner = model_of_table(field.annotation)
         if inner is None:
             continue
-        named = get_origin(field.annotation) in (tuple, dict)
-        for name, table in raw.get(key, {}).items() if named else [(None, raw.get(key))]:
+        given = raw.get(key, {}) if get_origin(field.annotation) in (tuple, dict) else [raw.get(key)]
+        several = isinstance(raw.get(key), list)
+        for name, table in given.items() if isinstance(given, dict) else [(None, table) for table in given]:
             own = (*place, key) if name is None else (*place, key, name)
             if table is None and type(None) in get_args(field.annotation):
                 yield from _absent(inner, own, field)
             else:
-                yield f"\n[{'.'.join(own)}]  # {field.description}"
-                yield from _table(model_of_table(field.annotation, table) or inner, table or {}, own, marks)
+                title = f"[[{'.'.join(own)}]]" if several else f"[{'.'.join(own)}]"
+                yield f"\n{title}  # {field.description}"
+                yield from _table(model_of_table(field.annotation, table) or inner, table or {}, own, marks, several)
 
 
 def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:

@@ -19,7 +19,7 @@ from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
 from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, distance_of_shifts, flank_length
 from gearfmu.quantities import range_of, range_problems
-from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_down, rounded_up
+from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_down
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
     STRIP_PER_MODULE,
@@ -204,19 +204,6 @@ def put_gear(draft: Draft, wish: Wish, number: int, place: str, gear: GearGeomet
     if wish.relief:
         relief = {"amount": f"{1e6 * wish.relief:g} um", "start_roll": "outer_single_contact", "kind": "parabolic"}
         draft.put(f"{place}.tip_relief", relief, GIVEN)
-
-
-def put_load(draft: Draft, wish: Wish, torque: float, speed: float) -> tuple[float, float]:
-    """Largest torque (N·m) and speed (rad/s) as given or proposed: what the model is made for."""
-    found = []
-    for field, given, usual, unit, why in (
-        ("torque_max", wish.torque, torque, "N*m", "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"),
-        ("speed_max", wish.speed, speed, "rad/s", "20 m/s at the reference circle"),
-    ):
-        value = rounded_up(usual, 2) if given is None else given
-        draft.put(field, f"{value:.10g} {unit}", GIVEN if given is not None else f"proposed: {why}")
-        found.append(value)
-    return found[0], found[1]
 
 
 def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometry, load: float, radius: float) -> None:

@@ -8,7 +8,15 @@ from gearfmu.errors import SpecError
 from gearfmu.geometry.mesh import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
-from gearfmu.stagefile.proposals.draft import PITCH_SPEED, Draft, millimetres, put_shafts, usual_torque
+from gearfmu.stagefile.proposals.draft import (
+    LOAD_RULE,
+    PITCH_SPEED,
+    Draft,
+    millimetres,
+    put_limit,
+    put_shafts,
+    usual_torque,
+)
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,
     Wish,
@@ -16,7 +24,6 @@ from gearfmu.stagefile.proposals.numbers import (
     distance_of,
     put_center,
     put_gear,
-    put_load,
     put_patch,
     put_slices,
 )
@@ -50,8 +57,8 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     """Torque, speed, load patches and shafts."""
     pinion, wheel = geometry.gears
     ratio = wheel.z / pinion.z
-    usual = usual_torque(2 * pinion.r, ratio, width), PITCH_SPEED / pinion.r
-    torque, _ = put_load(draft, wish, *usual)
+    torque = put_limit(draft, "torque_max", (wish.torque, GIVEN), (usual_torque(2 * pinion.r, ratio, width), LOAD_RULE))
+    put_limit(draft, "speed_max", (wish.speed, GIVEN), (PITCH_SPEED / pinion.r, "20 m/s at the reference circle"))
     radius = geometry.largest_relative_radius()
     for name, gear in zip(NAMES, geometry.gears, strict=True):
         put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)

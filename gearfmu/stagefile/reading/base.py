@@ -247,14 +247,10 @@ def _remedy(kind: type[Spec], entry: Any) -> str:
         meaning = f" ({field.description})" if field is not None and field.description else ""
         return f"this field is missing{meaning}: add it"
     if entry["type"] == "extra_forbidden":
-        return _unknown_key(str(loc[-1]), list(fields_at(kind, loc[:-1])))
+        return f"unknown key: {near_or_all(str(loc[-1]), sorted(fields_at(kind, loc[:-1])), 'known are')}"
     if entry["type"] == "string_pattern_mismatch":
         return "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
     return entry["msg"][:1].lower() + entry["msg"][1:]
-
-
-def _unknown_key(key: str, known: list[str]) -> str:
-    return f"unknown key: {near_or_all(key, sorted(known), 'known are')}"
 
 
 def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:

@@ -159,12 +159,16 @@ def changed_tables(kind: type[Spec], changes: Changes) -> dict[str, Any]:
     """The changes as nested tables of a file of class `kind`; SI numbers of quantities are written with their unit."""
     tables: dict[str, Any] = {}
     for key, value in changes.items():
-        *folders, last = key.split(".")
-        table = tables
-        for name in folders:
-            table = table.setdefault(name, {})
-        table[last] = _written(kind, key, value)
+        put_at(tables, key, _written(kind, key, value))
     return tables
+
+
+def put_at(tables: dict[str, Any], place: str, value: Any) -> None:
+    """Writes a value at its place ("gears.pinion.teeth") in nested tables; tables on the way are made."""
+    *way, key = place.split(".")
+    for step in way:
+        tables = tables.setdefault(step, {})
+    tables[key] = value
 
 
 def _written(kind: type[Spec], key: str, value: Any) -> Any:

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, entry, refuse
 from gearfmu.stagefile.tables.connections import Diameter, GearBearing, Length
-from gearfmu.stagefile.tables.imported import ImportSpec, SurfaceCoupling
+from gearfmu.stagefile.tables.imported import ELSEWHERE, ImportSpec, SurfaceCoupling
 
 Depth = Annotated[float, Quantity("flank_depth")]
 Slope = Annotated[float, Quantity("flank_slope")]
@@ -291,9 +291,7 @@ class GearSpec(Toothing):
     modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
     bearing: GearBearing = entry("bearing")
     body: BodySpec = entry("mesh and reduction")
-    imported: ImportSpec | None = entry(
-        "finite elements made elsewhere; meshed here when the table is absent", None, alias="import"
-    )
+    imported: ImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
     @model_validator(mode="after")
     def _one_coupling(self) -> GearSpec:

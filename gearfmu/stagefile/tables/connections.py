@@ -22,6 +22,7 @@ Diameter = Annotated[float, Quantity("diameter")]
 Length = Annotated[float, Quantity("length")]
 Ratio = Annotated[float, Quantity("damping_ratio")]
 Side = Literal["+z", "-z"]
+CARRIES = "axial force of the shaft that an angular contact bearing (of two the left) carries"
 SPRINGS = ("stiffness", "axial", "tilt")  # of a Bearing
 
 
@@ -104,9 +105,7 @@ class RollingMount(Spec):
     span: Length | None = entry(
         "distance of two such bearings, mirrored, on a stiff piece of shaft; one in the middle when absent", None
     )
-    carries: Side | None = entry(
-        "axial force of the shaft that an angular contact bearing (of two the left) carries", None
-    )
+    carries: Side | None = entry(CARRIES, None)
     damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m_body)", 0.03)
 
     @model_validator(mode="before")
@@ -293,9 +292,7 @@ class SupportSpec(LaterFields):
     span: Length | None = entry(
         "distance of two such bearings, mirrored, on a stiff piece of shaft; one when absent", None
     )
-    carries: Side | None = entry(
-        "axial force of the shaft that an angular contact bearing (of two the left) carries", None
-    )
+    carries: Side | None = entry(CARRIES, None)
     damping_ratio: Ratio = entry(
         "damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia", 0.03
     )

@@ -13,7 +13,9 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.reading.base import Quantity, Spec, Text, entry, refuse
 from gearfmu.stagefile.reading.files import Layers
 
+FlankTolerance = Annotated[float, Quantity("flank_tolerance")]
 SurfaceCoupling = Literal["averaging", "rigid"]
+ELSEWHERE = "finite elements made elsewhere; meshed here when the table is absent"
 FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 
 Files = TypeVar("Files", bound="SourceSpec")
@@ -65,18 +67,14 @@ class ImportSpec(FilesSpec):
 
     bore: Text = entry("node set of the bore; without it the nodes on the stage's bore diameter", "")
     bore_coupling: SurfaceCoupling = entry("averaging (RBE3) or rigid (RBE2) master node of the bore", "averaging")
-    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = entry(
-        "largest distance of a corner node from the best involute", 5e-6
-    )
+    flank_tolerance: FlankTolerance = entry("largest distance of a corner node from the best involute", 5e-6)
 
 
 class RingImportSpec(FilesSpec):
     """The finite elements of a ring, placed by the involute fit of its tooth spaces."""
 
     rim: Text = entry("node set of the rim; without it the nodes on the stage's rim diameter", "")
-    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = entry(
-        "largest distance of a corner node from the best involute", 5e-6
-    )
+    flank_tolerance: FlankTolerance = entry("largest distance of a corner node from the best involute", 5e-6)
 
     @property
     def bore(self) -> str:
