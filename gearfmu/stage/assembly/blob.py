@@ -170,7 +170,7 @@ GEAR_NUMBERS = (
     "z_mid",
     "helix",
 )
-_LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
+_LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "[^"]*", "[^"]*"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}
 
 
@@ -183,8 +183,6 @@ class Field:
     name: str
     kind: str
     dimensions: tuple[str, ...]
-    unit: str
-    description: str
     optional: bool
 
 
@@ -199,8 +197,8 @@ def fields() -> tuple[Field, ...]:
     """All arrays in the order of the table."""
     found = _LINE.findall(TABLE.read_text(encoding="utf-8"))
     return tuple(
-        Field(scope, name, kind, tuple(sizes.lstrip("?").split()), unit, text, sizes.startswith("?"))
-        for scope, name, kind, sizes, unit, text in found
+        Field(scope, name, kind, tuple(sizes.lstrip("?").split()), sizes.startswith("?"))
+        for scope, name, kind, sizes in found
     )
 
 
