@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.bearing import Balls, Rollers, Rolling, Row
+from gearfmu.bearing.law import Balls, Rollers, Rolling, Row
 
 DEEP = Balls(8, 12e-3, 50e-3, (0.52, 0.53), 0.0, 10e-6)
 ANGULAR = Balls(12, 9.5e-3, 46e-3, (0.515, 0.525), np.radians(30.0), 0.0)

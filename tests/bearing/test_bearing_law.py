@@ -11,9 +11,10 @@ import pytest
 from bearings import ANGULAR, AT, DEEP, KINDS, ROLLERS, TAPER, load
 from scipy.integrate import quad
 
-from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, Row, filled_ball, pass_orders, pass_swing, rest
+from gearfmu.bearing.catalogue import filled_ball
 from gearfmu.bearing.hertz import line_pressure, point
-from gearfmu.bearing.rest import preloaded
+from gearfmu.bearing.law import Balls, Rollers, Rolling, Row
+from gearfmu.bearing.rest import NoRestError, pass_orders, pass_swing, preloaded, rest
 
 # Seven balls of 11.5 mm on 43.5 mm, grooves 0.52 and 0.53, E 210 GPa: deflections that a commercial program prints, as
 # quoted in the tests of github.com/minzhun/ISO16281. Load N, N·m; clearance µm; radial and axial µm, tilt mrad.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfmu.bearing import rest
+from gearfmu.bearing.rest import rest
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised
