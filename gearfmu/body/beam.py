@@ -87,10 +87,15 @@ class Shaft:
 
     def ends(self, longest: float) -> np.ndarray:
         """Element ends: all steps and interfaces, and between them so many that no element is longer than `longest`."""
-        steps = np.sort(np.concatenate([[0.0], self.steps, self.places]))
-        steps = steps[np.concatenate([[True], np.diff(steps) > FINEST])]
+        steps = distinct(np.concatenate([[0.0], self.steps, self.places]))
         parts = [np.linspace(a, b, max(1, math.ceil((b - a) / longest)) + 1)[:-1] for a, b in pairwise(steps)]
         return np.append(np.concatenate(parts), steps[-1])
+
+
+def distinct(places: np.ndarray) -> np.ndarray:
+    """The places, m, ascending, those that are one once."""
+    ordered = np.sort(places)
+    return ordered[np.diff(ordered, prepend=-np.inf) > FINEST]
 
 
 def reduce_shaft(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from ctypes import c_int32
 from dataclasses import dataclass, field, fields
-from typing import Any
 
 import numpy as np
 
@@ -13,9 +12,9 @@ COUNTS = ("coordinates", "room", "supports", "engagements", "found")
 SPIN, GROUND, FIRST_GEAR = -1, 0, 1  # values of `group`
 
 
-def _array(shape: str, kind: type = np.float64) -> Any:
-    """A field of `LinearModel` that is an array of gk_linear, in its order: shape by the names of the counts, type."""
-    return field(metadata={"array": (kind, shape.split())})
+def _array(shape: str, kind: type = np.float64) -> dict[str, tuple[type, list[str]]]:
+    """What says that a field is an array of gk_linear, in its order: type, shape by the names of the counts."""
+    return {"array": (kind, shape.split())}
 
 
 @dataclass(frozen=True)
@@ -32,25 +31,25 @@ class LinearModel:
     elongation. engagements: of the stage.
     """
 
+    group: np.ndarray = field(metadata=_array("coordinates", np.int32))
+    number: np.ndarray = field(metadata=_array("coordinates", np.int32))
+    mass: np.ndarray = field(metadata=_array("coordinates"))
+    omega: np.ndarray = field(metadata=_array("coordinates"))
+    zeta: np.ndarray = field(metadata=_array("coordinates"))
+    label: np.ndarray = field(metadata=_array("room label", np.int32))
+    force: np.ndarray = field(metadata=_array("room"))
+    dashpot: np.ndarray = field(metadata=_array("room"))
+    te: np.ndarray = field(metadata=_array("room"))
+    rows: np.ndarray = field(metadata=_array("room coordinates"))
+    residual: np.ndarray = field(metadata=_array("room room"))
+    own: np.ndarray = field(metadata=_array("room room"))
+    support_compliance: np.ndarray = field(metadata=_array("supports"))
+    support_rows: np.ndarray = field(metadata=_array("supports coordinates"))
+    support_forces: np.ndarray = field(metadata=_array("supports room"))
+    support_damping: np.ndarray = field(metadata=_array("supports coordinates"))
+    damper: np.ndarray = field(metadata=_array("supports"))
+    damper_rows: np.ndarray = field(metadata=_array("supports coordinates"))
     engagements: int
-    group: np.ndarray = _array("coordinates", np.int32)
-    number: np.ndarray = _array("coordinates", np.int32)
-    mass: np.ndarray = _array("coordinates")
-    omega: np.ndarray = _array("coordinates")
-    zeta: np.ndarray = _array("coordinates")
-    label: np.ndarray = _array("room label", np.int32)
-    force: np.ndarray = _array("room")
-    dashpot: np.ndarray = _array("room")
-    te: np.ndarray = _array("room")
-    rows: np.ndarray = _array("room coordinates")
-    residual: np.ndarray = _array("room room")
-    own: np.ndarray = _array("room room")
-    support_compliance: np.ndarray = _array("supports")
-    support_rows: np.ndarray = _array("supports coordinates")
-    support_forces: np.ndarray = _array("supports room")
-    support_damping: np.ndarray = _array("supports coordinates")
-    damper: np.ndarray = _array("supports")
-    damper_rows: np.ndarray = _array("supports coordinates")
 
 
 ARRAYS: dict[str, tuple[type, list[str]]] = {

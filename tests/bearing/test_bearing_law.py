@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, Row, filled_ball, pass_orders, pass_swing, rest
+from gearfmu.bearing.catalogue import filled_ball
 from gearfmu.bearing.hertz import line_pressure, point
-from gearfmu.bearing.rest import preloaded
+from gearfmu.bearing.law import Balls, Rollers, Rolling, Row
+from gearfmu.bearing.rest import NoRestError, pass_orders, pass_swing, preloaded, rest
 
 DEEP = Balls(8, 12e-3, 50e-3, (0.52, 0.53), 0.0, 10e-6)
 ANGULAR = Balls(12, 9.5e-3, 46e-3, (0.515, 0.525), np.radians(30.0), 0.0)

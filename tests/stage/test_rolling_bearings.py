@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from driven import begun
 
-from gearfmu.bearing import rest
+from gearfmu.bearing.rest import rest
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised

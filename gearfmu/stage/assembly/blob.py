@@ -11,7 +11,7 @@ import hashlib
 import json
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -140,13 +140,9 @@ def _name_is_good(name: str) -> bool:
     return 0 < len(name) <= LONGEST_NAME and all(" " < c <= "~" for c in name)
 
 
-def _aligned(n: int) -> int:
-    return -(-n // ALIGNMENT) * ALIGNMENT
-
-
 def _pad(contents: bytearray, start: int) -> None:
     """Fill with zeros up to the next aligned position; `contents` begin at byte `start` of the blob."""
-    contents += bytes(_aligned(start + len(contents)) - start - len(contents))
+    contents += bytes(-(start + len(contents)) % ALIGNMENT)
 
 
 TABLE = Path(__file__).parents[2] / "kernel" / "src" / "model" / "gk_fields.inc"
@@ -170,7 +166,7 @@ GEAR_NUMBERS = (
     "z_mid",
     "helix",
 )
-_LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
+_LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "[^"]*", "[^"]*"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}
 
 
@@ -183,8 +179,6 @@ class Field:
     name: str
     kind: str
     dimensions: tuple[str, ...]
-    unit: str
-    description: str
     optional: bool
 
 
@@ -199,52 +193,47 @@ def fields() -> tuple[Field, ...]:
     """All arrays in the order of the table."""
     found = _LINE.findall(TABLE.read_text(encoding="utf-8"))
     return tuple(
-        Field(scope, name, kind, tuple(sizes.lstrip("?").split()), unit, text, sizes.startswith("?"))
-        for scope, name, kind, sizes, unit, text in found
+        Field(scope, name, kind, tuple(sizes.lstrip("?").split()), sizes.startswith("?"))
+        for scope, name, kind, sizes in found
     )
 
 
 def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     """`sections` in the order of the table, floats in the precision in which they are stored. AssertionError that lists
     every section that is missing, unknown, or of another type or shape: the writer's mistake, not the user's."""
-    sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
-    found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference", "sensors": "sensed"}
-    sizes |= {word: len(sections.get(name, ())) for word, name in found.items()}
-    ordered, problems = {}, []
-    for field, name, known in _instances(sections, sizes):
-        if name not in sections:
-            problems += [] if field.optional else [f"{name} is missing"]
-            continue
-        ordered[name] = np.asarray(sections[name], np.float32) if field.kind == "F32" else sections[name]
-        problems += _problems(field, name, sections[name], known)
+    ordered, problems, scopes = {}, [], _scopes(sections)
+    for field in fields():
+        for number, sizes in scopes[field.scope].items():
+            name = field.name + number
+            if name in sections:
+                ordered[name] = np.asarray(sections[name], np.float32) if field.kind == "F32" else sections[name]
+                problems += _problems(field, name, sections[name], sizes)
+            elif not field.optional:
+                problems.append(f"{name} is missing")
     problems += [f"{name} is unknown" for name in sections if name not in ordered]
     assert not problems, "; ".join(problems)
     return ordered
 
 
-def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[tuple[Field, str, dict[str, int]]]:
-    """Every field once per scope number: field, name of the section, sizes known there."""
-    of_gear = {
-        g: sizes
-        | _with_places(dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True)), sizes["functions"])
+def _scopes(sections: Mapping[str, Any]) -> dict[str, dict[str, dict[str, int]]]:
+    """Of every scope the numbers that its sections have in their names, with the sizes known there."""
+    known = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
+    found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference", "sensors": "sensed"}
+    known |= {word: len(sections.get(name, ())) for word, name in found.items()}
+    gears = {
+        f"{g}": known
+        | _with_places(dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True)), known["functions"])
         | {"own": len(sections.get(f"own_number{g}", ()))}
         | dict(zip(FLANK_SIZES, map(int, sections.get(f"flank_size{g}", (0, 0, 0))), strict=True))
-        for g in range(sizes["gears"])
+        for g in range(known["gears"])
     }
-    of_set = {s: sizes | {"ground": len(sections[f"omega_ground{s}"])} for s in range(sizes["sets"])}
-    for field in fields():
-        if field.scope == "MODEL":
-            yield field, field.name, sizes
-        elif field.scope == "GEAR":
-            yield from ((field, f"{field.name}{g}", known) for g, known in of_gear.items())
-        elif field.scope == "SET":
-            yield from ((field, f"{field.name}{s}", known) for s, known in of_set.items())
-        else:
-            yield from (
-                (field, f"{field.name}{g}_{s}", known | of_set[s] | {"reads": len(sections[f"ground_list{g}_{s}"])})
-                for g, known in of_gear.items()
-                for s in of_set
-            )
+    sets = {f"{s}": known | {"ground": len(sections[f"omega_ground{s}"])} for s in range(known["sets"])}
+    both = {
+        f"{g}_{s}": of_gear | of_set | {"reads": len(sections[f"ground_list{g}_{s}"])}
+        for g, of_gear in gears.items()
+        for s, of_set in sets.items()
+    }
+    return {"MODEL": {"": known}, "GEAR": gears, "SET": sets, "GEAR_SET": both}
 
 
 def _with_places(size: dict[str, int], functions: int) -> dict[str, int]:

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.body.beam import Section, Shaft, Steel, distinct, reduce_shaft
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
 from gearfmu.stage.assembly.groups import Layout, Support
@@ -23,7 +23,6 @@ from gearfmu.stagefile.tables.bodies import ShaftBody
 from gearfmu.stagefile.tables.connections import SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
 
-SAME_PLACE = 1e-9  # m
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 _KEPT = 4  # ways to read a body that are remembered
@@ -58,7 +57,7 @@ def stage_nodes(stage: Stage, carriers: Mapping[str, Body] = MappingProxyType({}
     for shaft in shafts:
         wanted = [place_of(stage, s) for s in stage.supports if shaft.name in (s.body, s.to)]
         wanted += [stage.place(shaft.name, port.at) for port in stage.ports.values() if port.body == shaft.name]
-        places[shaft.name] = _distinct(wanted)
+        places[shaft.name] = distinct(np.array(wanted)).tolist()
     names = {own.name: [node.name for node in carriers[own.name].nodes] for own in stage.carriers}
     for housing in stage.housings:
         names[housing.name] = [s.name for s in stage.supports if housing.name in (s.body, s.to)]
@@ -210,11 +209,3 @@ def _kind(stage: Stage, support: SupportSpec) -> str:
     if support.to is None or isinstance(stage.bodies[support.to], HousingBody):
         return "bearing"
     return "pin" if stage.rotor_of(support.body) != stage.rotor_of(support.to) else "seat"
-
-
-def _distinct(places: Sequence[float]) -> list[float]:
-    result: list[float] = []
-    for place in sorted(places):
-        if not result or place - result[-1] > SAME_PLACE:
-            result.append(place)
-    return result

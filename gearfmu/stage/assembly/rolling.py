@@ -18,8 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sl
 
-from gearfmu.bearing import Filled, NoRestError, Rest, Rolling, Row, filled_ball, filled_roller
-from gearfmu.bearing.rest import least, preloaded, scales, state
+from gearfmu.bearing.catalogue import Filled, filled_ball, filled_roller
+from gearfmu.bearing.law import Rolling, Row
+from gearfmu.bearing.rest import NoRestError, Rest, least, preloaded, scales, state
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.stagefile.forms.general import Stage

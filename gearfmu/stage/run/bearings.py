@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.bearing import Balls, NoRestError, Rollers, Rolling, pass_orders, pass_swing
+from gearfmu.bearing.law import Balls, Law, Rolling
+from gearfmu.bearing.rest import NoRestError, pass_orders, pass_swing
 from gearfmu.body import Body
 from gearfmu.stage.assembly.assemble import settled
 from gearfmu.stage.assembly.rolling import BALL_NUMBERS, ROLLER_NUMBERS, filled
@@ -119,7 +120,7 @@ def stage_bearings(stage: Stage, bodies: Sequence[Body], torque: float | None = 
     return Bearings(stage.name, found.torque, found.iterations, tuple(states))
 
 
-def _numbers(law: Balls | Rollers) -> dict[str, float]:
+def _numbers(law: Law) -> dict[str, float]:
     """Of the rolling elements, by their names in a stage file."""
     if isinstance(law, Balls):
         return dict(zip(BALL_NUMBERS, (law.count, law.diameter, law.pitch_diameter, *law.grooves), strict=True))

@@ -19,14 +19,10 @@ HEARD = 10e-9  # m: an order that changes by less, a hundredth of the form devia
 # class 1: 1 µm), is not judged by its level
 
 
-def is_helical(stage: Stage) -> bool:
-    """Whether lines of contact slant in one of its meshes."""
-    return any(isinstance(body, ToothedBody) and body.helix_angle != 0 for body in stage.bodies.values())
-
-
 def twice(stage: Stage, slices: int) -> int:
     """Twice as many slices where lines of contact slant, at most as many as a model takes; else as many."""
-    return min(2 * slices, int(all_ranges()["slices"].high)) if is_helical(stage) else slices
+    slanting = any(isinstance(body, ToothedBody) and body.helix_angle != 0 for body in stage.bodies.values())
+    return min(2 * slices, int(all_ranges()["slices"].high)) if slanting else slices
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.sound import WIDTH, Radiation, SoundError, SoundPower, power_of, segments
+from gearfmu.stage.assembly.groups import MOTIONS
 from gearfmu.stage.assembly.observed import MODE, MOTION
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
 
-MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 SEGMENTS = 40  # of a waterfall, half overlapping, where its lines are not `WIDEST` apart then
 WIDEST = 40.0  # Hz
 

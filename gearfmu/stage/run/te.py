@@ -105,7 +105,8 @@ class TeResult(Shown):
         planet; with rigid bearings the stage has the stiffness of its mesh."""
         rows = []
         for i, (torque, why) in enumerate(zip(self.torque, self.failed, strict=True)):
-            rows.append((f"{torque:.1f} N·m", why or f"{error_text(self.te[i])}, {self._stiffness(i)}"))
+            te = f"mean {1e6 * self.te[i].mean():.3f} µm, peak to peak {1e6 * np.ptp(self.te[i]):.3f} µm"
+            rows.append((f"{torque:.1f} N·m", why or f"{te}, {self._stiffness(i)}"))
             for g, gear in enumerate(() if why else self.centrals):
                 shares = self.sharing[i].mean(axis=0)[g]
                 means = f"means of planets 1 … {len(shares)}: {' '.join(f'{share:.3f}' for share in shares)}"
@@ -166,11 +167,6 @@ def mesh_harmonics(te: np.ndarray, count: int, pitches: int = 1) -> np.ndarray:
     lines = np.abs(np.fft.rfft(te, axis=1))[:, pitches : pitches * count + 1 : pitches] * math.sqrt(2) / te.shape[1]
     lines[:, (te.shape[1] // pitches + 1) // 2 - 1 :] = np.nan
     return np.pad(lines, ((0, 0), (0, count - lines.shape[1])), constant_values=np.nan)
-
-
-def error_text(te: np.ndarray) -> str:
-    """Mean and peak to peak of a transmission error (m)."""
-    return f"mean {1e6 * te.mean():.3f} µm, peak to peak {1e6 * np.ptp(te):.3f} µm"
 
 
 def set_error(stage: Stage) -> tuple[float, float]:
