@@ -151,10 +151,8 @@ def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
             )
             worst, count = max(worst, abs(near.fun - mesh.gears[c].tip_edge - place.gap)), count + 1
             assert near.x == pytest.approx(place.roll[o], abs=2e-6)
-            other = (1, -1)[o] / place.roll[
-                o
-            ]  # hollow flanks of the ring: from the curvature of the flank to the edge's
-            assert (1, -1)[c] / mesh.gears[c].s_tip - 1e-9 < place.curvature - other < 1 / mesh.gears[c].tip_edge + 1e-9
+            own = place.curvature - HOLLOW[o] / place.roll[o]
+            assert HOLLOW[c] / mesh.gears[c].s_tip - 1e-9 < own < 1 / mesh.gears[c].tip_edge + 1e-9
     print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 3 and worst < 1e-9
 
