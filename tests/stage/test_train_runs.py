@@ -26,7 +26,7 @@ from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
 FAST, STEPS, H = 1, 60, 5e-5
-TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
+TORQUE = 120.0  # N·m on the input
 
 
 def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
