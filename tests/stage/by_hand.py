@@ -107,10 +107,6 @@ class Pair:
         load = brentq(lambda f: self.approach(rolls, np.array([f]), hertz=True)[0] - gap, 1.0, 1.5e6)
         return load * self.width * self.geometry.gears[0].r_b
 
-    def corner_gap(self, position: float, tooth: int) -> float:
-        """Distance (m) of the pinion's tip edge from the wheel's involute, by search along the involute."""
-        return self.corner(position, tooth)[0]
-
     def corner(self, position: float, tooth: int, te: float = 0.0) -> tuple[float, float]:
         """Distance (m) of the pinion's tip edge from the wheel's involute, and the roll (m) there, by search along the
         involute; the pinion has turned by te (m) more."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from evidence.energy.free import FreePair, free_pair
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel, assemble
@@ -35,6 +36,18 @@ def pair(spec: Stage) -> PairGeometry:
 def plain(spec: Stage, bodies: list[Body]) -> StageModel:
     """No profile modification."""
     return assemble(spec, bodies)
+
+
+@pytest.fixture(scope="session")
+def pair_free(spec: Stage, bodies: list[Body]) -> FreePair:
+    """Torque ports on both shafts, no profile modification."""
+    return free_pair(spec, bodies)
+
+
+@pytest.fixture(scope="session")
+def relieved_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
+    """Torque ports on both shafts, tip relief on both gears."""
+    return free_pair(relief_spec, bodies)
 
 
 @pytest.fixture(scope="session")

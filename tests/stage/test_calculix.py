@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sections
 
-from evidence.peers.calculix import positions, rigid_bores, section, solid, sun_planet
+from evidence.peers.calculix import positions, rigid_bores, sun_planet
 from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.te import TeResult
@@ -125,22 +124,3 @@ def test_sun_and_planet_within_3_percent_at_two_loads() -> None:
         assert np.allclose(here[inside], theirs[inside], rtol=0.03)
         assert here.mean() == pytest.approx(theirs.mean(), rel=0.03)
         assert np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.03)
-
-
-def test_meshes_are_whole_and_bore_weights_are_areas(pair: PairGeometry) -> None:
-    """Section with every tooth: its area is the gear's but for the tip chamfers, every inner edge has two elements;
-    bore weights find the bore's middle."""
-    gear, roll = pair.gears[0], pair.path["C"]
-    plane = section.gear_plane(gear, {0: roll}, range(-8, 8), section.Fineness(toothed=8))
-    corners = plane.nodes[plane.quads[:, [0, 4, 1, 5, 2, 6, 3, 7]]]
-    x, y = corners[..., 0], corners[..., 1]
-    area = 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    assert area.min() > 0 and area.sum() == pytest.approx(gear.z * sections.section(gear)[0], rel=2e-3)
-    edges = np.sort(np.stack([plane.quads[:, :4], np.roll(plane.quads[:, :4], -1, axis=1)], axis=-1), axis=-1)
-    _, shared = np.unique(edges.reshape(-1, 2), axis=0, return_counts=True)
-    assert shared.max() == 2 and (shared == 1).sum() > len(plane.bore)
-    body = solid.extruded(plane, np.array([0.0, 3e-3, 7e-3]))
-    place = body.weights @ body.nodes[body.bore]
-    assert body.weights.sum() == pytest.approx(1) and np.allclose(place, [0, 0, 3.5e-3], atol=1e-7)
-    contact = plane.nodes[plane.patch[0]]
-    assert np.abs(np.linalg.norm(contact, axis=-1) - np.hypot(gear.r_b, roll)).max() < 0.3e-3

@@ -224,7 +224,7 @@ def test_tip_contact(plain: StageModel, hand: Pair, beyond: float) -> None:
     """Rigid gears, the pinion's tip past the end of the flank: it touches when the approach of the pair that carries
     has closed the corner's gap, not before, and then takes its share. Off: it never does."""
     position = (hand.geometry.gears[0].s_tip + beyond - _roll_at_zero(hand)) / hand.geometry.base_pitch
-    gap = hand.corner_gap(position, 0)
+    gap = hand.corner(position, 0)[0]
     (rolls,) = hand.rolls(position).values()
     touching = hand.touch_torque(rolls, gap)
     print(f"gap {1e6 * gap:.3f} µm, closed at {touching:.2f} N·m")
@@ -243,7 +243,7 @@ def test_a_tip_corner_yields_by_the_law_with_the_curvature_of_its_edge(
     pinion = hand.geometry.gears[0]
     position = (pinion.s_tip + beyond - _roll_at_zero(hand)) / hand.geometry.base_pitch
     (rolls,) = hand.rolls(position).values()
-    found = state(plain, position, 4 * hand.touch_torque(rolls, hand.corner_gap(position, 0)), **HELD | STIFF)
+    found = state(plain, position, 4 * hand.touch_torque(rolls, hand.corner(position, 0)[0]), **HELD | STIFF)
     gap, roll = hand.corner(position, 0, found.te)
     load = sum(found.forces[DRIVE, 0]) / hand.width
     by_hand = hand.corner_approach(beyond + found.te, roll, load)

@@ -17,9 +17,8 @@ from evidence.energy import energy, light_rattle
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
 from evidence.energy.light import run, statistics
-from gearfmu.body import Body, load_bodies
+from gearfmu.body import load_bodies
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 
 FAST = 1
@@ -31,11 +30,6 @@ SHORT = {"starts": 1, "duration": 0.01, "level": "fast"}
 @pytest.fixture(scope="module")
 def libraries(double_library: Path) -> dict[str, Path | None]:
     return {"shipped": None, "double": double_library, "no eta": edited_library("no_eta", WITHOUT_ETA, "double")}
-
-
-@pytest.fixture(scope="module")
-def pair_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
-    return free_pair(relief_spec, bodies)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +57,7 @@ def test_invariant_holds_and_damping_never_adds(
     """Cases T1 to T6 and T9, both laws, one start, another number of slices and another step each; the whole table is
     `python -m evidence.energy.energy`."""
     case = energy.CASES[name]
-    pair: FreePair = request.getfixturevalue("helical_free" if case.stage == energy.HELICAL else "pair_free")
+    pair: FreePair = request.getfixturevalue("helical_free" if case.stage == energy.HELICAL else "relieved_free")
     if build not in case.builds:
         pytest.skip("a case of the double build only")
     for law in case.laws:
@@ -74,13 +68,13 @@ def test_invariant_holds_and_damping_never_adds(
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.1])
-def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -> None:
+def test_energy_of_free_flight_has_no_trend(relieved_free: FreePair, speed: float) -> None:
     """40 000 steps in which gears that have sprung apart turn slowly and ring. Turns below the last place of a speed
     in single precision gave 4e-6 and took 6e-6 of the energy at the start; rounding alone leaves 4e-8."""
     rolling = {"pinion.w_start": speed, "wheel.w_start": -speed * 16 / 24}
     start = Rattle(load=2.0, play=2e-3, speed=0.0)
-    kernel = started(pair_free, start, {"level": FAST, "h": 5e-6, "effect.hertz": 0, **rolling})
-    elastic = started(pair_free, start, {"level": FAST, "effect.hertz": 0}).get("energy.stored")
+    kernel = started(relieved_free, start, {"level": FAST, "h": 5e-6, "effect.hertz": 0, **rolling})
+    elastic = started(relieved_free, start, {"level": FAST, "effect.hertz": 0}).get("energy.stored")
     give(kernel, dict.fromkeys((f"{port}.tau" for port in kernel.ports), 0.0))
     held, work, contact = stepped(kernel, 200, 1e-3, "energy.stored", "energy.work", "mesh.contact").T
     stored = held - work
@@ -90,20 +84,22 @@ def test_energy_of_free_flight_has_no_trend(pair_free: FreePair, speed: float) -
     assert abs(trend) < 4e-7 * elastic
 
 
-def test_contacts_that_take_turns_keep_their_energy(pair_free: FreePair) -> None:
+def test_contacts_that_take_turns_keep_their_energy(relieved_free: FreePair) -> None:
     """A jammed pair, 1398 changes of contact in 50 ms. With the step before it Newton's moves of α went to and fro
     between two contacts here: without the bracket two steps were left unsolved, with 2 % of the energy."""
     start = energy.random_start(energy.CASES["jammed 1 µm"].start, 14)
-    kernel = started(pair_free, start, {"level": FAST, "h": 10e-6, "slices": 1, "effect.hertz": 0}, None)
+    kernel = started(relieved_free, start, {"level": FAST, "h": 10e-6, "slices": 1, "effect.hertz": 0}, None)
     found = energies(kernel, 10e-6, 0.05)
     assert found.retried_steps == 0 and found.drift < energy.FLOAT and found.changes > 1300
 
 
 @pytest.mark.parametrize("name", cases(energy.CONTROLS, "no eta"))
-def test_controls_are_seen_to_fail(pair_free: FreePair, libraries: dict[str, Path | None], name: str) -> None:
+def test_controls_are_seen_to_fail(relieved_free: FreePair, libraries: dict[str, Path | None], name: str) -> None:
     case = energy.CONTROLS[name]
     (build,) = case.builds
-    line = energy.row(pair_free, name, case, (build, 0, 5, 10e-6), {**SHORT, "duration": 0.02, "libraries": libraries})
+    line = energy.row(
+        relieved_free, name, case, (build, 0, 5, 10e-6), {**SHORT, "duration": 0.02, "libraries": libraries}
+    )
     assert line["drift"] > case.at_least
 
 
@@ -118,17 +114,18 @@ def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> n
 
 
 @pytest.fixture(scope="module")
-def converged(pair_free: FreePair, double_library: Path) -> np.ndarray:
-    return speeds(pair_free, double_library, 0.1e-6, DG4)
+def converged(relieved_free: FreePair, double_library: Path) -> np.ndarray:
+    return speeds(relieved_free, double_library, 0.1e-6, DG4)
 
 
 @pytest.mark.parametrize("integrator, order", [(DG4, 4), (EM, 2), (CENTRAL, 2)])
 def test_order_in_closed_contact(
-    pair_free: FreePair, double_library: Path, converged: np.ndarray, integrator: int, order: int
+    relieved_free: FreePair, double_library: Path, converged: np.ndarray, integrator: int, order: int
 ) -> None:
     """T10: all modes below 50 kHz are exponential at these steps, the stiffness is constant."""
     errors = [
-        np.sqrt(np.mean((speeds(pair_free, double_library, h, integrator) - converged) ** 2)) for h in (0.8e-6, 0.4e-6)
+        np.sqrt(np.mean((speeds(relieved_free, double_library, h, integrator) - converged) ** 2))
+        for h in (0.8e-6, 0.4e-6)
     ]
     print(f"errors {errors} rad/s")
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
@@ -147,7 +144,7 @@ def test_balance_of_a_loaded_damped_run(relieved: StageModel) -> None:
     assert np.ptp(stored - work + lost - left) < 1e-9 * stored.max()
 
 
-def test_central_is_the_same_physics_and_drifts(pair_free: FreePair, relieved: StageModel) -> None:
+def test_central_is_the_same_physics_and_drifts(relieved_free: FreePair, relieved: StageModel) -> None:
     """Loaded run against dg4, both at 0.94 µs; undamped rattle at 2 µs keeps its energy to a percent, not exactly."""
     inputs = Steady(relieved, 2000 * np.pi / 30, LOAD)
     runs = [
@@ -156,7 +153,7 @@ def test_central_is_the_same_physics_and_drifts(pair_free: FreePair, relieved: S
     ]
     te, reference = (run["mesh.te"][40:] for run in reversed(runs))
     assert np.std(te - reference) < 0.02 * np.std(reference) and runs[1].meta["outcome"] == "completed"
-    rattle = started(pair_free, Rattle(position=0.3), {"level": FAST, "h": 2e-6, "integrator": CENTRAL})
+    rattle = started(relieved_free, Rattle(position=0.3), {"level": FAST, "h": 2e-6, "integrator": CENTRAL})
     assert 1e-6 < energies(rattle, 2e-6, 0.01).drift < 0.03
 
 

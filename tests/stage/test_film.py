@@ -11,7 +11,7 @@ import pytest
 from driven import give, stepped
 from scipy.integrate import solve_ivp
 
-from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
+from evidence.energy.free import FreePair, Rattle, energies, started
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
@@ -26,11 +26,6 @@ DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m
 OIL = {"viscosity": 1e-3, "roughness": 2e-6, "radius": 1.0, "width": 1.0}  # of a flat engagement
 ON = {"effect.film": 1.0, "oil_viscosity": OIL["viscosity"], "film_roughness": OIL["roughness"]}
-
-
-@pytest.fixture(scope="module")
-def pair_free(spec: Stage, bodies: list[Body]) -> FreePair:
-    return free_pair(spec, bodies)
 
 
 # ---- a falling body: exact -------------------------------------------------------------------------------------------

@@ -298,9 +298,9 @@ def topography(tmp_path: Path, spec: Stage, pair: PairGeometry) -> dict[str, Any
 def test_a_topography_is_the_same_flank_as_its_closed_form(
     topography: dict[str, Any], spec: Stage, bodies: list[Body], pair: PairGeometry
 ) -> None:
-    """The flank is a parabola both ways: splines through its points are that parabola, so that
-    table and transmission error are those of `profile` and `lead`. Across the width strips take means of straight
-    lines between 33 places either way."""
+    """The flank is a parabola both ways: splines through its points are that parabola, so that table and transmission
+    error are those of `profile` and `lead`. Across the width strips take means of straight lines between 33 places
+    either way."""
     shape, gear = pair.gears[0], spec.written.gears[0]
     measured, designed = (assemble(changed(spec, update), bodies) for update in (topography, CLOSED_FORM))
     found, closed = read_blob(measured.blob), read_blob(designed.blob)

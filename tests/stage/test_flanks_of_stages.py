@@ -1,4 +1,4 @@
-"""Flanks and runout of sets and trains: the same fields, whatever the stage is made of."""
+"""Flanks and runout of sets: the same fields, whatever the stage is made of."""
 
 from __future__ import annotations
 

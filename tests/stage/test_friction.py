@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import brentq
 
 import gearfmu as gf
-from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, free_pair, started
+from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, started
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
@@ -26,11 +26,6 @@ from gearfmu.stagefile.tables.connections import FrictionSpec, PortSpec
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
 EM = 1.0
-
-
-@pytest.fixture(scope="module")
-def pair_free(spec: Stage, bodies: list[Body]) -> FreePair:
-    return free_pair(spec, bodies)
 
 
 # ---- a block on a spring: exact --------------------------------------------------------------------------------------

@@ -11,14 +11,14 @@ from driven import begun, stepped
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
-from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.bodies import LeadSpec, Misalignment
 from gearfmu.stagefile.tables.connections import PortSpec
 
-TORQUE, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
+TORQUE = 150.0  # N·m on the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}
 SHAFTS = ("pinion", "wheel")
 
@@ -64,13 +64,6 @@ def test_axial_force_is_the_tangential_one_times_tan_beta(
     assert abs(kernel.get("mesh.force")) == pytest.approx(normal, rel=1e-6)
     assert pinion[2] == pytest.approx(tangential * math.tan(gear.beta), rel=1e-6)
     assert wheel[2] == pytest.approx(-pinion[2], rel=1e-6)
-
-
-def steady(model: StageModel, torque: float = TORQUE, **parameters: float) -> dict[str, np.ndarray]:
-    """Constant speed and load for ten mesh periods, the first four left away."""
-    period = 2 * math.pi / 23 / SPEED
-    trace = simulate(model, Steady(model, SPEED, torque), 10 * period, period / 60, {"level": 1.0} | parameters)
-    return {name: trace[name][240:] for name in trace.channels}
 
 
 def with_bearings(spec: Stage) -> Stage:

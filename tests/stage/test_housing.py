@@ -73,12 +73,6 @@ def with_feet(chosen: Stage, **springs: float) -> Stage:
     return chosen.model_copy(update={"supports": tuple(feet)})
 
 
-def undamped(chosen: Stage) -> Stage:
-    """The stage without dashpots at its supports."""
-    supports = tuple(s.model_copy(update={"damping_ratio": 0.0}) for s in chosen.supports)
-    return chosen.model_copy(update={"supports": supports})
-
-
 def block(name: str, mass: float) -> GroundPart:
     """A rigid body with one node at its origin."""
     return GroundPart(

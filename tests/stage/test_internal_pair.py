@@ -76,7 +76,7 @@ def flank_of(stage: Stage, mesh: RingMesh, which: int, pose: np.ndarray, place: 
     return lambda roll: axis + turn @ gear.flank_point(roll, 1 - 2 * place[0])
 
 
-EDGES = {"pinion": 0, "ring": 1}
+EDGES, HOLLOW = {"pinion": 0, "ring": 1}, (1, -1)
 
 
 def past(mesh: RingMesh, place, which: int) -> bool:
@@ -106,6 +106,7 @@ def test_gap_is_the_distance_of_two_involutes(stage: Stage, mesh: RingMesh, inne
             distance = math.sqrt(near.fun / 1e9)
             worst, count = max(worst, abs(distance - (place.gap - allowance))), count + 1
             assert near.x[0] == pytest.approx(place.roll[0], abs=2e-6)
+            assert place.curvature == pytest.approx(1 / place.roll[0] - 1 / place.roll[1], rel=1e-9)
     print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 6 and worst < 1e-10
 
@@ -129,7 +130,8 @@ def edge_centre(mesh: RingMesh, which: int) -> np.ndarray:
 def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
     stage: Stage, mesh: RingMesh, inner: Inner, edge: str
 ) -> None:
-    """The gap is the shortest distance of the arc's centre from the other flank, less the radius; open flanks."""
+    """The gap is the shortest distance of the arc's centre from the other flank, less the radius; open flanks. From
+    the flank's end on the curvature of the edge takes the place of the flank's."""
     c, o, worst, count = EDGES[edge], 1 - EDGES[edge], 0.0, 0
     for phi in np.linspace(0.0, 2 * math.pi / mesh.planet.z, 60):
         pose = rolling(mesh, phi, 2e-5)
@@ -149,6 +151,8 @@ def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
             )
             worst, count = max(worst, abs(near.fun - mesh.gears[c].tip_edge - place.gap)), count + 1
             assert near.x == pytest.approx(place.roll[o], abs=2e-6)
+            own = place.curvature - HOLLOW[o] / place.roll[o]
+            assert HOLLOW[c] / mesh.gears[c].s_tip - 1e-9 < own < 1 / mesh.gears[c].tip_edge + 1e-9
     print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 3 and worst < 1e-9
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from doubled import doubled
 
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble
@@ -39,33 +40,14 @@ def held(support: SupportSpec, extra: float = 0.0) -> SupportSpec:
 
 def opposed(stage: Stage) -> Stage:
     """The pair and its image, turned by half a turn about the wheel's axis, with a bearing between both wheels."""
-    two = {name: f"{name}2" for name in stage.bodies}
-    axis = np.array(stage.rotors["wheel"].axis)
-    bodies = {new: stage.bodies[old].model_copy(update={"name": new}) for old, new in two.items()}
-    rotors = {
-        f"{name}2": rotor.model_copy(
-            update={
-                "axis": tuple(2 * axis - np.array(rotor.axis)),
-                "bodies": {two[body]: place for body, place in rotor.bodies.items()},
-            }
-        )
-        for name, rotor in stage.rotors.items()
-    }
-    mesh = stage.engagements[0]
-    again = mesh.model_copy(update={"name": "mesh2", "gears": tuple(two[name] for name in mesh.gears)})
-    supports = [held(support) for support in stage.supports]
-    supports += [s.model_copy(update={"name": two[s.name], "body": two[s.body]}) for s in supports]
-    between = SupportSpec(name="between", body="wheel", to="wheel2", radial=BETWEEN, damping_ratio=0.0)
-    ports = {two[name]: port.model_copy(update={"body": two[port.body]}) for name, port in stage.ports.items()}
-    return stage.model_copy(
-        update={
-            "bodies": stage.bodies | bodies,
-            "rotors": stage.rotors | rotors,
-            "engagements": (mesh, again),
-            "supports": (*supports, between),
-            "ports": stage.ports | ports,
-        }
+    axis = stage.rotors["wheel"].axis
+    both = doubled(
+        stage.model_copy(update={"supports": tuple(map(held, stage.supports))}),
+        lambda name: f"{name}2",
+        lambda own: (2 * axis[0] - own[0], 2 * axis[1] - own[1]),
     )
+    between = SupportSpec(name="between", body="wheel", to="wheel2", radial=BETWEEN, damping_ratio=0.0)
+    return both.model_copy(update={"supports": (*both.supports, between)})
 
 
 def run(stage: Stage, bodies: dict[str, Any], inputs: dict[str, float]) -> dict[str, np.ndarray]:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from by_hand import slice_weights
 from driven import begun, stepped
-from numpy.polynomial import legendre
 from scipy.interpolate import BarycentricInterpolator
 from turned_rows import on_tooth
 
@@ -19,7 +19,7 @@ from gearfmu.femesh import sector_mesh
 from gearfmu.kernel import Kernel
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.reduction.cyclic.statics import Statics, static_tables
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.assembly.groups import MOTIONS
@@ -99,7 +99,7 @@ def test_amplitudes_belong_to_the_state(observed: StageModel) -> None:
 # ---- the ring of a set ----
 @pytest.fixture(scope="module")
 def set_spec() -> Stage:
-    """planetary54 with a ring on a coarse mesh, whose unreduced statics are made again below."""
+    """planetary54 with a ring on a coarse mesh, whose unreduced statics are made again."""
     found = load_stage("planetary54")
     ring = found.written.ring
     own = ring.body.model_copy(update={"mesh": MESH, "modes": 300})
@@ -113,15 +113,6 @@ def set_bodies(set_spec: Stage) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def statics(set_spec: Stage) -> Statics:
-    """Of the finite elements of the ring."""
-    ring = set_spec.by_file["ring"]
-    geometry = gear_shape(ring)
-    mesh = sector_mesh(geometry, ring.face_width, MESH)
-    return static_tables(SectorBody(mesh, ring.material, *tooth_flank(geometry, ring)), [])
-
-
-@pytest.fixture(scope="module")
 def set_model(set_spec: Stage, set_bodies: list[Any]) -> StageModel:
     return assemble(set_spec, set_bodies, observe=("ring",))
 
@@ -130,14 +121,6 @@ def set_model(set_spec: Stage, set_bodies: list[Any]) -> StageModel:
 def at_rest(set_model: StageModel) -> Kernel:
     """600 N·m on the carrier, every mode dynamic."""
     return begun(set_model.kernel(level=FULL), {"carrier.tau": TORQUE, "sun.tau": -TORQUE / 4})
-
-
-def slice_coefficients() -> np.ndarray:
-    """(slices, A): (2a + 1)·mean of P_a over each slice."""
-    edges = np.linspace(-1, 1, SLICES + 1)
-    integrals = [legendre.legint(np.eye(5)[a]) for a in range(5)]
-    between = [(2 * a + 1) * np.diff(legendre.legval(edges, integral)) for a, integral in enumerate(integrals)]
-    return np.array(between).T * SLICES / 2
 
 
 def loads(spec: Stage, model: StageModel, at_rest: Kernel) -> list[tuple[int, float, np.ndarray]]:
@@ -160,17 +143,21 @@ def loads(spec: Stage, model: StageModel, at_rest: Kernel) -> list[tuple[int, fl
             turned = 2 * math.pi * space / ring.z + ring_phase - carrier - action
             roll = ring.r_b * (math.remainder(turned, 2 * math.pi) + ring.psi_b)
             if sum(of_slices) > 0:
-                found.append((space, roll, np.array(of_slices) @ slice_coefficients()))
+                found.append((space, roll, np.array(of_slices) @ slice_weights(SLICES, 5)))
     return found
 
 
 def test_the_ring_at_rest_is_deformed_as_its_unreduced_statics_say(
-    set_spec: Stage, set_bodies: list[Any], set_model: StageModel, at_rest: Kernel, statics: Statics
+    set_spec: Stage, set_bodies: list[Any], set_model: StageModel, at_rest: Kernel
 ) -> None:
     """Displacement of the rim in all 54 sectors: modes with the kernel's amplitudes against the static tables of the
     finite elements, loaded by the contact forces and by the moment on the mounts, spread round the rim. Measured: 0.6 %
     of the largest; what the stored modes leave out, and one mean tooth table."""
     ring, z = set_bodies[2], 54
+    shape, wheel = gear_shape(set_spec.by_file["ring"]), set_spec.by_file["ring"]
+    statics = static_tables(
+        SectorBody(sector_mesh(shape, wheel.face_width, MESH), wheel.material, *tooth_flank(shape, wheel)), []
+    )
     q = amplitudes(at_rest, "ring", ring)
     by_modes = np.array([on_tooth(ring.flank, ring.sensors.rows, sector, z) @ q for sector in range(z)])
     table, exact = BarycentricInterpolator(ring.flank.roll, np.moveaxis(statics.static_fp[0], 1, 0)), np.zeros((z, 3))

@@ -1,5 +1,5 @@
-"""Physics of the shipped pair: free rattle keeps its energy and its backlash, every effect does what its name says,
-bad values are refused."""
+"""Physics of the shipped pair: free rattle keeps its energy and its backlash, coast flanks and bearings that are
+off, bad values refused. Other effects: test_effects.py."""
 
 from __future__ import annotations
 

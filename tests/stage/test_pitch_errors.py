@@ -51,19 +51,6 @@ def test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh(
     assert held[0] and free[-1] and np.all(np.diff(held.astype(int)) <= 0) and np.all(np.diff(free.astype(int)) >= 0)
 
 
-@pytest.mark.parametrize("gear", [0, 1])
-def test_a_receding_tooth_matters_only_where_it_is_alone(
-    gear: int, spec: Stage, bodies: list[Body], pair: PairGeometry
-) -> None:
-    """Neighbours take over before the pinion has moved by F_pi cos α: their tip corners reach in from off the line of
-    action."""
-    tables: list[dict[int, float]] = [{}, {}]
-    tables[gear] = {0: -DEVIATION}
-    te = light_te(spec, bodies, *tables)
-    assert np.all(te > -2e-9) and np.all(te < ALONG_NORMAL + 2e-9)
-    assert np.mean(np.abs(te) < 2e-9) > pair.contact_ratio - 1 and te.max() > 0.2 * ALONG_NORMAL
-
-
 def test_coast_flanks_see_the_other_side(spec: Stage, bodies: list[Body], pair: PairGeometry) -> None:
     """The flank that leads on the drive side trails on the coast side: what protrudes there has a negative sign."""
     te = light_te(spec, bodies, {0: -DEVIATION}, {}, torque=-LIGHT)

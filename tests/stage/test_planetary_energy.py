@@ -1,6 +1,6 @@
 """Energy of the time step on a planetary set with pins out of place: with the mesh position frozen the invariant holds
 through changes of contact in eight meshes, the carrier standing or turning; with damping it never grows; controls are
-seen to fail; order in closed contact; central beside dg4. The names T1 to T10 are those of test_energy.py."""
+seen to fail; order in closed contact. The names T1 to T10 are those of test_energy.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standalone runs of the shipped pair: mean values, work, agreement and order of the integrators, restart."""
+"""Standalone runs of the shipped pair: mean values, agreement and order of the integrators, what a run records."""
 
 from __future__ import annotations
 

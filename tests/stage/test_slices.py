@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.polynomial import Legendre
+from by_hand import slice_weights
 from scipy.integrate import quad
 from slices import by_functions_alone
 
@@ -79,17 +79,11 @@ def patches(apart: float, half: float) -> float:
     return sum(quad(weighed, *pair, limit=200)[0] for pair in zip(ends, ends[1:], strict=False))
 
 
-def weights() -> np.ndarray:
-    """(SLICES, A): of a slice on the width functions."""
-    edges = np.linspace(-1, 1, SLICES + 1)
-    means = [np.diff(Legendre.basis(d).integ()(edges)) / np.diff(edges) for d in DEGREES]
-    return np.stack([(2 * d + 1) * mean for d, mean in zip(DEGREES, means, strict=True)], axis=1)
-
-
 def local_terms(helix: float) -> tuple[np.ndarray, np.ndarray]:
     """(SLICES, SLICES) 1/m: of the slices' patches, and of their width functions, end faces as mirrors, half-way up."""
     table = between_functions(WIDTH, STRIP, helix, np.array([0.3]), DEGREES)[0]
-    z, t, along = WIDTH * ((np.arange(SLICES) + 0.5) / SLICES - 0.5), weights(), math.cos(helix)
+    z, along = WIDTH * ((np.arange(SLICES) + 0.5) / SLICES - 0.5), math.cos(helix)
+    t = slice_weights(SLICES, DEGREES.size)
     half = WIDTH / SLICES / 2 / along
     places = WIDTH * np.linspace(0, 1, DISTANCES)
     own, smeared = np.empty((2, SLICES, SLICES))

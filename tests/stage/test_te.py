@@ -1,5 +1,4 @@
-"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two methods to one number, convergence,
-smoothness."""
+"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two methods to one number, smoothness."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from doubled import doubled
 from driven import begun
 
 from gearfmu.body import load_bodies
@@ -17,7 +18,7 @@ from gearfmu.errors import SpecError
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
-from gearfmu.stagefile.forms.general import RotorSpec, Stage
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import shafts_of
 from gearfmu.stagefile.reading.base import read_toml
@@ -25,7 +26,7 @@ from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
 
 FAST, STEPS, H = 1, 60, 5e-5
-TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
+TORQUE = 120.0  # N·m on the input
 
 
 def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
@@ -37,39 +38,12 @@ def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
     return simulate(model, inputs, STEPS * H, H, {"level": FAST})
 
 
-def side_by_side(pair: Stage) -> Stage:
-    """The pair twice in one stage, far apart; names of the second begin with "b_"."""
-
-    def named(name: str) -> str:
-        return f"b_{name}"
-
-    bodies = {named(n): gear.model_copy(update={"name": named(n)}) for n, gear in pair.bodies.items()}
-    rotors = {
-        named(n): RotorSpec(axis=(rotor.axis[0], 1.0), bodies={named(b): at for b, at in rotor.bodies.items()})
-        for n, rotor in pair.rotors.items()
-    }
-    meshes = [
-        mesh.model_copy(update={"name": named(mesh.name), "gears": tuple(map(named, mesh.gears))})
-        for mesh in pair.engagements
-    ]
-    supports = [s.model_copy(update={"name": named(s.name), "body": named(s.body)}) for s in pair.supports]
-    ports = {named(n): port.model_copy(update={"body": named(port.body)}) for n, port in pair.ports.items()}
-    return pair.model_copy(
-        update={
-            "bodies": pair.bodies | bodies,
-            "rotors": pair.rotors | rotors,
-            "engagements": (*pair.engagements, *meshes),
-            "supports": (*pair.supports, *supports),
-            "ports": pair.ports | ports,
-        }
-    )
-
-
 def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, relieved) -> None:
     """Pairs that nothing connects do not know of each other, at different loads and speeds: the same bits as each alone
     at its place."""
     pair = relief_spec
-    both = assemble(side_by_side(pair), [*bodies, *bodies])
+    far = doubled(pair, lambda name: f"b_{name}", lambda axis: (axis[0], 1.0))
+    both = assemble(far, [*bodies, *bodies])
     there = {n: rotor.model_copy(update={"axis": (rotor.axis[0], 1.0)}) for n, rotor in pair.rotors.items()}
     apart = assemble(pair.model_copy(update={"rotors": there}), bodies)
     first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
