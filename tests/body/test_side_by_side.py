@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import apart, reduce_bodies, reduce_body
+from gearfmu.body import apart, body_needs, reduce_bodies, reduce_body
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.errors import MeshError
 from gearfmu.reduction import memory
@@ -98,6 +98,12 @@ def test_a_carrier_that_does_not_fit_is_refused_with_the_counts_to_lower(
     monkeypatch.setattr(memory, "available_memory", lambda: 1e9)
     with pytest.raises(MeshError, match=r"carrier.*about \d\.\d GB .*carrier\.mesh \(around = 4.*scale = 1\)"):
         reduce_body(load_stage("planetary54"), "carrier")
+
+
+def test_every_body_of_a_stage_has_its_need_before_the_work(spec: object) -> None:
+    assert set(body_needs(spec)) == {"pinion", "wheel"}
+    assert set(body_needs(load_stage("planetary54"))) == {"sun", "planet", "ring", "carrier"}
+    assert {"pinion1", "wheel1"} <= set(body_needs(load_stage("two_stage")))
 
 
 @pytest.mark.full

@@ -76,6 +76,9 @@ def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(ma
     spec, bodies, folder = made
     before = body_path(spec, "pinion").stat().st_mtime_ns
     assert np.array_equal(reduce_bodies(spec)[0].frequency, bodies[0].frequency)
+    body_path(spec, "wheel").unlink()
+    reduce_bodies(spec)
+    assert body_path(spec, "wheel").is_file(), "what is missing is made, and nothing else"
     assert body_path(spec, "pinion").stat().st_mtime_ns == before
     assert [b.name for b in load_bodies(spec)] == ["pinion", "wheel"]
     softer = spec.written.gears[0].material.model_copy(update={"youngs_modulus": 103e9})

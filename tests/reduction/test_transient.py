@@ -6,12 +6,10 @@ from dataclasses import replace
 from functools import cache, lru_cache
 
 import numpy as np
-import pytest
 import scipy.sparse as sp
 from small_body import tiny
 
 from evidence.reduction.in_time.transient import Assembly, Joints, Member, Motion, Scheme, _JointSolver, integrate
-from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -151,15 +149,3 @@ def test_contacts_are_solved_by_either_way() -> None:
         left = free - solver.matrix @ one
         assert np.all(one[kinds] <= 0) and np.all(left[kinds] > -1e-9) and np.allclose(left[~kinds], 0, atol=1e-9)
         assert np.allclose(left * one, 0, atol=1e-9)
-
-
-def test_bad_input_is_refused() -> None:
-    scene = pushed("s")
-    with pytest.raises(BodyError, match="alpha"):
-        integrate(scene, Scheme(1e-6, 1e-5, alpha=0.1))
-    with pytest.raises(BodyError, match="jump"):
-        integrate(replace(scene, history=lambda t: 1.0), WINDOW)
-    with pytest.raises(BodyError, match="closed"):
-        integrate(pushed("c", gap=-1e-6), WINDOW)
-    with pytest.raises(BodyError, match="springs"):
-        Member.whole(tiny().grounded())

@@ -7,13 +7,15 @@ numbers. Assembled models and reduced bodies are made once a process.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from _pytest.mark.structures import ParameterSet
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
@@ -35,6 +37,7 @@ COARSE = BodySpec(
     mesh=MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2),
 )
 Change = Callable[[Stage], Stage]
+FULL = pytest.mark.full
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,7 @@ class Kind:
         """A few milliseconds under `scale` times the torque, at level fast unless `parameters` say another."""
         driven = model.driven_by_springs()
         inputs = Steady(driven, self.speed, scale * self.torque)
-        fast = {"level": float(level_number(driven, "fast"))}
-        return simulate(driven, inputs, self.duration, self.step, fast | dict(parameters or {}))
+        return simulate(driven, inputs, self.duration, self.step, at_level(driven) | dict(parameters or {}))
 
 
 KINDS = {
@@ -185,6 +187,17 @@ def level_number(model: StageModel, level: str) -> int:
     """The kernel's number of a fidelity level."""
     variable = next(v for v in model.kernel_variables() if v.name == "level")
     return variable.items.index(level)
+
+
+def at_level(model: StageModel, level: str = "fast", **parameters: float) -> dict[str, float]:
+    """Parameters of a run at a fidelity level."""
+    return {"level": float(level_number(model, level))} | parameters
+
+
+def every(full: Iterable[str] = (), seeds: Iterable[int] = range(20)) -> list[ParameterSet]:
+    """A test's parameters: each kind, those named `full` under make test-full, and there the drawn stages too."""
+    named = [pytest.param(kind, id=name, marks=[FULL] * (name in full)) for name, kind in KINDS.items()]
+    return named + [pytest.param(drawn(seed), id=f"drawn-{seed}", marks=FULL) for seed in seeds]
 
 
 def channels(trace: Trace) -> dict[str, np.ndarray]:

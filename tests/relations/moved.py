@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from kinds import Kind, channels, level_number
+from kinds import Kind, at_level, channels
 
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.assembly.meshes import tooth_phases
@@ -90,8 +90,7 @@ def run(
         values = {name: sense * value for name, value in steady(time).items()}
         return {name: value + ahead[name[:-4]] if name.endswith(".phi") else value for name, value in values.items()}
 
-    fast = {"level": float(level_number(driven, "fast"))}
-    found = channels(simulate(driven, inputs, kind.duration, kind.step, fast))
+    found = channels(simulate(driven, inputs, kind.duration, kind.step, at_level(driven)))
     del found["energy.residual"]  # a small difference of energies that are compared themselves
     for rotor, place in places.items():
         if f"{rotor}.gear.phi" in found:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builds import double_library, edited_library
-from kinds import KINDS, Kind, family, level_number, loaded
+from kinds import KINDS, Kind, at_level, family, loaded
 
 from gearfmu.kernel import Kernel
 
@@ -24,8 +24,7 @@ TOLERANCE = 5e-6  # of the largest force: found up to 7e-7; the scalar of a step
 
 def started(kind: Kind, library: Path) -> Kernel:
     model, inputs = kind.model().driven_by_springs(), loaded(kind)
-    fast = {"level": float(level_number(model, "fast")), "h": H}
-    kernel = Kernel(model.blob, fast | {"effect.friction": 1.0}, library=library)
+    kernel = Kernel(model.blob, at_level(model, h=H) | {"effect.friction": 1.0}, library=library)
     for name, value in inputs(0.0).items():
         kernel.set(name, value)
     kernel.initialize()

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, drawn, level_number
+from kinds import KINDS, Kind, at_level, drawn
 
 from gearfmu.stage import StageModel, Steady, Trace, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
@@ -66,7 +66,7 @@ def deviations(trace: Trace, model: StageModel, kind: Kind) -> dict[str, float]:
 
 def ran(kind: Kind, parameters: dict[str, float], step: float = STEP) -> tuple[Trace, StageModel]:
     model = kind.model().driven_by_springs()
-    known = {"level": float(level_number(model, "fast")), **parameters}
+    known = at_level(model) | parameters
     return simulate(model, Steady(model, kind.speed, kind.torque), DURATION, step, known), model
 
 

@@ -15,7 +15,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from kinds import HOUSED, KINDS, Kind, bodies_of, channels, drawn, family, level_number, listed, loaded
+from kinds import HOUSED, KINDS, Drawn, Kind, at_level, bodies_of, channels, every, family, level_number, listed, loaded
 
 from gearfmu.stage import assemble
 from gearfmu.stage.assembly.blob import read_blob, with_guid, write_blob
@@ -33,7 +33,7 @@ DRAWN_DASHPOT = 0.1  # of drawn stages; found up to 0.061
 MOMENTUM = 0.02  # root mean square: trapezoids of forces; modal damping holds bodies a little
 ENERGY = 1e-3  # of what passed through the ports, in fractions of a pitch; found up to 3e-4
 WORK, DRAWN_WORK = 1e-6, 6e-6  # of the same; found up to 3e-6 in drawn sets, 3.6e-6 in one with friction
-DEAR = [pytest.param(name, marks=pytest.mark.full) if name == "helical_set" else name for name in KINDS]
+DEAR = ["helical_set"]
 START = 30  # steps in which friction, unknown at rest, sets in
 RATE = 2e-5  # of the speed of a port
 TORQUE = 1  # kind of a port in the blob
@@ -88,20 +88,14 @@ def is_at_rest(kind: Kind, time: float, level: str = "fast") -> None:
     assert np.abs(moment).max() < MOMENTS * torque, moment / torque
 
 
-@pytest.mark.parametrize("name", DEAR)
-def test_a_stage_at_rest_is_held_by_its_supports_and_ports(name: str) -> None:
-    """Where its input has made a third of a turn."""
-    is_at_rest(KINDS[name], 2 * math.pi / 3 / KINDS[name].speed)
+@pytest.mark.parametrize("kind", every(DEAR))
+def test_a_stage_at_rest_is_held_by_its_supports_and_ports(kind: Kind) -> None:
+    """Where its input has made a third of a turn, drawn stages at the start."""
+    is_at_rest(kind, 0.0 if isinstance(kind, Drawn) else 2 * math.pi / 3 / kind.speed)
 
 
 def test_a_housed_stage_at_rest_is_held_by_its_feet() -> None:
     is_at_rest(HOUSED, 0.0, "rigid")
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
-def test_a_drawn_stage_at_rest_is_held_by_its_supports_and_ports(seed: int) -> None:
-    is_at_rest(drawn(seed), 0.0)
 
 
 # ---- ports ----------------------------------------------------------------------------------------------------------
@@ -129,8 +123,7 @@ def test_the_speed_of_a_port_is_the_rate_of_its_angle(name: str, h: float) -> No
         own = {n: value for n, value in loaded(kind)(time).items() if not n.startswith(f"{port}.")}
         return own | {f"{port}.tau": torque}
 
-    set_up = {"level": float(level_number(model, "fast")), "h": h, f"{port}.w_start": speed}
-    out = simulate(model, inputs, 200 * h, h, set_up)
+    out = simulate(model, inputs, 200 * h, h, at_level(model, h=h) | {f"{port}.w_start": speed})
     w, turned = out[f"{port}.w"], out[f"{port}.phi"][-1] - out[f"{port}.phi"][20]
     rate = turned / (out.time[-1] - out.time[20])
     assert np.trapezoid(w[20:], out.time[20:]) / (out.time[-1] - out.time[20]) == pytest.approx(rate, rel=RATE)
@@ -146,12 +139,15 @@ def layout_of(kind: Kind) -> Layout:
     return stage_layout(stage, gears, {body.name: body for body in carriers}, few)
 
 
-def has_its_dashpots(kind: Kind, allowed: float = DASHPOT) -> None:
+@pytest.mark.parametrize("kind", every(DEAR))
+def test_a_support_gives_its_force_by_spring_and_own_dashpot(kind: Kind) -> None:
     """Force − k·displacement = c·speed in every direction of every support that has a dashpot. On the ground of a set
-    dashpots turn with the axes of the carrier (docs/theory, 3.10): their speed is that in these axes."""
+    dashpots turn with the axes of the carrier (docs/theory, 3.10): their speed is that in these axes. Seen by it:
+    dashpots of other supports in the force of a bearing; a displacement that is force over stiffness, dashpots
+    included."""
+    allowed = DRAWN_DASHPOT if isinstance(kind, Drawn) else DASHPOT
     model, layout = kind.model().driven_by_springs(), layout_of(kind)
-    set_up = {"level": float(level_number(model, "fast")), "h": STEP}
-    out = channels(simulate(model, loaded(kind), 80 * STEP, STEP, set_up))
+    out = channels(simulate(model, loaded(kind), 80 * STEP, STEP, at_level(model, h=STEP)))
     turning = [out[f"{carrier.name}.gear.w"][1:-1] for carrier in model.stage.carriers]
     names = [*zip(layout.support_names(), layout.displacement_names(), strict=True)]
     constants = [(c, s.damping[i]) for s in layout.supports for i, c in enumerate(np.diag(s.compliance))]
@@ -180,19 +176,6 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
-@pytest.mark.parametrize("name", DEAR)
-def test_a_support_gives_its_force_by_spring_and_own_dashpot(name: str) -> None:
-    """Seen by it: dashpots of other supports in the force of a bearing; a displacement that is force over stiffness,
-    dashpots included."""
-    has_its_dashpots(KINDS[name])
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
-def test_a_support_of_a_drawn_stage_gives_its_force_by_spring_and_own_dashpot(seed: int) -> None:
-    has_its_dashpots(drawn(seed), DRAWN_DASHPOT)
-
-
 # ---- momentum -------------------------------------------------------------------------------------------------------
 MOVED = [(name, effect) for name in ("pair", "helical", "internal") for effect in (None, "friction", "film")]
 BESIDE = ("helical", None)  # runs with an effect have all that is in this one
@@ -208,9 +191,8 @@ def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | 
     stage, bodies = kind.stage, bodies_of(kind.file)
     gears = [gear.name for gear in stage.gears]
     observed = assemble(stage, listed(stage, bodies), observe=gears).driven_by_springs()
-    set_up = {"level": float(level_number(observed, "full")), "h": step}
     on = {f"effect.{effect}": 1.0} if effect else {}
-    out = channels(simulate(observed, loaded(kind), 150 * step, step, set_up | on))
+    out = channels(simulate(observed, loaded(kind), 150 * step, step, at_level(observed, "full", h=step) | on))
     rate, force = 0.0, 0.0
     for gear in gears:
         turned = np.exp(1j * (tooth_phases(stage)[gear] + out[f"{gear}.gear.phi"]))
@@ -226,9 +208,8 @@ def test_forces_on_the_ground_are_the_rate_of_momentum(name: str, effect: str | 
 def keeps_its_energy(kind: Kind, allowed: float = WORK, **parameters: float) -> float:
     """What friction and film took, over the energy that passed the ports."""
     model, inputs = kind.model().driven_by_springs(), loaded(kind)
-    set_up = {"level": float(level_number(model, "fast"))}
     step = kind.step
-    out = channels(simulate(model, inputs, 20 * step, step, set_up | parameters))
+    out = channels(simulate(model, inputs, 20 * step, step, at_level(model, **parameters)))
     speeds = {port: inputs(0.0)[f"{port}.w"] for port in kind.stage.ports}
     powers = {port: -out[f"{port}.tau_mean"][1:] * speed for port, speed in speeds.items()}
     through = sum(float(np.abs(power).sum()) * step for power in powers.values())
@@ -243,9 +224,11 @@ def keeps_its_energy(kind: Kind, allowed: float = WORK, **parameters: float) -> 
     return float(np.max(known)) / through
 
 
-@pytest.mark.parametrize("name", DEAR)
-def test_power_of_the_ports_is_what_is_stored_and_lost(name: str) -> None:
-    keeps_its_energy(KINDS[name])
+@pytest.mark.parametrize("kind", every(DEAR))
+def test_power_of_the_ports_is_what_is_stored_and_lost(kind: Kind) -> None:
+    """Seen by it: a planet whose teeth are placed by a branch of atan2 overlaps its neighbours, and the stage gains up
+    to 6 % of what passes."""
+    keeps_its_energy(kind, DRAWN_WORK if isinstance(kind, Drawn) else WORK)
 
 
 @pytest.mark.parametrize(("name", "effect"), [("helical", "friction"), ("helical", "film"), ("set", "friction")])
@@ -257,19 +240,9 @@ def test_power_of_the_ports_is_what_is_stored_and_lost_with_oil(name: str, effec
     assert effect == "film" or 1e-3 < taken < 2e-2
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
-def test_power_of_the_ports_of_a_drawn_stage_is_what_is_stored_and_lost(seed: int) -> None:
-    """Seen by it: a planet whose teeth are placed by a branch of atan2 overlaps its neighbours, and the stage gains up
-    to 6 % of what passes."""
-    keeps_its_energy(drawn(seed), DRAWN_WORK)
-
-
-@pytest.mark.parametrize("name", DEAR)
-def test_a_stage_without_load_leaves_no_step_unsolved(name: str) -> None:
+@pytest.mark.parametrize("kind", every(DEAR, seeds=()))
+def test_a_stage_without_load_leaves_no_step_unsolved(kind: Kind) -> None:
     """Forces near zero are no measure of what has settled (gk_couple.c, NEGLIGIBLE)."""
-    kind = KINDS[name]
     model = kind.model().driven_by_springs()
-    fast = {"level": float(level_number(model, "fast"))}
-    trace = simulate(model, loaded(kind, 0.0), kind.duration, kind.step, fast)
+    trace = simulate(model, loaded(kind, 0.0), kind.duration, kind.step, at_level(model))
     assert trace["solver.retried_steps"][-1] == 0 and trace["solver.steps"][-1] > 90

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, drawn
+from kinds import KINDS, Drawn, Kind, every
 
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.place import place_of
@@ -52,23 +52,11 @@ def te_of(model: StageModel, torque: float, **parameters: float) -> Callable[[fl
     return lambda part: kernel.transmission(-part * place.pitch, torque, place.number).te
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(kind, marks=[pytest.mark.full] * (name == "helical_set")) for name, kind in KINDS.items()],
-    ids=KINDS,
-)
+@pytest.mark.parametrize("kind", every(full=["helical_set"]))
 def test_transmission_error_does_not_jump_over_a_pitch(kind: Kind) -> None:
     """Rolls of all tooth pairs pass every cell of the grid along the flank, its first and last among them."""
-    places = np.linspace(0, 1, POSITIONS[kind.name] + 1)
-    assert jump(te_of(kind.model(), kind.torque), places) == (0.0, pytest.approx(np.nan, nan_ok=True))
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
-def test_transmission_error_of_a_drawn_stage_does_not_jump(seed: int) -> None:
-    kind = drawn(seed)
-    places = np.linspace(0, 1, 2 * POSITIONS[kind.name.partition("-")[0]] + 1)
-    assert jump(te_of(kind.model(), kind.torque), places)[0] == 0.0
+    count = POSITIONS[kind.name.partition("-")[0]] * (2 if isinstance(kind, Drawn) else 1)
+    assert jump(te_of(kind.model(), kind.torque), np.linspace(0, 1, count + 1))[0] == 0.0
 
 
 @pytest.mark.parametrize("name", ["pair", "helical", pytest.param("train", marks=pytest.mark.full)])

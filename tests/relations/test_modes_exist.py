@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from kinds import KINDS, Kind, bodies_of, drawn, listed
+from kinds import FULL, KINDS, Kind, bodies_of, drawn, listed
 
 from gearfmu.kernel import Kernel
 from gearfmu.modes import linear
@@ -20,6 +20,7 @@ from gearfmu.stage import StageModel
 from gearfmu.stage.run.limits import engagements_per_turn
 
 COUNT = 16
+DEAR = {"train": 3, "set": 12, "helical_set": 2}  # positions
 
 
 @pytest.fixture(autouse=True)
@@ -57,7 +58,15 @@ def frequencies(kind: Kind, model: StageModel, position: float) -> tuple[np.ndar
     return np.sqrt(np.delete(squared, np.argsort(np.abs(squared))[:free])) / (2 * np.pi), free
 
 
-def require_real_modes(kind: Kind, positions: int) -> None:
+@pytest.mark.parametrize(
+    ("kind", "positions"),
+    [pytest.param(KINDS[name], n, id=f"{name}-{n}") for name, n in (("pair", 12), ("helical", 3), ("internal", 12))]
+    + [pytest.param(KINDS[name], n, id=f"{name}-{n}", marks=FULL) for name, n in DEAR.items()]
+    + [pytest.param(drawn(seed), 3, id=f"drawn-{seed}", marks=FULL) for seed in range(20)],
+)
+def test_reported_modes_exist_at_every_position_and_none_is_missing(kind: Kind, positions: int) -> None:
+    """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means
+    over the positions ("1197 Hz") were those of different modes."""
     model = kind.model()
     found = modes_of(kind, model, positions)
     numbers = []
@@ -70,23 +79,6 @@ def require_real_modes(kind: Kind, positions: int) -> None:
         sure = 0.9 * found.frequency[:, COUNT // 2 :].min()  # modes at the end of the list may leave it
         assert (own < sure).sum() == (real < sure).sum(), f"modes below {sure:.0f} Hz"
     assert found.rigid.shape == (positions, max(numbers))
-
-
-@pytest.mark.parametrize(
-    ("name", "positions"),
-    [("pair", 12), ("helical", 3), ("internal", 12),
-     *(pytest.param(*dear, marks=pytest.mark.full) for dear in (("train", 3), ("set", 12), ("helical_set", 2)))],
-)  # fmt: skip
-def test_reported_modes_exist_at_every_position_and_none_is_missing(name: str, positions: int) -> None:
-    """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means
-    over the positions ("1197 Hz") were those of different modes."""
-    require_real_modes(KINDS[name], positions)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(20))
-def test_so_do_those_of_drawn_stages(seed: int) -> None:
-    require_real_modes(drawn(seed), 3)
 
 
 def test_modes_are_the_same_at_four_times_as_many_positions() -> None:

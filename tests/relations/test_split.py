@@ -1,15 +1,12 @@
-"""R9, split: a run may be cut anywhere. Two runs joined by a state are one run, here or in another process; shorter
-communication steps are the same run; a run that goes on with another setup goes on where it was.
+"""R9, split: a run may be cut anywhere. Two runs joined by a state are one run; shorter communication steps
+are the same run; a run that goes on with another setup goes on where it was.
 
 Runs are joined under a load that has just halved, so that gears accelerate.
 """
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,26 +23,6 @@ QUICK = ("pair", "internal", "helical", "set")
 KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 3e-3  # of the family of an output
 BY_ROWS = 2e-3  # the first communication step has seven internal steps for six; measured: 7e-4
 AFRESH = 5e-5  # engagements that solve side by side begin each communication step afresh; measured: 2.1e-5
-PROCESS = """
-import sys
-from pathlib import Path
-import numpy as np
-from gearfmu.kernel import Kernel
-from gearfmu.kernel.instance import Recording
-folder = Path(sys.argv[1])
-given = dict(np.load(folder / "given.npz"))
-kernel = Kernel((folder / "blob").read_bytes(), {"level": 1.0, "h": float(sys.argv[2])})
-kernel.prepare()
-kernel.restore((folder / "state").read_bytes())
-names = [v.name for v in kernel.variables.values() if v.causality == "output"]
-first, h = int(sys.argv[3]), float(sys.argv[4])
-for i in range(len(next(iter(given.values())))):
-    for name, values in given.items():
-        kernel.set(name, float(values[i]))
-    kernel.step((first + i) * h, h)
-np.save(folder / "end.npy", [kernel.get(name) for name in names])
-(folder / "state").write_bytes(kernel.save())
-"""
 
 
 def kinds(quick: tuple[str, ...] = QUICK) -> list[object]:
@@ -119,21 +96,6 @@ def test_two_runs_joined_by_a_state_are_one(kind: Kind) -> None:
     inputs = given(kind, model, BEFORE, AFTER)
     rows = [step_on(kernel, inputs, BEFORE) for kernel in (one, other)]
     assert np.array_equal(*rows) and one.save() == other.save() and np.ptp(rows[0], axis=0).max() > 0
-
-
-@pytest.mark.parametrize("kind", kinds(("pair",)))
-def test_another_process_goes_on_with_the_same_bits(kind: Kind, tmp_path: Path) -> None:
-    model = kind.model().driven_by_springs()
-    kernel, inputs = begun(kind, model), given(kind, model, BEFORE, AFTER)
-    Recording(kernel, [], BEFORE, H).advance(BEFORE, given(kind, model, 0, BEFORE))
-    (tmp_path / "blob").write_bytes(model.blob)
-    (tmp_path / "state").write_bytes(kernel.save())
-    np.savez(tmp_path / "given.npz", **inputs)
-    step_on(kernel, inputs, BEFORE)
-    subprocess.run([sys.executable, "-c", PROCESS, str(tmp_path), repr(INNER), str(BEFORE), repr(H)], check=True)
-    names = [v.name for v in kernel.variables.values() if v.causality == "output"]
-    assert np.array_equal(np.load(tmp_path / "end.npy"), [kernel.get(name) for name in names])
-    assert (tmp_path / "state").read_bytes() == kernel.save()
 
 
 @pytest.mark.parametrize("kind", kinds(("pair", "internal", "set")))

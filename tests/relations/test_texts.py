@@ -1,5 +1,5 @@
 """R12, two texts with one meaning: a stage file in other units, with remarks, in another order of tables, with a byte
-order mark and other line ends is the same stage to the last bit, and makes the same model.
+order mark and other line ends is the same stage to the last bit.
 
 Where order has a meaning (`ORDERED`, lists) it is kept here; what it may change is the relation of order. Output in
 other code pages: tests/test_console.py.
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kinds import COARSE, KINDS, ROOT, assembled, bodies_of
+from kinds import KINDS, ROOT
 
 from gearfmu.quantities import to_si
 from gearfmu.stagefile.reading.files import find_stage, read_layers
@@ -114,20 +114,6 @@ def is_same(one: Any, other: Any) -> bool:
     return one == other and stages[0] == stages[1] and orders[0] == orders[1]
 
 
-def model_hash(kind: str, spec: Any) -> str:
-    """Hash of the assembled model, with the bodies that all relations share."""
-    if kind == "internal":
-        return assembled(with_coarse_bodies(spec), bodies_of(KINDS[kind].file)).hash
-    return assembled(spec, bodies_of(KINDS[kind].file)).hash
-
-
-def with_coarse_bodies(spec: Any) -> Any:
-    """The internal pair with element counts of the shared bodies."""
-    return spec.model_copy(
-        update={"bodies": {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}}
-    )
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_meaning_is_one_stage(kind: str, tmp_path: Path) -> None:
     """A byte order mark was an error of TOML in the first line. A pair whose file had [gears.wheel] above
@@ -142,15 +128,6 @@ def test_one_meaning_is_one_stage(kind: str, tmp_path: Path) -> None:
         ("all of them", Style(True, True, random.Random(2)), office),
     ):
         assert is_same(read(tmp_path, style.text(tables), encode), plain), name
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.full if "set" in kind or kind == "train" else ()) for kind in KINDS]
-)
-def test_one_meaning_is_one_model(kind: str, tmp_path: Path) -> None:
-    tables = tables_of(kind)
-    plain = model_hash(kind, read(tmp_path, Style().text(tables)))
-    assert model_hash(kind, read(tmp_path, Style(True, True, random.Random(3)).text(tables), office)) == plain
 
 
 @pytest.mark.full
