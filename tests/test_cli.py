@@ -26,12 +26,6 @@ from gearfmu.stage.run.trace import Channel, Trace
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def process(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd, check=False)
-
-
 def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
     code = "import sys; from gearfmu.cli import outcome; print(outcome(['--help'])); print(sorted(sys.modules))"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -205,7 +199,7 @@ def test_validate_returns_the_count_at_most_99(tmp_path: Path, count: int) -> No
 
 
 def test_version_is_the_packages() -> None:
-    assert process("--version").stdout.strip() == f"gearfmu, version {importlib.metadata.version('gearfmu')}"
+    assert call("--version")[1].strip() == f"gearfmu, version {importlib.metadata.version('gearfmu')}"
 
 
 def test_reduce_tells_degrees_of_freedom_time_and_memory(tmp_path: Path) -> None:

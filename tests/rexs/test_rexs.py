@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -206,13 +205,6 @@ def test_a_file_that_makes_no_stage_is_written_and_judged(tmp_path: Path, monkey
     monkeypatch.chdir(tmp_path)
     assert outcome(["new", "mine", "--rexs", str(path)]) == 1
     assert "no involute is left" in capsys.readouterr().err and (tmp_path / "mine" / "stage.toml").exists()
-
-
-def test_archives_are_read(tmp_path: Path) -> None:
-    archive = tmp_path / "pair.rexsz"
-    with zipfile.ZipFile(archive, "w") as target:
-        target.write(PAIR, "pair.rexs")
-    assert draft_from_rexs(archive).tables == draft_from_rexs(PAIR).tables
 
 
 @pytest.mark.parametrize(

@@ -13,17 +13,10 @@ from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.study.ladder import SET_DURATION, SET_SETTLE, window
 from gearfmu.study.run import Job, study
 from gearfmu.study.table import read_rows, write_rows
 
 ROW = SetRow("s", 4, 85.0, "fast", 5e-6, 5, "", 248, "full, 0.312 µs", 0.02, -0.001, 0.07, 0.03, 35.0, 1.0)
-
-
-def test_the_window_is_the_beginning_of_the_scene() -> None:
-    scene = load_scene("planetary_paper")
-    assert window(scene, quick=True).duration < window(scene).duration == SET_DURATION < scene.duration
-    assert window(scene).settle == SET_SETTLE
 
 
 @pytest.mark.full
