@@ -13,7 +13,7 @@ from gearfmu.report import heading, housing, page, sections
 from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.plan import plan_sections
-from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
+from gearfmu.report.results import energy_balance, strict
 from gearfmu.report.run import Run
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
@@ -40,7 +40,7 @@ def write(
     written.
     """
     folder, run = Path(out_dir), Run(trace, summary, spec, bodies, deformation)
-    results = {**key_results(trace), **dynamic_factors(trace), **energy_balance(trace)}
+    results = run.results | energy_balance(trace)
     made, missing = chosen_plots(run)
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
