@@ -89,7 +89,8 @@ def _figures(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
         for mesh in meshes(trace):
             late = detail_window(trace, mesh, angles.get(mesh))
             makers += [partial(plots.mesh_force_and_error, trace, mesh, part) for part in (None, late)]
-        over_frequency = [lambda: plots_nvh.force_spectrum(trace, window, angles)]
+        forces = plots_nvh.force_channels(trace)
+        over_frequency = [partial(plots_nvh.spectra, trace, window, angles, forces, plots_nvh.FORCES)]
     else:
         makers += [partial(planets.forces, trace, own, part) for part in (None, _late(run))]
         makers += [partial(make, trace, own, window) for make in (planets.planets, planets.sharing)]
