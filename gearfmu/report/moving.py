@@ -174,12 +174,14 @@ def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray,
     places = (x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about))
     points, quads = np.asarray(display.points, float), np.asarray(display.quads, int)
     teeth = body.toothed.teeth if _periodic(points, quads, body.toothed.teeth) else 1
-    size, first = len(points) // teeth, quads[: len(quads) // teeth]
-    ahead = ((first // size) % max(teeth, 1) == 1).astype(np.int8) if teeth > 1 else np.zeros_like(first, np.int8)
-    return Drawn(
-        name, points, first % size if teeth > 1 else first, ahead, teeth, angle + phase,
-        (*places, float(stage.rotors[rotor].bodies[name])),
-    )  # fmt: skip
+    place = (*places, float(stage.rotors[rotor].bodies[name]))
+    return Drawn(name, points, *_first_sector(len(points), quads, teeth), teeth, angle + phase, place)
+
+
+def _first_sector(points: int, quads: np.ndarray, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Quads of the first of `teeth` equal sectors by its points, and whether each point is the next sector's."""
+    size, first = points // teeth, quads[: len(quads) // teeth]
+    return first % size, (first // size == 1).astype(np.int8)
 
 
 def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
@@ -258,11 +260,8 @@ def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[fl
     c, s = math.cos(gear.angle), math.sin(gear.angle)
     back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # from the axes of the stage to the body's
     points, quads = gear.surface
-    teeth = gear.body.toothed.teeth
-    size = len(points) // teeth
-    body.points, body.teeth = points @ back, teeth
-    first_quads = quads[: len(quads) // teeth]
-    body.quads, body.ahead = first_quads % size, (first_quads // size == 1).astype(np.int8)
+    body.points, body.teeth = points @ back, gear.body.toothed.teeth
+    body.quads, body.ahead = _first_sector(len(points), quads, body.teeth)
     body.times, body.frames = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
     body.contacts, body.unit, body.rolls = {}, None, None
 
