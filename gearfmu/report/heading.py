@@ -18,14 +18,9 @@ from gearfmu.stagefile.forms.general import Stage, ToothedBody
 PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
 
 
-def title(run: Run) -> str:
-    """ "fzg_c/stage_relief, 302 N·m, 2000 rpm": stage and operating point."""
-    return ", ".join([run.stage_name, *operating_point(run)])
-
-
 def operating_point(run: Run) -> list[str]:
     """Torque and speed of the input within the window of the results, as far as they were recorded: one number where
-    they are steady, else the largest torque and the range of the speed."""
+    they are steady, else the largest torque and the range of the speed: "302 N·m", "2000 rpm"."""
     part, found = run.part, []
     name = input_shaft(part)
     torque = next((n for n in (f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau") if n in part), None)

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -36,9 +36,6 @@ BOLT_TONE = 1.45  # brighter than the plate behind it
 HOUSING_TONE = 1.75
 
 
-Contacts: TypeAlias = np.ndarray
-
-
 @dataclass
 class Drawn:
     """A gear in the view. points (P, 3) m, `teeth` equal sectors of them one after the other; quads (Q, 4) of the first
@@ -53,7 +50,7 @@ class Drawn:
     teeth: int
     angle: np.ndarray
     place: tuple[np.ndarray, np.ndarray, float]
-    contacts: dict[str, Contacts] = field(default_factory=dict)
+    contacts: dict[str, np.ndarray] = field(default_factory=dict)
     rolls: np.ndarray | None = None
     unit: np.ndarray | None = None
     times: np.ndarray | None = None
@@ -156,8 +153,9 @@ def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
             points = skin.points.astype(float)
             x, y, z = 0.5 * (points.min(axis=0) + points.max(axis=0))
             ahead = np.zeros_like(skin.faces, np.int8)
-            own = Drawn(housing.name, points - [x, y, z], skin.faces, ahead, 1, still, (still + x, still + y, float(z)))
-            found.append(replace(own, tone=HOUSING_TONE, inside=True))
+            place, centred = (still + x, still + y, float(z)), points - [x, y, z]
+            surface = (centred, skin.faces, ahead)
+            found.append(Drawn(housing.name, *surface, 1, still, place, tone=HOUSING_TONE, inside=True))
     return found
 
 
@@ -214,7 +212,7 @@ def _load(
     pair, force = mesh_shape(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
     carried = _carried(trace, stage, mesh, time)
     gamma = direction_of(pair, *mesh_axes(stage, mesh))
-    found: list[Contacts] = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
+    found = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
     for i in range(time.size):
         sg = 1 if force[i] >= 0 else -1
         angles = [made[name].angle[i] - carried[i] - gamma for name in mesh.gears]

@@ -65,7 +65,8 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
         ("te_rms_ac_um", 1.0, "µm rms", "alternating transmission error"),
         ("contact_loss_percent", 1.0, "%", "of the samples with teeth apart"),
     ):
-        known = {mesh: results[own] for mesh in names if (own := _key(mesh, key, names)) in results}
+        keys = {mesh: f"{mesh}_{key}" if len(names) > 1 else key for mesh in names}
+        known = {mesh: results[own] for mesh, own in keys.items() if own in results}
         if known:
             mesh = max(known, key=lambda name: abs(known[name]))
             where = f", {mesh_words(mesh)} (the largest)" if len(known) > 1 and known[mesh] else ""
@@ -80,10 +81,6 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
     if "lock_time_s" in results:
         found.append((f"{results['lock_time_s']:.4g}", "s", "clutch locked from here on"))
     return found
-
-
-def _key(mesh: str, key: str, names: Sequence[str]) -> str:
-    return f"{mesh}_{key}" if len(names) > 1 else key
 
 
 def results(run: Run) -> str:
