@@ -26,12 +26,17 @@ Maker: TypeAlias = Callable[[], "Plot | None"]
 
 def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
     """Every figure the run allows, and in words why others are not there."""
-    deformed, gaps = _deformed(run)
-    gaps = [*gaps, *run.statics[1]]
-    made, missing = _made(_figures(run, deformed))
+    gears, gaps = deformed_gears(run)
+    made, missing = [], []
+    for maker in _figures(run, gears):
+        try:
+            if (plot := maker()) is not None:
+                made.append(plot)
+        except MetricsError as error:
+            missing.append(str(error))
     if not run.angles and run.planets is None:
         missing.append("No mesh orders: the trace has no gear speed or no tooth numbers.")
-    return made, [*gaps, *missing]
+    return made, [*gaps, *run.statics[1], *dict.fromkeys(missing)]
 
 
 def deformed_gears(run: Run) -> tuple[list[DeformedGear], list[str]]:
@@ -55,81 +60,47 @@ def turning(run: Run) -> View | None:
     forces = [mesh for mesh in meshes(run.trace) if f"{mesh}.force" in run.trace]
     if run.stage is None or run.trace.time.size < 2 or not forces:
         return None
-    window = _late(run) if run.planets else detail_window(run.trace, forces[0], run.angles.get(forces[0]))
+    if run.planets is not None:
+        window = planets.detail_window(run.trace, run.planets, run.window)
+    else:
+        window = detail_window(run.trace, forces[0], run.angles.get(forces[0]))
     times = np.zeros(0) if run.deformation is None else run.deformation.time
     recorded = [(gear, times) for gear in deformed_gears(run)[0]]
     return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), window, recorded)
 
 
-def _late(run: Run) -> tuple[float, float]:
-    """The last mesh periods (s) of a set."""
-    assert run.planets is not None
-    return planets.detail_window(run.trace, run.planets, run.window)
-
-
-def _deformed(run: Run) -> tuple[list[Maker], list[str]]:
-    """Makers of pictures and films of deformed gears, and why others are missing."""
-    gears, missing = deformed_gears(run)
-    kinds = (drawn.pictures, drawn.film)
-    assert run.deformation is not None or not gears
-    return [
-        partial(kind, run.deformation, gear, run.trace, run.stage)  # type: ignore[arg-type]
-        for gear in gears
-        for kind in kinds
-    ], missing
-
-
-def _figures(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
-    """All figures: of a pair or train mesh by mesh, of a set its planets side by side."""
+def _figures(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
+    """All figures: of a pair or train mesh by mesh, of a set its planets side by side. gears: to be drawn deformed."""
     trace, window, own, angles = run.trace, run.window, run.planets, run.angles
-    makers: list[Maker] = [lambda: plots.torque_and_slip(trace)]
+    makers: list[Maker] = [partial(plots.torque_and_slip, trace)]
     makers.append(partial(plots.speeds, trace, own.rotors if own else ()))
     over_frequency: list[Maker]
     if own is None:
         for mesh in meshes(trace):
             late = detail_window(trace, mesh, angles.get(mesh))
             makers += [partial(plots.mesh_force_and_error, trace, mesh, part) for part in (None, late)]
-        over_frequency = [lambda: plots_nvh.force_spectrum(trace, window, angles)]
+        forces = plots_nvh.force_channels(trace)
+        over_frequency = [partial(plots_nvh.spectra, trace, window, angles, forces, plots_nvh.FORCES)]
     else:
-        makers += [partial(planets.forces, trace, own, part) for part in (None, _late(run))]
+        late = planets.detail_window(trace, own, window)
+        makers += [partial(planets.forces, trace, own, part) for part in (None, late)]
         makers += [partial(make, trace, own, window) for make in (planets.planets, planets.sharing)]
         makers.append(partial(plots.pin_forces, trace, own.planets))
         over_frequency = [partial(plots_nvh.spectra_by_central, trace, own, window)]
-    makers += [partial(plots.bearing_forces, trace, own is not None), lambda: plots.axial_and_tilting(trace)]
-    makers += _statics(run, [[mesh] for mesh in run.shown_meshes])
-    makers += deformed
+    makers += [partial(plots.bearing_forces, trace, own is not None), partial(plots.axial_and_tilting, trace)]
+    if run.stage is not None:
+        cycle = partial(mesh_cycle.transmission_error, trace, window, run.stage)
+        makers += [partial(cycle, mesh, run.loads.get(mesh)) for mesh in run.shown_meshes]
+        makers += [partial(mesh_cycle.contact_pattern, trace, run.stage, *loaded) for loaded in run.loads.items()]
+    if run.deformation is not None:
+        kinds = [partial(kind, run.deformation) for kind in (drawn.pictures, drawn.film)]
+        makers += [partial(kind, gear, trace, run.stage) for gear in gears for kind in kinds]
     makers += [partial(plots.energy, trace)] if own else []
     makers += over_frequency if run.run_up is None else [partial(make, run.run_up) for make in plots_runup.FIGURES]
     if own is None:
         makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
-        makers += [lambda: plots_nvh.force_spectrogram(trace, angles)] if run.run_up is None else []
+        makers += [partial(plots_nvh.force_spectrogram, trace, angles)] if run.run_up is None else []
     return makers + housing.figures(run)
-
-
-def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:
-    """Mesh cycle and contact pattern, which need the stage and its bodies."""
-    if run.stage is None:
-        return []
-    makers: list[Maker] = []
-    for group in groups:
-        makers.append(partial(mesh_cycle.transmission_error, run.trace, run.window, run.stage, group, run.loads))
-    for mesh, loads in run.loads.items():
-        makers.append(partial(mesh_cycle.contact_pattern, run.trace, run.stage, mesh, loads))
-    return makers
-
-
-def _made(makers: Sequence[Maker]) -> tuple[list[Plot], list[str]]:
-    """The plots that could be made, and in words why others could not."""
-    made, missing = [], []
-    for maker in makers:
-        try:
-            plot = maker()
-        except MetricsError as error:
-            missing.append(str(error))
-            continue
-        if plot is not None:
-            made.append(plot)
-    return made, list(dict.fromkeys(missing))
 
 
 def detail_window(trace: Trace, mesh: str, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:

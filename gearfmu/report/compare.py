@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +15,17 @@ from gearfmu.report import metrics, page, sections
 from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
 from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded
 from gearfmu.report.metrics import MetricsError
-from gearfmu.report.names import plain, shown
+from gearfmu.report.names import minus, plain, shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.plots_nvh import SHOWN_TO, averaging, force_channels, octave_table, segment, spectrum_of
-from gearfmu.report.results import dynamic_factors, key_results
+from gearfmu.report.plots_nvh import (
+    SHOWN_TO,
+    averaging,
+    force_channels,
+    octave_table,
+    segment,
+    spectrum_curve,
+    spectrum_of,
+)
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
 from gearfmu.stage.run.te import mesh_harmonics
@@ -63,31 +69,22 @@ def write_comparison(compared: Sequence[Compared], path: Path) -> Path:
     return path
 
 
-def _values(own: Compared) -> dict[str, float]:
-    return {**key_results(own.run.trace), **dynamic_factors(own.run.trace)}
-
-
 def _difference(key: str, value: float, first: float) -> tuple[str, float]:
     """A difference in words and as a number: dB of alternating parts, else per cent, else the plain difference."""
     if key.endswith(LEVELS) and value > 0 and first > 0:
         change = 20 * math.log10(value / first)
-        return _minus(f"{change:+.1f} dB"), change
+        return minus(f"{change:+.1f} dB"), change
     if first and not key.endswith("percent"):
         change = 100 * (value - first) / abs(first)
-        return _minus(f"{change:+.1f} %"), change
-    return _minus(f"{value - first:+.3g}"), value - first
-
-
-def _minus(text: str) -> str:
-    """A number with the sign that print has for minus."""
-    return text.replace("-", "−")
+        return minus(f"{change:+.1f} %"), change
+    return minus(f"{value - first:+.3g}"), value - first
 
 
 def _tiles(compared: Sequence[Compared]) -> list[tuple[str, str, str]]:
     """The largest news: what each other run changes against the first."""
-    first, found = _values(compared[0]), []
+    first, found = compared[0].run.results, []
     for own in compared[1:]:
-        values = _values(own)
+        values = own.run.results
         for end, words in (
             ("te_rms_ac_um", "alternating transmission error"), ("mesh_force_rms_ac_N", "alternating mesh force"),
             ("dynamic_factor", "dynamic factor"),
@@ -101,29 +98,24 @@ def _tiles(compared: Sequence[Compared]) -> list[tuple[str, str, str]]:
 
 def _results(compared: Sequence[Compared]) -> str:
     """The table of key results, one column a run and one a difference."""
-    known = [_values(own) for own in compared]
-    names = meshes(compared[0].run.trace)
-    head = '<tr><th></th><th>unit</th><th class="n">' + escape(compared[0].label) + "</th>"
-    for own in compared[1:]:
-        head += f'<th class="n">{escape(own.label)}</th><th class="n">change</th>'
-    rows = ""
-    for key, first in known[0].items():
+    names, rows = meshes(compared[0].run.trace), []
+    for key, first in compared[0].run.results.items():
         words, _, unit = sections.result_words(key, names)
-        rows += f'<tr><td>{escape(words)}</td><td>{unit}</td><td class="n">{first:.4g}</td>'
-        for values in known[1:]:
-            rows += _cells(key, values.get(key), first)
-        rows += "</tr>"
+        changes = [cell for own in compared[1:] for cell in _cells(key, own.run.results.get(key), first)]
+        rows.append((words, unit, f"{first:.4g}", *changes))
+    others = [cell for own in compared[1:] for cell in (own.label, "change")]
     where = "; ".join(f"{own.label} {own.run.window.start:.4g} s to {own.run.window.end:.4g} s" for own in compared)
     note = page.note(f"Changes against {compared[0].label}. Windows: {where}. {sections.FACTOR_WORDS}")
-    return f'<div class="scroll"><table>{head}</tr>{rows}</table></div>{note}'
+    return page.table(("", "unit", compared[0].label, *others), rows, (0, 1)) + note
 
 
-def _cells(key: str, value: float | None, first: float) -> str:
+def _cells(key: str, value: float | None, first: float) -> tuple[str, str]:
     if value is None:
-        return '<td class="n">–</td><td class="n">–</td>'
+        return "–", "–"
     words, change = _difference(key, value, first)
-    kind = "" if abs(change) < ALIKE or "mean" in key or "lock" in key else (" better" if change < 0 else " worse")
-    return f'<td class="n">{value:.4g}</td><td class="n{kind}">{words}</td>'
+    if abs(change) < ALIKE or "mean" in key or "lock" in key:
+        return f"{value:.4g}", words
+    return f"{value:.4g}", page.Ready(f'<span class="{"better" if change < 0 else "worse"}">{words}</span>')
 
 
 def _plots(compared: Sequence[Compared]) -> list[Plot | None]:
@@ -166,7 +158,7 @@ def _mesh_cycle(compared: Sequence[Compared], mesh: str) -> Plot | None:
     """Mean transmission error over the mesh cycle and its harmonics."""
     found: dict[str, np.ndarray] = {}
     for own in compared:
-        stage, part = own.run.stage, own.run.trace.window(own.run.window.start, own.run.window.end)
+        stage, part = own.run.stage, own.run.part
         engagement = None if stage is None else next((e for e in stage.engagements if e.name == mesh), None)
         if stage is None or engagement is None or f"{mesh}.te" not in part:
             continue
@@ -202,16 +194,13 @@ def _spectra(compared: Sequence[Compared]) -> Plot | None:
     for name in _common(compared):
         curves = []
         for own in compared:
-            part = own.run.trace.window(own.run.window.start, own.run.window.end)
             try:
-                found = spectrum_of(part, name, segment(part.time.size))
+                found = spectrum_of(own.run.part, name, segment(own.run.part.time.size))
             except MetricsError:
                 continue
-            inside = (found.frequency > 0) & (found.frequency <= SHOWN_TO)
-            level = metrics.level(found.amplitude)
-            curves.append(Curve(found.frequency[inside] / 1e3, level[inside], own.label, "dB re 1 N"))
+            curves.append(spectrum_curve(own.label, found, SHOWN_TO))
             columns[f"{own.label} frequency_[Hz]"] = found.frequency
-            columns[f"{own.label} {name}_[dB re 1 N]"] = level
+            columns[f"{own.label} {name}_[dB re 1 N]"] = metrics.level(found.amplitude)
         if curves:
             panels.append(Panel(f"{shown(name)}: level in dB re 1 N", tuple(curves), limits=level_limits(curves)))
     if not panels:
@@ -266,55 +255,47 @@ def _orders(compared: Sequence[Compared], mesh: str) -> Plot | None:
 
 def _octaves(compared: Sequence[Compared]) -> list[str]:
     """Octave bands of the first run, and what the others change in dB."""
-    tables: dict[str, Mapping[str, Mapping[float, float]]] = {}
-    for own in compared:
-        try:
-            tables[own.label] = octave_table(own.run.trace, own.run.window)
-        except MetricsError:
-            return []
-    first = tables[compared[0].label]
-    bands = [band for band in next(iter(first.values()), {}) if all(_has(t, band) for t in tables.values())]
-    if not bands:
+    try:
+        tables = [octave_table(own.run.trace, own.run.window) for own in compared]
+    except MetricsError:
         return []
-    rows = []
-    for name in _common(compared):
-        rows.append((f"{plain(name) or name}, {compared[0].label}", *(_db(first[name][band]) for band in bands)))
-        for own in compared[1:]:
-            change = [tables[own.label][name][band] - first[name][band] for band in bands]
-            rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
-    table = page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
-    note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
-    return [page.section("Octave bands", note, table, name="octaves")]
-
-
-def _has(table: Mapping[str, Mapping[float, float]], band: float) -> bool:
-    return all(band in row for row in table.values())
+    rows = [row for table in tables for row in table.values()]
+    bands = [band for band in next(iter(tables[0].values()), {}) if all(band in row for row in rows)]
+    levels = [{name: np.array([row[band] for band in bands]) for name, row in table.items()} for table in tables]
+    head = ("Hz", *(f"{band:g}" for band in bands))
+    return _level_table(compared, "Octave bands", head, levels, "octaves") if bands else []
 
 
 def _order_table(compared: Sequence[Compared]) -> list[str]:
     """Mesh orders of the first run in dB, and what the others change."""
-    found = []
+    found, head = [], ("order", *(str(k) for k in range(1, ORDERS + 1)))
     for mesh in meshes(compared[0].run.trace):
-        levels = [order_levels(own, mesh) for own in compared]
-        rows = []
-        for name in (n for n in _common(compared) if all(n in level for level in levels)):
-            rows.append((f"{plain(name) or name}, {compared[0].label}", *(_db(value) for value in levels[0][name])))
-            for own, level in zip(compared[1:], levels[1:], strict=True):
-                change = level[name] - levels[0][name]
-                rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
-        if rows:
-            head = ("order", *(str(k) for k in range(1, ORDERS + 1)))
-            note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
-            found.append(
-                page.section(
-                    of_mesh(compared[0].run.trace, mesh, "Mesh orders in numbers"), note, page.table(head, rows)
-                )
-            )
+        title = of_mesh(compared[0].run.trace, mesh, "Mesh orders in numbers")
+        found += _level_table(compared, title, head, [order_levels(own, mesh) for own in compared])
     return found
 
 
+def _level_table(
+    compared: Sequence[Compared],
+    title: str,
+    head: Sequence[str],
+    levels: Sequence[Mapping[str, np.ndarray]],
+    mark: str = "",
+) -> list[str]:
+    """A section with levels (dB) of the first run by channel, and what the others change; none without common
+    channels. levels: by channel of each run; mark: target of links."""
+    rows = []
+    for name in (n for n in _common(compared) if all(n in own for own in levels)):
+        rows.append((f"{plain(name) or name}, {compared[0].label}", *map(_db, levels[0][name])))
+        for own, level in zip(compared[1:], levels[1:], strict=True):
+            change = level[name] - levels[0][name]
+            rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
+    note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
+    return [page.section(title, note, page.table(head, rows), name=mark)] if rows else []
+
+
 def _db(value: float, sign: str = "") -> str:
-    return "–" if math.isnan(value) else _minus(f"{value:{sign}.1f}")
+    return "–" if math.isnan(value) else minus(f"{value:{sign}.1f}")
 
 
 def _facts(compared: Sequence[Compared]) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +20,7 @@ from PIL import Image
 
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
-from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, png, round_scale, styled
+from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, embedded, png, round_scale, styled
 from gearfmu.stage.assembly.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.touching import GEAR_PHI
@@ -178,8 +177,8 @@ def _columns(deformation: Deformation, gear: DeformedGear, frames: Sequence[int]
     table: dict[str, Any] = {"time_[s]": deformation.time[chosen]}
     for nu in np.unique(diameter):
         table[f"rms_nu{nu}_[m]"] = np.sqrt((own.amplitude[chosen][:, diameter == nu] ** 2).sum(axis=1))
-    names: Mapping[str, int] = {"x_[m]": 0, "y_[m]": 1, "z_[m]": 2, "rx_[rad]": 3, "ry_[rad]": 4, "rz_[rad]": 5}
-    return table | {f"rigid_{name}": own.motion[chosen, k] for name, k in names.items()}
+    names = ("x_[m]", "y_[m]", "z_[m]", "rx_[rad]", "ry_[rad]", "rz_[rad]")
+    return table | {f"rigid_{name}": own.motion[chosen, k] for k, name in enumerate(names)}
 
 
 def _palette() -> Image.Image:
@@ -197,5 +196,4 @@ def _animated(images: Sequence[Image.Image]) -> str:
     packed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     buffer = io.BytesIO()
     packed[0].save(buffer, "PNG", save_all=True, append_images=packed[1:], duration=FRAME_MS, loop=0, optimize=True)
-    data = base64.b64encode(buffer.getvalue()).decode()
-    return f'<img alt="" style="max-width:560px;margin:auto" src="data:image/png;base64,{data}">'
+    return embedded(buffer, ' style="max-width:560px;margin:auto"')

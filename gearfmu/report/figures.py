@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, astuple
 from html import escape
 from typing import Any
 
@@ -69,8 +70,8 @@ def _panel_numbers(chart: Chart, panel: Panel, pack: Pack) -> dict[str, Any]:
         "x": panel.x_label or chart.x_label,
         "group": chart.group,
         "curves": [_curve(curve, colour, pack) for curve, colour in zip(panel.curves, colours_of(panel), strict=True)],
-        "marks": [{"x": m.x, "text": m.text, "look": m.look, "colour": m.colour} for m in panel.marks],
-        "spans": [[span.start, span.end, span.kind] for span in panel.spans],
+        "marks": [asdict(mark) for mark in panel.marks],
+        "spans": [astuple(span) for span in panel.spans],
     }
     limits = panel.x_limits or chart.x_limits
     if limits is not None:

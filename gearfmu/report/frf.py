@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.axis import Axis
 
 from gearfmu.reduction.transfer import Reference
-from gearfmu.report.style import COLOURS, INK, panels, saved, styled
+from gearfmu.report.style import COLOURS, INK, panels, plain_ticks, saved, styled
 
 LABELS = {
     "modal": "modal truncation",
@@ -35,8 +34,8 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
             colour = COLOURS[number % len(COLOURS)]
             axes[-1].loglog(frequency, np.maximum(error, 1e-16), color=colour, label=label)
         for panel in axes:
-            readable(panel.yaxis, powers=True)
-            readable(panel.xaxis, powers=False)
+            plain_ticks(panel)
+            panel.yaxis.set_major_formatter(_power)
         axes[0].set_title(title, loc="left")
         axes[-1].set_ylabel("relative error (Frobenius)")
         axes[-1].set_xlabel("frequency, Hz")
@@ -61,12 +60,6 @@ def label_of(method: str) -> str:
     """A method's name for a legend; text behind a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
-
-
-def readable(axis: Axis, powers: bool) -> None:
-    """Label the ticks of an axis as powers of ten or as plain numbers."""
-    axis.set_major_formatter(_power if powers else "{x:g}")
-    axis.set_minor_formatter("")
 
 
 def _power(value: float, _: float) -> str:

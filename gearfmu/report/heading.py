@@ -3,45 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gearfmu.report.mesh_cycle import face_load_factor, static_face_load_factor
-from gearfmu.report.metrics import MetricsError
-from gearfmu.report.names import mesh_words
-from gearfmu.report.planets import shares
+from gearfmu.report.names import mesh_words, minus
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.run import Run
-from gearfmu.report.signals import GEAR_SPEED, input_shaft, mesh_speed
+from gearfmu.report.signals import GEAR_SPEED, input_shaft, mesh_speed, steady
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 
 PHASE = 1e-3  # pitches: of a phase taken as 0 or ½
-STEADY = 0.1  # nine tenths of the samples lie as close together, over their median
-
-
-def title(run: Run) -> str:
-    """ "fzg_c/stage_relief, 302 N·m, 2000 rpm": stage and operating point."""
-    return ", ".join([run.stage_name, *operating_point(run)])
 
 
 def operating_point(run: Run) -> list[str]:
     """Torque and speed of the input within the window of the results, as far as they were recorded: one number where
-    they are steady, else the largest torque and the range of the speed."""
-    part = run.trace.window(run.window.start, run.window.end)
-    found = []
+    they are steady, else the largest torque and the range of the speed: "302 N·m", "2000 rpm"."""
+    part, found = run.part, []
     name = input_shaft(part)
     torque = next((n for n in (f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau") if n in part), None)
     if torque is not None and np.any(part[torque]):
         values = np.abs(part[torque])
-        steady = float(np.mean(values)) if _steady(values) else None
-        found.append(f"{_round(steady):.5g} N·m" if steady is not None else f"up to {values.max():.4g} N·m")
+        found.append(f"{_round(values.mean()):.5g} N·m" if steady(values) else f"up to {values.max():.4g} N·m")
     speed = f"{name}{GEAR_SPEED}"
     if speed in part and np.any(part[speed]):
         values = np.abs(part[speed]) * RPM
-        low, high = (f"{_round(float(v)):.5g}" for v in (values.min(), values.max()))
-        found.append(f"{_round(float(np.mean(values))):.5g} rpm" if _steady(values) else f"{low} … {high} rpm")
+        low, mean, high = (f"{_round(v):.5g}" for v in (values.min(), values.mean(), values.max()))
+        found.append(f"{mean} rpm" if steady(values) else f"{low} … {high} rpm")
     return found
 
 
@@ -50,17 +40,12 @@ def _round(value: float) -> float:
     return float(f"{value:.4g}") if value >= 1000 else float(f"{value:.3g}")
 
 
-def _steady(values: np.ndarray) -> bool:
-    low, high = np.percentile(values, [5, 95])
-    return bool(high - low < STEADY * np.median(values))
-
-
 def of_set(run: Run) -> list[tuple[str, str]]:
     """Key numbers of a planetary set over the window: torques, speeds, ratio, mesh frequency, phasing of the planets,
     K_γ, K_Hβ, dynamic factor; those that were not recorded are left out."""
     own = run.planets
     assert own is not None
-    part, found = run.trace.window(run.window.start, run.window.end), []
+    part, found = run.part, []
     bodies = ["sun", own.carrier, "ring"]
     means = {
         name: float(np.mean(part[n]))
@@ -68,11 +53,12 @@ def of_set(run: Run) -> list[tuple[str, str]]:
         if (n := next((n for n in _torques(name) if n in part), "")) and np.any(part[n])
     }
     if means:
-        found.append(("Torques, mean", ", ".join(f"{name} {_minus(f'{v:.4g}')} N·m" for name, v in means.items())))
+        found.append(("Torques, mean", ", ".join(f"{name} {minus(f'{v:.4g}')} N·m" for name, v in means.items())))
     speeds = {n: float(np.mean(part[f"{n}{GEAR_SPEED}"])) for n in bodies if f"{n}{GEAR_SPEED}" in part}
     if speeds:
-        words = ", ".join(f"{name} {_minus(f'{_round_to_rpm(v):.4g}')} rpm" for name, v in speeds.items())
-        found.append(("Speeds, mean", words))
+        # below 0.05 rpm: elastic motion of a gear that is held
+        rpm = {name: v * RPM if abs(v * RPM) >= 0.05 else 0.0 for name, v in speeds.items()}
+        found.append(("Speeds, mean", ", ".join(f"{name} {minus(f'{v:.4g}')} rpm" for name, v in rpm.items())))
     if speeds.get("sun") and abs(speeds.get(own.carrier, 0.0)) > 1e-9:
         found.append(("Ratio, speed of the sun over that of the carrier", f"{speeds['sun'] / speeds[own.carrier]:.4g}"))
     frequency = mesh_speed(part, own) / (2 * math.pi)
@@ -125,46 +111,28 @@ def _torques(name: str) -> tuple[str, ...]:
     return f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau", f"bearing.{name}.mz_mean", f"bearing.{name}.mz"
 
 
-def _round_to_rpm(speed: float) -> float:
-    """rpm; speeds of the elastic motion of a gear that is held are none."""
-    return speed * RPM if abs(speed * RPM) >= 0.05 else 0.0
-
-
 def _factors(run: Run) -> list[tuple[str, str]]:
+    """K_γ and K_Hβ at every central gear, the latter of the run where forces of slices were recorded, else of the
+    statics; dynamic factor."""
     assert run.planets is not None
-    found = []
-    try:
-        means = shares(run.trace, run.planets, run.window)[1]
-    except MetricsError:
-        means = {}
+    found, over_width = [], []
     for central, meshes in run.planets.meshes.items():
-        known = {mesh: means[mesh] for mesh in meshes.values() if mesh in means}
-        if known:
-            most = max(known, key=lambda mesh: known[mesh])
-            found.append((f"K_γ at the {central}, largest mean share", f"{known[most]:.3f} ({mesh_words(most)})"))
-    found += _over_the_width(run)
-    factors = {mesh: value for mesh, value in dynamic_factors(run.trace).items() if math.isfinite(value)}
-    if factors:
-        most = max(factors, key=lambda mesh: factors[mesh])
-        where = mesh_words(most.removesuffix("dynamic_factor").rstrip("_"))
-        found.append(("Dynamic factor, largest", f"{factors[most]:.3f}" + (f" ({where})" if where else "")))
-    return found
-
-
-def _over_the_width(run: Run) -> list[tuple[str, str]]:
-    """K_Hβ at every central gear: of the run where forces of slices were recorded, else of the statics."""
-    assert run.planets is not None
-    part, found = run.trace.window(run.window.start, run.window.end), []
-    for central, meshes in run.planets.meshes.items():
-        of_run = {mesh: factor for mesh in meshes.values() if (factor := face_load_factor(part, mesh)) is not None}
+        if known := {mesh: run.mean_shares[mesh] for mesh in meshes.values() if mesh in run.mean_shares}:
+            found.append((f"K_γ at the {central}, largest mean share", _largest(known)))
+        of_run = {mesh: factor for mesh in meshes.values() if (factor := face_load_factor(run.part, mesh)) is not None}
         of_statics = {mesh: static_face_load_factor(run.loads[mesh]) for mesh in meshes.values() if mesh in run.loads}
         if known := of_run or of_statics:
-            most = max(known, key=lambda mesh: known[mesh])
             how = "largest" if of_run else "quasi-static"
-            words = f"K_Hβ at the {central}, {how}: most loaded slice over the mean"
-            found.append((words, f"{known[most]:.3f} ({mesh_words(most)})"))
-    return found
+            over_width.append((f"K_Hβ at the {central}, {how}: most loaded slice over the mean", _largest(known)))
+    factors = {
+        name.removesuffix("dynamic_factor").rstrip("_"): value
+        for name, value in dynamic_factors(run.trace).items()
+        if math.isfinite(value)
+    }
+    return found + over_width + ([("Dynamic factor, largest", _largest(factors))] if factors else [])
 
 
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
+def _largest(known: Mapping[str, float]) -> str:
+    """The largest number and its mesh."""
+    mesh = max(known, key=lambda name: known[name])
+    return f"{known[mesh]:.3f}" + (f" ({mesh_words(mesh)})" if mesh else "")

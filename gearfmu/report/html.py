@@ -13,7 +13,7 @@ from gearfmu.report import heading, housing, page, sections
 from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.plan import plan_sections
-from gearfmu.report.results import dynamic_factors, energy_balance, key_results, strict
+from gearfmu.report.results import energy_balance, strict
 from gearfmu.report.run import Run
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.trace import Trace, write_columns
@@ -40,7 +40,7 @@ def write(
     written.
     """
     folder, run = Path(out_dir), Run(trace, summary, spec, bodies, deformation)
-    results = {**key_results(trace), **dynamic_factors(trace), **energy_balance(trace)}
+    results = run.results | energy_balance(trace)
     made, missing = chosen_plots(run)
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
@@ -50,7 +50,7 @@ def write(
 
 
 def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
-    summary = run.summary
+    summary, title = run.summary, ", ".join([run.stage_name, *heading.operating_point(run)])
     about = [run.title, *(str(summary[key]) for key in ("description", "started") if summary.get(key))]
     over_speed = [plot for plot in made if plot.name in RUN_UP]
     over_frequency = [plot for plot in made if plot.name.startswith(NVH) and plot.name not in RUN_UP]
@@ -59,7 +59,7 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str]) -> str:
     octaves = sections.octaves(run)
     view = turning(run)
     body = [
-        page.head(heading.title(run), str(summary.get("outcome", "outcome not given")), " · ".join(about)),
+        page.head(title, str(summary.get("outcome", "outcome not given")), " · ".join(about)),
         page.tiles(sections.tiles(run)),
         page.facts(sections.facts(summary)),
         *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],

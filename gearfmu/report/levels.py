@@ -4,26 +4,26 @@ file."""
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.reading.files import model_folder
 
-COLUMNS = (
-    "scene",
-    "level",
-    "n_dyn",
-    "slices",
-    "h_us",
-    "te_error",
-    "force_error",
-    "bearing_error",
-    "te_mean_error_um",
-    "time_per_second",
-    "bodies",
-)
+COLUMNS: dict[str, Callable[[str], Any]] = {  # and what their text is read as
+    "scene": str,
+    "level": str,
+    "n_dyn": int,
+    "slices": int,
+    "h_us": float,
+    "te_error": float,
+    "force_error": float,
+    "bearing_error": float,
+    "te_mean_error_um": float,
+    "time_per_second": float,
+    "bodies": str,
+}
 HEADER = (
     "scene, level",
     "dynamic modes",
@@ -35,7 +35,6 @@ HEADER = (
     "mean TE, µm",
     "CPU time per second",
 )
-TEXT, WHOLE = ("scene", "level", "bodies"), ("n_dyn", "slices")
 
 
 def levels_path(stage: Stage) -> Path:
@@ -49,9 +48,9 @@ def read_levels(path: Path) -> list[dict[str, Any]]:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
+        if tuple(reader.fieldnames or ()) != tuple(COLUMNS):
             return []
-        return [{key: _value(key, text) for key, text in row.items()} for row in reader]
+        return [{key: COLUMNS[key](text) for key, text in row.items()} for row in reader]
 
 
 def fingerprint(hashes: Iterable[str]) -> str:
@@ -73,7 +72,3 @@ def shown_rows(rows: list[dict[str, Any]], level: str) -> list[tuple[str, ...]]:
         )
         for row in rows
     ]
-
-
-def _value(key: str, text: str) -> Any:
-    return text if key in TEXT else int(text) if key in WHOLE else float(text)

@@ -4,7 +4,7 @@ how the force lies on the flanks."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -76,50 +76,41 @@ def no_mean_cycle(window: Window, position: np.ndarray | None) -> str:
     return "The samples are too few: they leave parts of the mesh cycle empty."
 
 
-def transmission_error(
-    trace: Trace, window: Window, stage: Stage, names: Sequence[str], loads: Mapping[str, FlankLoads]
-) -> Plot | None:
-    """Transmission error of engagements over the mesh cycle with its harmonics: quasi-static where `loads` has it, and
-    of a steady run its mean over all cycles of the window; None without either."""
-    part, curves, missing = trace.window(window.start, window.end), {}, ""
-    for mesh in (e for e in stage.engagements if e.name in names):
-        if mesh.name in loads:
-            own = loads[mesh.name]
-            order = np.argsort(np.mod(own.position, 1.0))
-            curves[mesh.name, STATIC] = (np.mod(own.position, 1.0)[order], 1e6 * own.te[order])
-        position = position_of(part, stage, mesh)
-        mean = None
-        if window.reason == SETTLED and position is not None and f"{mesh.name}.te" in part:
-            mean = folded(position, 1e6 * part[f"{mesh.name}.te"])
-        if mean is not None:
-            curves[mesh.name, RUN] = ((np.arange(BINS) + 0.5) / BINS, mean)
-        else:
-            missing = missing or no_mean_cycle(window, position)
+def transmission_error(trace: Trace, window: Window, stage: Stage, name: str, loads: FlankLoads | None) -> Plot | None:
+    """Transmission error of an engagement over the mesh cycle with its harmonics: quasi-static by its `loads`, and of a
+    steady run its mean over all cycles of the window; None without either."""
+    part, curves = trace.window(window.start, window.end), {}
+    mesh = next((e for e in stage.engagements if e.name == name), None)
+    if mesh is None:
+        return None
+    if loads is not None:
+        order = np.argsort(np.mod(loads.position, 1.0))
+        curves[STATIC] = (np.mod(loads.position, 1.0)[order], 1e6 * loads.te[order])
+    position, mean = position_of(part, stage, mesh), None
+    if window.reason == SETTLED and position is not None and f"{name}.te" in part:
+        mean = folded(position, 1e6 * part[f"{name}.te"])
+    if mean is not None:
+        curves[RUN] = ((np.arange(BINS) + 0.5) / BINS, mean)
     if not curves:
         return None
-    words = {key: key[1] if len(names) == 1 else f"{key[0]}, {key[1]}" for key in curves}
     looks = {STATIC: "dashed", RUN: ""}
-    over = [Curve(x, y, words[key], "µm", looks[key[1]], list(names).index(key[0])) for key, (x, y) in curves.items()]
-    lines = {key: mesh_harmonics(y[None], HARMONICS)[0] for key, (_, y) in curves.items()}
+    over = [Curve(x, y, words, "µm", looks[words], k) for k, (words, (x, y)) in enumerate(curves.items())]
+    lines = {words: mesh_harmonics(y[None], HARMONICS)[0] for words, (_, y) in curves.items()}
     orders = np.arange(1.0, HARMONICS + 1)
-    bars = [Curve(orders, line, words[key], "µm rms", "bars", k) for k, (key, line) in enumerate(lines.items())]
-    if len(names) == 1:
-        over = [Curve(c.x, c.y, c.name, c.unit, c.look, k) for k, c in enumerate(over)]
+    bars = [Curve(orders, line, words, "µm rms", "bars", k) for k, (words, line) in enumerate(lines.items())]
     panels = (
         Panel("transmission error in µm", tuple(over), height=220, x_label="position in pitches", x_limits=(0.0, 1.0)),
         Panel("harmonics in µm, rms", tuple(bars), height=220, x_label="harmonic of the mesh"),
     )
-    told = "; ".join(f"{words[key]} {np.ptp(y):.3g} µm peak to peak" for key, (_, y) in curves.items())
-    caption = f"Dashed: {STATIC}, under the mean mesh force of the run. " if any(k[1] == STATIC for k in curves) else ""
-    if any(key[1] == RUN for key in curves):
+    told = "; ".join(f"{words} {np.ptp(y):.3g} µm peak to peak" for words, (_, y) in curves.items())
+    caption = f"Dashed: {STATIC}, under the mean mesh force of the run. " if STATIC in curves else ""
+    if RUN in curves:
         caption += f"In the run: mean over all mesh cycles, {window.start:.3g} s to {window.end:.3g} s. "
     else:
-        caption += f"No mean cycle of the run. {missing} "
-    file = "mesh_cycle" if len(stage.engagements) == 1 or len(names) > 1 else f"mesh_cycle_{names[0]}"
-    columns = {f"{words[key]}_harmonic_[um rms]": line for key, line in lines.items()}
-    title = "Transmission error over the mesh cycle"
-    title = title if len(names) > 1 else of_mesh(trace, names[0], title)
-    data = {"harmonic": orders} | columns
+        caption += f"No mean cycle of the run. {no_mean_cycle(window, position)} "
+    file = "mesh_cycle" if len(stage.engagements) == 1 else f"mesh_cycle_{name}"
+    title = of_mesh(trace, name, "Transmission error over the mesh cycle")
+    data = {"harmonic": orders} | {f"{words}_harmonic_[um rms]": line for words, line in lines.items()}
     return Plot(file, title, f"{caption}{told[:1].upper()}{told[1:]}.", Chart(panels, across=2), data)
 
 

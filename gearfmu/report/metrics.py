@@ -129,12 +129,12 @@ def band_rms(spectrum: Spectrum, low: float, high: float) -> float:
     return float(np.sqrt(np.sum(spectrum.amplitude[inside] ** 2) / HANN_NOISE_BANDWIDTH))
 
 
-def octave_levels(spectrum: Spectrum, reference: float = 1.0) -> dict[float, float]:
-    """Level in dB of each octave band (IEC 61260 centres, 63 Hz … 16 kHz) that lies in the spectrum and holds ≥ 3
+def octave_levels(spectrum: Spectrum) -> dict[float, float]:
+    """Level in dB re 1 of each octave band (IEC 61260 centres, 63 Hz … 16 kHz) that lies in the spectrum and holds ≥ 3
     lines."""
     top = spectrum.frequency[-1]
     return {
-        float(centre): float(level(band_rms(spectrum, low, high), reference))
+        float(centre): float(level(band_rms(spectrum, low, high)))
         for low, centre, high in OCTAVES
         if high <= top * 1.0001 and (high - low) >= 3 * spectrum.resolution
     }
@@ -147,12 +147,7 @@ def mesh_angle(time: np.ndarray, speed: np.ndarray, teeth: int) -> np.ndarray:
 
 
 def order_cuts(
-    time: np.ndarray,
-    values: np.ndarray,
-    angle: np.ndarray,
-    orders: int = 5,
-    periods: int = 8,
-    averaged: float = 0.0,
+    time: np.ndarray, values: np.ndarray, angle: np.ndarray, orders: int = 5, periods: int = 8, averaged: float = 0.0
 ) -> OrderCuts:
     """Follow mesh orders 1 … `orders` of values (n,) along the mesh angle (n,) rad (from `mesh_angle`).
 
@@ -179,12 +174,7 @@ def order_cuts(
 
 
 def order_map(
-    time: np.ndarray,
-    values: np.ndarray,
-    angle: np.ndarray,
-    highest: float,
-    turns: int = 4,
-    averaged: float = 0.0,
+    time: np.ndarray, values: np.ndarray, angle: np.ndarray, highest: float, turns: int = 4, averaged: float = 0.0
 ) -> OrderMap:
     """Orders up to `highest` of values (n,) along the angle (n,) rad of a shaft, which grows all the time.
 

@@ -83,17 +83,14 @@ def write_contact_sheet(body: BodyModes, path: Path) -> None:
 def heading(mode: Mode, short: bool = False) -> str:
     """A mode in one line: its numbers, frequency, nodal diameters and name."""
     numbers = "–".join(str(number) for number in (mode.numbers[0], mode.numbers[-1])[: len(mode.numbers)])
-    diameters = f"ν = {mode.nodal_diameter}" if short else _plural(mode.nodal_diameter)
+    nu = mode.nodal_diameter
+    diameters = f"ν = {nu}" if short else f"{nu} nodal diameter{'' if nu == 1 else 's'}"
     share = "" if mode.harmonic_share > 0.995 else f" ({100 * mode.harmonic_share:.0f} %)"
     frequency = f"{mode.frequency:.0f} Hz" if short else f"{mode.frequency:.1f} Hz"
     name = mode.name if short else f"{mode.motion} ({mode.name})"
     separator = "\n" if short else ", "
     word = "mode" if len(mode.numbers) == 1 else "modes"
     return f"{word} {numbers}: {frequency}{separator}{diameters}{share}, {name}"
-
-
-def _plural(diameters: int) -> str:
-    return f"{diameters} nodal diameter{'' if diameters == 1 else 's'}"
 
 
 def _component(mode: Mode) -> tuple[int, str]:
@@ -116,7 +113,10 @@ def _paint(axis: Axes, body: BodyModes, surface: _Surface, mode: Mode, view: int
     polygons, colours = list(drawn[surface.quads[order], :2]), np.clip(colours[order], 0, 1)
     axis.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=colours, linewidths=0.3))
     _outline(axis, body.points @ axes.T, rest @ axes.T, surface)
-    _frame(axis, rest @ axes.T, np.linalg.norm(moved, axis=1).max())
+    margin, seen = np.linalg.norm(moved, axis=1).max(), (rest @ axes.T)[:, :2]
+    low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin  # the same frame for every mode of a body
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axis.axis("off")
 
 
 def _outline(axis: Axes, points: np.ndarray, rest: np.ndarray, surface: _Surface) -> None:
@@ -129,13 +129,6 @@ def _outline(axis: Axes, points: np.ndarray, rest: np.ndarray, surface: _Surface
     np.maximum.at(depth, tuple(place.T), centres[:, 2])
     seen = points[surface.edges[:, 1], 2] > depth[tuple(middle.T)] - 4 * cell
     axis.add_collection(LineCollection(list(points[surface.edges[seen], :2]), colors=INK, linewidths=0.55, alpha=0.5))
-
-
-def _frame(axis: Axes, points: np.ndarray, margin: float) -> None:
-    """The same frame for every mode of a body."""
-    low, high = points[:, :2].min(axis=0) - margin, points[:, :2].max(axis=0) + margin
-    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    axis.axis("off")
 
 
 @lru_cache(maxsize=1)

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -36,9 +36,6 @@ BOLT_TONE = 1.45  # brighter than the plate behind it
 HOUSING_TONE = 1.75
 
 
-Contacts: TypeAlias = np.ndarray
-
-
 @dataclass
 class Drawn:
     """A gear in the view. points (P, 3) m, `teeth` equal sectors of them one after the other; quads (Q, 4) of the first
@@ -53,7 +50,7 @@ class Drawn:
     teeth: int
     angle: np.ndarray
     place: tuple[np.ndarray, np.ndarray, float]
-    contacts: dict[str, Contacts] = field(default_factory=dict)
+    contacts: dict[str, np.ndarray] = field(default_factory=dict)
     rolls: np.ndarray | None = None
     unit: np.ndarray | None = None
     times: np.ndarray | None = None
@@ -156,8 +153,9 @@ def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
             points = skin.points.astype(float)
             x, y, z = 0.5 * (points.min(axis=0) + points.max(axis=0))
             ahead = np.zeros_like(skin.faces, np.int8)
-            own = Drawn(housing.name, points - [x, y, z], skin.faces, ahead, 1, still, (still + x, still + y, float(z)))
-            found.append(replace(own, tone=HOUSING_TONE, inside=True))
+            place, centred = (still + x, still + y, float(z)), points - [x, y, z]
+            surface = (centred, skin.faces, ahead)
+            found.append(Drawn(housing.name, *surface, 1, still, place, tone=HOUSING_TONE, inside=True))
     return found
 
 
@@ -174,12 +172,14 @@ def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray,
     places = (x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about))
     points, quads = np.asarray(display.points, float), np.asarray(display.quads, int)
     teeth = body.toothed.teeth if _periodic(points, quads, body.toothed.teeth) else 1
-    size, first = len(points) // teeth, quads[: len(quads) // teeth]
-    ahead = ((first // size) % max(teeth, 1) == 1).astype(np.int8) if teeth > 1 else np.zeros_like(first, np.int8)
-    return Drawn(
-        name, points, first % size if teeth > 1 else first, ahead, teeth, angle + phase,
-        (*places, float(stage.rotors[rotor].bodies[name])),
-    )  # fmt: skip
+    place = (*places, float(stage.rotors[rotor].bodies[name]))
+    return Drawn(name, points, *_first_sector(len(points), quads, teeth), teeth, angle + phase, place)
+
+
+def _first_sector(points: int, quads: np.ndarray, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+    """Quads of the first of `teeth` equal sectors by its points, and whether each point is the next sector's."""
+    size, first = points // teeth, quads[: len(quads) // teeth]
+    return first % size, (first // size == 1).astype(np.int8)
 
 
 def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
@@ -212,7 +212,7 @@ def _load(
     pair, force = mesh_shape(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
     carried = _carried(trace, stage, mesh, time)
     gamma = direction_of(pair, *mesh_axes(stage, mesh))
-    found: list[Contacts] = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
+    found = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
     for i in range(time.size):
         sg = 1 if force[i] >= 0 else -1
         angles = [made[name].angle[i] - carried[i] - gamma for name in mesh.gears]
@@ -258,11 +258,8 @@ def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[fl
     c, s = math.cos(gear.angle), math.sin(gear.angle)
     back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # from the axes of the stage to the body's
     points, quads = gear.surface
-    teeth = gear.body.toothed.teeth
-    size = len(points) // teeth
-    body.points, body.teeth = points @ back, teeth
-    first_quads = quads[: len(quads) // teeth]
-    body.quads, body.ahead = first_quads % size, (first_quads // size == 1).astype(np.int8)
+    body.points, body.teeth = points @ back, gear.body.toothed.teeth
+    body.quads, body.ahead = _first_sector(len(points), quads, body.teeth)
     body.times, body.frames = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
     body.contacts, body.unit, body.rolls = {}, None, None
 

@@ -48,6 +48,11 @@ def mesh_words(mesh: str) -> str:
     return re.sub(r"^([a-z]+)_planet(\d+)$", r"\1 – planet \2", mesh)
 
 
+def minus(text: str) -> str:
+    """A number with the sign that print has for minus."""
+    return text.replace("-", "−")
+
+
 def plain(channel: str) -> str:
     """The plain name of a channel; "" for what is none that we know."""
     return re.sub(r"(?:the )?\bplanet(\d+)", r"planet \1", _plain(channel))

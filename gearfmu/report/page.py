@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gearfmu.extras import MissingPackage
 from gearfmu.report.chart import Chart, Plot
 from gearfmu.report.figures import chart_element, chart_numbers
+from gearfmu.report.names import minus
 from gearfmu.report.packed import Pack, squeezed
 from gearfmu.report.results import REACHED_THE_END
 
@@ -72,7 +73,7 @@ def contents(links: Mapping[str, str]) -> str:
 def tiles(results: Sequence[tuple[str, str, str]]) -> str:
     """The key results: value, unit, description."""
     found = "".join(
-        f"<div><b>{escape(value.replace('-', '−'))}<small>{escape(unit)}</small></b><span>{escape(label)}</span></div>"
+        f"<div><b>{escape(minus(value))}<small>{escape(unit)}</small></b><span>{escape(label)}</span></div>"
         for value, unit, label in results
     )
     return f'<div class="tiles">{found}</div>' if found else ""
@@ -129,12 +130,20 @@ def details(title: str, *parts: str) -> str:
     return f"<section><details><summary>{escape(title)}</summary>{''.join(parts)}</details></section>"
 
 
+class Ready(str):
+    """A cell of a table that is HTML already."""
+
+
+def _cell(text: str) -> str:
+    return text if isinstance(text, Ready) else escape(text)
+
+
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> str:
     """A table; columns of the numbers `text` are text, the others numbers, right-aligned."""
     marks = ["" if k in text else ' class="n"' for k in range(len(header))]
-    top = "".join(f"<th{mark}>{escape(cell)}</th>" for mark, cell in zip(marks, header, strict=True))
+    top = "".join(f"<th{mark}>{_cell(cell)}</th>" for mark, cell in zip(marks, header, strict=True))
     body = "".join(
-        "<tr>" + "".join(f"<td{mark}>{escape(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>"
+        "<tr>" + "".join(f"<td{mark}>{_cell(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>"
         for row in rows
     )
     return f'<div class="scroll"><table><tr>{top}</tr>{body}</table></div>'

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
 from gearfmu.report import page
-from gearfmu.report.style import COLOURS, panels, png, styled
+from gearfmu.report.style import COLOURS, WIDTH, plain_ticks, png, styled
 
 LEAST = 1e-3  # budgets: the smallest error on the chart
 MOST_SHOWN = 4.0  # budgets: the longest bar
@@ -85,8 +86,7 @@ def _number(value: float | None) -> str:
 def _chart(segment: Mapping[str, Any]) -> str:
     """Work–precision with the plan on it, and bars of error and price by effect."""
     with styled():
-        figure, axes = panels((3.0,), share=False)
-        axes[0].remove()
+        figure = Figure(figsize=(WIDTH, 3.55), layout="constrained")
         left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.0, 0.7))
         _precision(left, segment)
         _bars(middle, right, segment["lines"])
@@ -107,9 +107,7 @@ def _precision(panel: Axes, segment: Mapping[str, Any]) -> None:
     panel.axhline(1.0 / segment["safety"], color=COLOURS[1], linewidth=0.8, linestyle="--")
     prices = [point["price"] for point in segment["points"]]
     panel.xaxis.set_major_locator(FixedLocator([tick for tick in TICKS if min(prices) / 2 < tick < max(prices) * 2]))
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
+    plain_ticks(panel)
     panel.set_xlabel("processor time over that of level fast")
     panel.set_ylabel("error bound, budgets")
 

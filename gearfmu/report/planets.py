@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, over_time
-from gearfmu.report.names import mesh_words
 from gearfmu.report.plots import columns, pin_force
 from gearfmu.report.signals import PlanetSet, Window, mesh_speed, recorded
 from gearfmu.stage.run.trace import Trace
@@ -73,47 +71,36 @@ def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     run."""
     shared, means = shares(trace, own, window)
     late = trace.window(*detail_window(trace, own, window))
-    panels: list[Panel] = []
+    data, rows = {"time_[s]": trace.time}, []
     for planet in own.planets:
-        panels += _of_planet(
-            trace, late, planet, {c: (m, shared[m], means[m]) for c, m in _meshes_of(own, planet).items()}
-        )
-    panels = _same_limits(panels)
+        meshes = {central: own_meshes[planet] for central, own_meshes in own.meshes.items() if planet in own_meshes}
+        forces = [Curve(late.time, 1e-3 * np.abs(late[f"{m}.force"]), central, "kN") for central, m in meshes.items()]
+        parts = [Curve(trace.time, shared[m], f"{central} {means[m]:.3f}") for central, m in meshes.items()]
+        for central, mesh in meshes.items():
+            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shared[mesh]}
+        pin = []
+        if (pressed := pin_force(trace, planet)) is not None:
+            pin = [Curve(trace.time, 1e-3 * pressed, f"mean {np.mean(pressed):.4g} N", "kN", colour=2)]
+            data[f"{planet}_pin_[N]"] = pressed
+        rows.append((forces, parts, pin))
+    scales = [
+        _limits([curve.y for row in rows for curve in row[k]], least) for k, least in enumerate((0.0, LEAST_SPAN, 0.0))
+    ]
+    panels = [
+        Panel(f"{planet}: {label}", tuple(curves), limits=scale, height=130)
+        for planet, row in zip(own.planets, rows, strict=True)
+        for label, curves, scale in zip(COLUMNS_OF_PLANETS, row, scales, strict=True)
+    ]
     caption = (
         "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean "
         f"over one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force "
         "on the pin across its axis, with its mean. Each column has one scale."
     )
-    data = {"time_[s]": trace.time}
-    for planet in own.planets:
-        for central, mesh in _meshes_of(own, planet).items():
-            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shared[mesh]}
-        if (pressed := pin_force(trace, planet)) is not None:
-            data[f"{planet}_pin_[N]"] = pressed
     return Plot("planets", "Planet by planet", caption, Chart(tuple(panels), across=len(COLUMNS_OF_PLANETS)), data)
 
 
 LEAST_SPAN = 0.01  # of an axis of shares
 COLUMNS_OF_PLANETS = ("mesh forces in kN", "share", "force on the pin in kN")
-
-
-def _of_planet(
-    trace: Trace, late: Trace, planet: str, meshes: Mapping[str, tuple[str, np.ndarray, float]]
-) -> list[Panel]:
-    """The row of a planet: mesh forces over the last mesh periods `late`; shares and pin force over the run. meshes: by
-    central gear its engagement, share (n,) and mean share."""
-    forces, parts = [], []
-    for central, (mesh, share, mean) in meshes.items():
-        forces.append(Curve(late.time, 1e-3 * np.abs(late[f"{mesh}.force"]), central, "kN"))
-        parts.append(Curve(trace.time, share, f"{central} {mean:.3f}"))
-    pressed = pin_force(trace, planet)
-    pin: tuple[Curve, ...] = ()
-    if pressed is not None:
-        pin = (Curve(trace.time, 1e-3 * pressed, f"mean {np.mean(pressed):.4g} N", "kN", colour=2),)
-    return [
-        Panel(f"{planet}: {label}", tuple(curves), height=130)
-        for label, curves in zip(COLUMNS_OF_PLANETS, (forces, parts, pin), strict=True)
-    ]
 
 
 def _limits(curves: Sequence[np.ndarray], least: float) -> tuple[float, float] | None:
@@ -125,39 +112,6 @@ def _limits(curves: Sequence[np.ndarray], least: float) -> tuple[float, float] |
     low, high = float(values.min()), float(values.max())
     edge = max(0.05 * (high - low), 0.5 * (least - (high - low))) or 0.05 * abs(high) or 1.0
     return low - edge, high + edge
-
-
-def _same_limits(panels: list[Panel]) -> list[Panel]:
-    """The panels of a column with one scale."""
-    found = []
-    for number, panel in enumerate(panels):
-        column = panels[number % len(COLUMNS_OF_PLANETS) :: len(COLUMNS_OF_PLANETS)]
-        least = LEAST_SPAN if number % len(COLUMNS_OF_PLANETS) == COLUMNS_OF_PLANETS.index("share") else 0.0
-        panel = replace(panel, limits=_limits([curve.y for other in column for curve in other.curves], least))
-        found.append(panel)
-    return found
-
-
-def _meshes_of(own: PlanetSet, planet: str) -> dict[str, str]:
-    """Engagements of a planet by central gear."""
-    return {central: meshes[planet] for central, meshes in own.meshes.items() if planet in meshes}
-
-
-def planet_results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the table of planets: mean, alternating part and share of every mesh force, transmission
-    error, pin force; over `window`."""
-    part, means = trace.window(window.start, window.end), shares(trace, own, window)[1]
-    rows = []
-    for meshes in own.meshes.values():
-        for planet, mesh in meshes.items():
-            force = _force(part, mesh)
-            te = part[f"{mesh}.te"] * 1e6 if f"{mesh}.te" in part else np.array([np.nan])
-            pin = [part[name] for d in "xy" if (name := f"pin.{planet}.f{d}") in part]
-            held = float(np.mean(np.hypot(*pin))) if len(pin) == 2 else np.nan
-            numbers = (np.mean(force), np.std(force), means[mesh], np.mean(te), np.std(te), held)
-            rows.append((mesh_words(mesh), *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
-    head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
-    return head, rows
 
 
 def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float = 8) -> tuple[float, float]:

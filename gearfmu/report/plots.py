@@ -66,15 +66,16 @@ def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | 
     names = [name for name in scales if name in trace]
     if not names:
         return None
-    part, shaded = trace if window is None else trace.window(*window), tuple(_contact(trace, mesh, window))
+    part = trace if window is None else trace.window(*window)
+    state = _by_flank(trace, part, mesh) if f"{mesh}.contact" in part else None
+    shaded = () if state is None else tuple(_contact(part.time, state))
     panels = []
     for name in names:
         scale, label = scales[name]
-        curve = Curve(part.time, part[name] * scale, name, label.split()[-1])
-        panels.append(Panel(label, (curve,), spans=shaded))
+        panels.append(Panel(label, channels(part, [name], scale, label.split()[-1]), spans=shaded))
     file = mesh if window is None else f"{mesh}_detail"
     title = of_mesh(trace, mesh, "Mesh force and transmission error") + ("" if window is None else ", detail")
-    words = _contact_words(_by_flank(trace, part, mesh)) if f"{mesh}.contact" in part else ""
+    words = "" if state is None else _contact_words(state)
     extra = [n for n in (f"{mesh}.contact", f"{mesh}.pairs") if n in part]
     chart = over_time(panels, "time" if window is None else file)
     return Plot(file, title, words, chart, columns(part, names + extra))
@@ -142,8 +143,8 @@ def pin_forces(trace: Trace, planets: Sequence[str]) -> Plot | None:
 
 def pin_force(trace: Trace, planet: str) -> np.ndarray | None:
     """(n,) N: magnitude of the force of a planet on its pin across the axis; None where it was not recorded."""
-    names = [f"pin.{planet}.{direction}" for direction in ("fx", "fy")]
-    return np.hypot(trace[names[0]], trace[names[1]]) if all(name in trace for name in names) else None
+    x, y = (f"pin.{planet}.{direction}" for direction in ("fx", "fy"))
+    return np.hypot(trace[x], trace[y]) if x in trace and y in trace else None
 
 
 def energy(trace: Trace) -> Plot | None:
@@ -200,14 +201,10 @@ def _locked(trace: Trace) -> list[Span]:
     return [Span(*ends, "locked") for name in names for ends in spans(trace.time, trace[name].astype(bool))]
 
 
-def _contact(trace: Trace, mesh: str, window: tuple[float, float] | None) -> list[Span]:
-    """Where the teeth of an engagement are apart, on the coast flanks or on both."""
-    if f"{mesh}.contact" not in trace:
-        return []
-    part = trace if window is None else trace.window(*window)
-    state = _by_flank(trace, part, mesh)
-    found = [Span(*ends, kind) for code, kind in SPANS.items() for ends in spans(part.time, state == code)]
-    return joined(found, float(part.time[-1] - part.time[0]) / MOST_SPANS)
+def _contact(time: np.ndarray, state: np.ndarray) -> list[Span]:
+    """Where the teeth of an engagement are apart, on the coast flanks or on both; state (n,): of `_by_flank`."""
+    found = [Span(*ends, kind) for code, kind in SPANS.items() for ends in spans(time, state == code)]
+    return joined(found, float(time[-1] - time[0]) / MOST_SPANS)
 
 
 def joined(found: Sequence[Span], gap: float) -> list[Span]:
@@ -233,11 +230,11 @@ def _by_flank(trace: Trace, part: Trace, mesh: str) -> np.ndarray:
 
 def _contact_words(state: np.ndarray) -> str:
     """state (n,): of `_by_flank`."""
-    shares = [
+    shares = (
         (0, "the teeth are apart", "orange"),
         (-1, "coast flanks carry", "blue"),
         (2, "both flanks touch", "grey"),
-    ]
+    )
     words = [
         f"{text} in {np.mean(state == code):.1%} of the samples ({shade})"
         for code, text, shade in shares

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from gearfmu.report.signals import (
     noise_floor,
     on_mounts,
     recorded,
+    steady,
 )
 from gearfmu.stage.run.trace import Trace
 
@@ -32,7 +33,6 @@ MOST_ROWS, MOST_COLUMNS = 400, 700  # of a map in the page
 SENSOR = "sensor."
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 MARKED_ORDERS = 12  # of a set
-STEADY = 0.1  # nine tenths of the speeds lie as close together, over their median, where mesh orders are marked
 SHOWN_TO = 12e3  # Hz; the data reach half the sampling rate
 
 
@@ -81,11 +81,6 @@ def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spec
     return metrics.amplitude_spectrum(part[name], step, size, averaging(part, name))
 
 
-def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
-    """Level of every bearing and mesh force over frequency: `spectra`."""
-    return spectra(trace, window, angles, force_channels(trace), FORCES)
-
-
 def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     """Spectra of the mesh forces and of the ring's force on its mounts along fixed axes. Marked: mesh orders k f_m, and
     around each the sidebands of the planets' passing, k f_m ± N f_c (N planets, f_c: carrier)."""
@@ -97,13 +92,12 @@ def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     mesh_frequency = mesh_speed(part, own) / (2 * np.pi)
     speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
     carrier = float(np.median(speed)) / (2 * np.pi)
-    steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
+    is_steady = steady(speed)
     top = min(SHOWN_TO, 0.5 / metrics.sample_step(part.time))
-    marks = tuple(_side_marks(mesh_frequency, len(own.planets) * carrier, top)) if steady else ()
+    marks = _side_marks(mesh_frequency, len(own.planets) * carrier, top) if is_steady else []
     panels = [
-        replace(panel, label=f"{title}: {panel.label}")
+        _levels({name: spectra[name] for name in group}, top, marks, FORCES, f"{title}: ")
         for title, group in groups.items()
-        for panel in [_levels({name: spectra[name] for name in group}, top, marks, FORCES)]
     ]
     chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
     first = next(iter(spectra.values()))
@@ -114,7 +108,7 @@ def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     caption += (
         f"Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: k·f_m ± {len(own.planets)} f_c, "
         f"f_c = {carrier:.2f} Hz of the carrier."
-        if steady
+        if is_steady
         else "Mesh orders are not marked: the speed is not steady."
     )
     data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in spectra.items()}
@@ -148,7 +142,7 @@ def spectra(
     own = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
     top = min(SHOWN_TO, 0.5 / step)
     found = {mesh: _order_marks(part.time, trace, (mesh, angle), top) for mesh, angle in angles.items()}
-    marked, marks = [mesh for mesh in found if found[mesh]], tuple(mark for own in found.values() for mark in own)
+    marked, marks = [mesh for mesh in found if found[mesh]], [mark for own in found.values() for mark in own]
     panels = [_levels({name: own[name] for name in group}, top, marks, kind) for group in _by_part(names)]
     chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
     first = next(iter(own.values()))
@@ -162,7 +156,11 @@ def spectra(
             else "Mesh orders are not marked: the speed is not known or not steady, or they lie above the spectrum."
         )
     )
-    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, chart, _spectrum_columns(own, kind))
+    data = {"frequency_[Hz]": first.frequency}
+    for name, spectrum in own.items():
+        data[f"{name}_rms_[{kind.unit}]"] = spectrum.amplitude
+        data[f"{name}_[{kind.label}]"] = kind.level(spectrum.amplitude)
+    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, chart, data)
 
 
 def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
@@ -176,7 +174,7 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
 
 def cuts(trace: Trace, of: tuple[str, np.ndarray], names: Sequence[str], kind: Kind) -> Plot | None:
     """Level of the first orders of an engagement (name, mesh angle (n,) rad) in channels along the run; None without
-    channels."""
+    channels. MetricsError where not even the first order lies below the sampling limit anywhere in the run."""
     mesh, mesh_angle = of
     if not names:
         return None
@@ -185,22 +183,29 @@ def cuts(trace: Trace, of: tuple[str, np.ndarray], names: Sequence[str], kind: K
         name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS, averaged=averaging(trace, name))
         for name in names
     }
-    _require_order(next(iter(found.values())), mesh, metrics.sample_step(trace.time))
+    first = next(iter(found.values()))
+    low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
+    if not np.any(np.isfinite(first.amplitude)):
+        raise metrics.MetricsError(
+            f"Mesh orders of {mesh}: its mesh frequency, {low:.0f} Hz and more, lies above 0.45 of the sampling rate, "
+            f"{0.45 / metrics.sample_step(trace.time):.0f} Hz. Run again with a communication step of "
+            f"{0.45e6 / low / 5:.2g} µs for the first five orders."
+        )
     panels = []
     for name, cut in found.items():
         rows = [(k, row) for k, row in zip(cut.orders, cut.amplitude, strict=True) if np.any(np.isfinite(row))]
         curves = tuple(Curve(cut.time, kind.level(row), f"order {k}", kind.label) for k, row in rows)
         panels.append(Panel(f"{shown(name)}, {kind.label}", curves, limits=level_limits(curves)))
-    first = next(iter(found.values()))
-    low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
     caption = (
         f"Mesh order k = k × mesh frequency, which runs from {low:.0f} to {high:.0f} Hz; Hann window of 8 mesh "
-        "periods in "
-        "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are "
-        "left out."
+        "periods in angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate "
+        "are left out."
     )
     title = of_mesh(trace, mesh, f"Mesh orders {'of the housing ' if kind is ACCELERATIONS else ''}along the run")
-    return Plot(file, title, caption, over_time(panels), _order_columns(found, kind))
+    data = {"time_[s]": first.time, "mesh_frequency_[Hz]": first.mesh_frequency}
+    for name, cut in found.items():
+        data |= {f"{name}_order_{k}_rms_[{kind.unit}]": row for k, row in zip(cut.orders, cut.amplitude, strict=True)}
+    return Plot(file, title, caption, over_time(panels), data)
 
 
 def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | None:
@@ -221,11 +226,10 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     top, time = float(np.ceil(values.max() / 5) * 5), picture_data.time + trace.time[0]
     shown_to = picture_data.frequency <= limit
     heat = heat_of(time, picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T, (top - RANGE_DB, top))
-    looks = [LOOKS[k % len(LOOKS)] for k in range(len(angles))]
     rays = [
         curve
-        for look, own in zip(looks, angles.items(), strict=True)
-        for curve in _order_curves(trace, own, look, limit)
+        for k, own in enumerate(angles.items())
+        for curve in _order_curves(trace, own, LOOKS[k % len(LOOKS)], limit)
     ]
     limits = (float(time[0]), float(time[-1]))
     panel = Panel(f"{shown(name)}: frequency in kHz", tuple(rays), heat, height=300, limits=(0.0, limit / 1e3))
@@ -281,17 +285,6 @@ def sampling_warning(trace: Trace) -> str | None:
     )
 
 
-def _require_order(cuts: metrics.OrderCuts, mesh: str, step: float) -> None:
-    """MetricsError where not even the first order lies below the sampling limit anywhere in the run."""
-    if not np.any(np.isfinite(cuts.amplitude)):
-        lowest = float(cuts.mesh_frequency.min())
-        raise metrics.MetricsError(
-            f"Mesh orders of {mesh}: its mesh frequency, {lowest:.0f} Hz and more, lies above 0.45 of the sampling "
-            f"rate, {0.45 / step:.0f} Hz. Run again with a communication step of {0.45e6 / lowest / 5:.2g} µs for the "
-            "first five orders."
-        )
-
-
 def heat_of(
     x: np.ndarray, y: np.ndarray, levels: np.ndarray, limits: tuple[float, float], unit: str = "dB re 1 N"
 ) -> Heat:
@@ -311,10 +304,12 @@ def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarr
     return np.fmax.reduceat(levels, starts, axis=0), np.add.reduceat(at, starts) / counts
 
 
-def _levels(spectra: Mapping[str, metrics.Spectrum], top: float, marks: tuple[Mark, ...], kind: Kind) -> Panel:
+def _levels(
+    spectra: Mapping[str, metrics.Spectrum], top: float, marks: Sequence[Mark], kind: Kind, of: str = ""
+) -> Panel:
     """A panel of levels over frequency (kHz) up to `top` (Hz)."""
     curves = tuple(spectrum_curve(name, own, top, kind) for name, own in spectra.items())
-    return Panel(f"level in {kind.label}", curves, marks=marks, limits=level_limits(curves))
+    return Panel(f"{of}level in {kind.label}", curves, marks=tuple(marks), limits=level_limits(curves))
 
 
 def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float, kind: Kind = FORCES) -> Curve:
@@ -324,18 +319,16 @@ def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float, kind: Kind
     return Curve(spectrum.frequency[inside] / 1e3, level, name, kind.label)
 
 
-def _order_marks(time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray], top: float) -> tuple[Mark, ...]:
-    """Marks of the orders of an engagement (name, mesh angle) at the median speed below `top` (Hz), if nine tenths of
-    the window stay within 10 %; else none."""
+def _order_marks(time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray], top: float) -> list[Mark]:
+    """Marks of the orders of an engagement (name, mesh angle) at the median speed below `top` (Hz), where the speed
+    over time (n,) s is steady; else none."""
     name, angle = mesh
     frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
-    low, middle, high = np.percentile(frequency, [5, 50, 95])
-    if middle <= 0 or high - low > 0.1 * middle:
-        return ()
-    several = len(meshes(trace)) > 1
+    if not steady(frequency):
+        return []
+    several, middle = len(meshes(trace)) > 1, np.percentile(frequency, 50)
     highest = min(int(top / middle), 3 if several else 24)
-    orders = range(1, highest + 1)
-    return tuple(Mark(k * middle / 1e3, f"{name} {k}" if several else str(k)) for k in orders)
+    return [Mark(k * middle / 1e3, f"{name} {k}" if several else str(k)) for k in range(1, highest + 1)]
 
 
 def _order_curves(trace: Trace, mesh: tuple[str, np.ndarray], look: str, limit: float) -> list[Curve]:
@@ -349,21 +342,4 @@ def _order_curves(trace: Trace, mesh: tuple[str, np.ndarray], look: str, limit: 
         if np.any(np.isfinite(curve)):
             words = f"order {order}" if len(meshes(trace)) < 2 else f"{name} order {order}"
             found.append(Curve(trace.time[thin], curve[thin] / 1e3, words, "kHz", look))
-    return found
-
-
-def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum], kind: Kind) -> dict[str, np.ndarray]:
-    found = {"frequency_[Hz]": next(iter(spectra.values())).frequency}
-    for name, spectrum in spectra.items():
-        found[f"{name}_rms_[{kind.unit}]"] = spectrum.amplitude
-        found[f"{name}_[{kind.label}]"] = kind.level(spectrum.amplitude)
-    return found
-
-
-def _order_columns(cuts: Mapping[str, metrics.OrderCuts], kind: Kind) -> dict[str, np.ndarray]:
-    first = next(iter(cuts.values()))
-    found = {"time_[s]": first.time, "mesh_frequency_[Hz]": first.mesh_frequency}
-    for name, cut in cuts.items():
-        for row, order in enumerate(cut.orders):
-            found[f"{name}_order_{order}_rms_[{kind.unit}]"] = cut.amplitude[row]
     return found

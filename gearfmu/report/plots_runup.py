@@ -8,7 +8,7 @@ from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits
 from gearfmu.report.names import shown
 from gearfmu.report.plots import RPM
-from gearfmu.report.plots_nvh import heat_of
+from gearfmu.report.plots_nvh import Kind, heat_of
 from gearfmu.report.runup import RunUp, Signal
 
 SHOWN_DB = 60
@@ -26,12 +26,15 @@ def frequency_maps(run: RunUp) -> Plot:
     size = min(samples, 2 ** max(6, round(np.log2(samples / 40))))
     hop = max(1, (samples - size) // BINS)
     maps = {name: metrics.spectrogram(own.values, step, size, hop, own.averaged) for name, own in run.signals.items()}
-    top = min(run.highest * _fastest(run), 0.5 / step)
+    fastest = float(run.turning.speed.max()) / (2 * np.pi)  # Hz
+    top = min(run.highest * fastest, 0.5 / step)
     first = next(iter(maps.values()))
     speed, kept = _speed_at(run, first.time, size * step) * RPM, first.frequency <= top
     ends = np.array([speed.min(), speed.max()])
     rays = tuple(
-        Curve(ends, order * ends / 60e3, f"{mesh} order {k}".strip(), "kHz", _look(run, mesh, "dashed"))
+        Curve(
+            ends, order * ends / 60e3, f"{mesh} order {k}".strip(), "kHz", "dotted" if _prime(run, mesh) else "dashed"
+        )
         for mesh, k, order in run.mesh_orders
     )
     panels = []
@@ -56,8 +59,9 @@ def order_maps(run: RunUp) -> Plot:
     panels = []
     for name, found in run.orders.items():
         heat = _heat(found.order, found.speed * RPM, found.amplitude, run.signals[name])
-        marks = tuple(_order_marks(run, run.signals[name]))
-        panels.append(Panel(f"{shown(name)}: speed of the {run.shaft} in rpm", (), heat, marks, height=250))
+        marks = [Mark(order, f"{k}{_prime(run, mesh)}") for mesh, k, order in run.mesh_orders]
+        marks += [Mark(order, "", "side") for orders in run.signals[name].sides.values() for order in orders]
+        panels.append(Panel(f"{shown(name)}: speed of the {run.shaft} in rpm", (), heat, tuple(marks), height=250))
     chart = Chart(tuple(panels), f"order of the {run.shaft}", "order", x_limits=(0.0, run.highest))
     first = next(iter(run.orders.values()))
     passing = PASSING if any(own.sides for own in run.signals.values()) else ""
@@ -77,15 +81,16 @@ def order_levels(run: RunUp) -> Plot:
     speed = next(iter(run.orders.values())).speed * RPM
     found = {name: _bands(run, name) for name in run.signals}
     beside = any(own.sides for own in run.signals.values())
+    low, high = speed.min(), speed.max()
+    ticks = tuple(Mark(rpm, "", "tick", order - 1) for order, _, rpm in crossings(run) if low <= rpm <= high)
     panels = []
     for name, bands in found.items():
-        own = run.signals[name]
+        kind = run.signals[name].kind
         curves = tuple(
-            _band_curve(speed, label, own.level(amplitude), own, k)
+            _band_curve(speed, label, kind.level(amplitude), kind, k)
             for k, (label, amplitude) in enumerate(bands.items())
         )
-        marks = tuple(_ticks(run, speed))
-        panels.append(Panel(f"{shown(name)}, {own.label}", curves, marks=marks, limits=level_limits(curves)))
+        panels.append(Panel(f"{shown(name)}, {kind.label}", curves, marks=ticks, limits=level_limits(curves)))
     chart = Chart(tuple(panels), f"speed of the {run.shaft} in rpm", "speed")
     caption = (
         f"Level within half an order of {_families(run)}, orders of the {run.shaft}{BESIDE if beside else ''}. "
@@ -109,25 +114,20 @@ def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
 
 def _column(run: RunUp, name: str) -> str:
     own = run.signals[name]
-    return f"{name}{'_mean' if own.averaged else ''}_rms_[{own.unit}]"
+    return f"{name}{'_mean' if own.averaged else ''}_rms_[{own.kind.unit}]"
 
 
 def _heat(x: np.ndarray, y: np.ndarray, amplitude: np.ndarray, own: Signal) -> Heat:
     """A map of amplitude (Y, X) rms, from the highest level SHOWN_DB down."""
-    values = own.level(amplitude)
+    values = own.kind.level(amplitude)
     top = float(np.ceil(np.nanpercentile(values, 99.9) / 5) * 5)
-    return heat_of(x, y, values, (top - SHOWN_DB, top), own.label)
+    return heat_of(x, y, values, (top - SHOWN_DB, top), own.kind.label)
 
 
-def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, own: Signal, number: int) -> Curve:
+def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, kind: Kind, number: int) -> Curve:
     beside = label.startswith("beside")
     colour = int(label.split()[-1]) - 1 if beside else number
-    return Curve(speed, level, label, own.label, "dotted" if beside else "", colour)
-
-
-def _order_marks(run: RunUp, own: Signal) -> list[Mark]:
-    marks = [Mark(order, f"{k}{_prime(run, mesh)}") for mesh, k, order in run.mesh_orders]
-    return marks + [Mark(order, "", "side") for orders in own.sides.values() for order in orders]
+    return Curve(speed, level, label, kind.label, "dotted" if beside else "", colour)
 
 
 def crossings(run: RunUp) -> list[tuple[int, float, float]]:
@@ -140,10 +140,6 @@ def crossings(run: RunUp) -> list[tuple[int, float, float]]:
 def _prime(run: RunUp, mesh: str) -> str:
     """What tells the orders of a mesh from those of the first."""
     return "′" * list(run.families).index(mesh)
-
-
-def _look(run: RunUp, mesh: str, first: str) -> str:
-    return "dotted" if _prime(run, mesh) else first
 
 
 def _families(run: RunUp) -> str:
@@ -174,11 +170,6 @@ def _circles(run: RunUp, ends: np.ndarray, top: float) -> tuple[np.ndarray, np.n
     return (np.array([rpm for rpm, _ in found]), np.array([f for _, f in found])) if found else None
 
 
-def _ticks(run: RunUp, speed: np.ndarray) -> list[Mark]:
-    low, high = speed.min(), speed.max()
-    return [Mark(rpm, "", "tick", order - 1) for order, _, rpm in crossings(run) if low <= rpm <= high]
-
-
 def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:
     """Mean speed (rad/s) over windows of `width` s around times (s) after the beginning of the part: what the shaft
     turns in them, free of its vibration."""
@@ -186,11 +177,6 @@ def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:
     ends = [np.clip(centres + side * width, 0.0, time[-1]) for side in (-0.5, 0.5)]
     turned = np.interp(ends[1], time, angle) - np.interp(ends[0], time, angle)
     return np.asarray(np.abs(turned) / (ends[1] - ends[0]))
-
-
-def _fastest(run: RunUp) -> float:
-    """Hz."""
-    return float(run.turning.speed.max()) / (2 * np.pi)
 
 
 FIGURES = (frequency_maps, order_maps, order_levels)

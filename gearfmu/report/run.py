@@ -11,7 +11,9 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.report.mesh_cycle import static_loads
-from gearfmu.report.metrics import MetricsError, sample_step
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.planets import shares
+from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import (
     PlanetSet,
@@ -46,6 +48,16 @@ class Run:
         return window_of_interest(self.trace)
 
     @cached_property
+    def part(self) -> Trace:
+        """The trace within the window."""
+        return self.trace.window(self.window.start, self.window.end)
+
+    @cached_property
+    def results(self) -> dict[str, float]:
+        """Key results and dynamic factors."""
+        return {**key_results(self.trace), **dynamic_factors(self.trace)}
+
+    @cached_property
     def known(self) -> dict[str, Meshing]:
         """Meshing by engagement."""
         return known_meshings(self.trace, self.spec)
@@ -54,6 +66,15 @@ class Run:
     def planets(self) -> PlanetSet | None:
         """The planetary set, None for other stages."""
         return planet_set(self.trace, self.known)
+
+    @cached_property
+    def mean_shares(self) -> dict[str, float]:
+        """Share of every planet in the force of its central gear by engagement, mean over the window; empty for other
+        stages and for samples that are not even."""
+        try:
+            return {} if self.planets is None else shares(self.trace, self.planets, self.window)[1]
+        except MetricsError:
+            return {}
 
     @cached_property
     def angles(self) -> dict[str, np.ndarray]:
@@ -106,11 +127,3 @@ class Run:
     def stage_name(self) -> str:
         """Name of the stage."""
         return str(self.summary.get("stage") or self.trace.meta.get("stage") or "stage not named")
-
-    @cached_property
-    def step(self) -> float | None:
-        """Time between samples, s; None where that is not even."""
-        try:
-            return sample_step(self.trace.time)
-        except MetricsError:
-            return None

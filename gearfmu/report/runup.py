@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
-from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, loudest_sensors
+from gearfmu.report.plots_nvh import ACCELERATIONS, FORCES, SENSOR, Kind, averaging, loudest_sensors
 from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
@@ -36,23 +36,13 @@ MODES = 30  # of the linearised stage, the lowest
 
 @dataclass(frozen=True)
 class Signal:
-    """values (n,); unit, and reference of its level; sides: for every mesh order the orders beside it, of the
-    carrier, that the signal has by the passing of the planets."""
+    """values (n,), of a kind; averaged: s, over which every sample is a mean; sides: for every mesh order the orders
+    beside it, of the carrier, that the signal has by the passing of the planets."""
 
     values: np.ndarray
-    unit: str
-    reference: float
-    sides: Mapping[int, tuple[float, ...]]
-    averaged: float = 0.0  # s, over which every sample is a mean
-
-    def level(self, amplitude: np.ndarray) -> np.ndarray:
-        """Level in dB."""
-        return metrics.level(amplitude, self.reference)
-
-    @property
-    def label(self) -> str:
-        """Of a level."""
-        return metrics.level_label(self.unit, self.reference)
+    kind: Kind
+    averaged: float
+    sides: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -163,15 +153,15 @@ def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window)
     """The run-up of a pair or a train within `window`, by gear A of its first engagement; None where that does not
     gather speed (or lose it) steadily, or where gears ride on a carrier."""
     part, rotors = trace.window(window.start, window.end), [meshing.rotor for meshing in known.values()]
-    if any(meshing.carrier is not None for meshing in known.values()):
-        return None
-    if any(f"{gear}{GEAR_PHI}" not in part for gear in rotors):
+    carried = any(meshing.carrier is not None for meshing in known.values())
+    if carried or any(f"{gear}{GEAR_PHI}" not in part for gear in rotors):
         return None
     first = rotors[0]
     turning = Turning.of(part.time, part[f"{first}{GEAR_PHI}"])
     if not turning.steady:
         return None
-    turned = {gear: float(np.ptp(part[f"{gear}{GEAR_PHI}"][[0, -1]])) for gear in _rotors(part)}
+    angles = [name for name in part.channels if name.endswith(GEAR_PHI)]
+    turned = {name.removesuffix(GEAR_PHI): float(np.ptp(part[name][[0, -1]])) for name in angles}
     families = {mesh: own.teeth * turned[own.rotor] / turned[first] for mesh, own in known.items()}
     if len(known) == 1:
         families, others = {"": float(next(iter(known.values())).teeth)}, {}
@@ -182,11 +172,6 @@ def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window)
     names += [*(f"{mesh}.force" for mesh in known), *loudest_sensors(part)]
     signals = {name: _force(part, name) for name in names if name in part or f"{name}_mean" in part}
     return RunUp(part, first, turning, families, signals, orders_shown=shown, others=others) if signals else None
-
-
-def _rotors(part: Trace) -> list[str]:
-    """Those whose angle is recorded."""
-    return [name.removesuffix(GEAR_PHI) for name in part.channels if name.endswith(GEAR_PHI)]
 
 
 def _loudest_bearings(part: Trace) -> list[str]:
@@ -215,22 +200,14 @@ def resonances(run: RunUp, mesh: str, stage: Stage, bodies: Sequence[Body]) -> t
 
 def _force(part: Trace, name: str) -> Signal:
     """A force, its mean over the step where that was recorded, or a sensor's acceleration, which is such a mean."""
-    if name.startswith(SENSOR):
-        own = ACCELERATIONS
-        return Signal(part[name], own.unit, own.reference, {}, metrics.sample_step(part.time))
-    step = metrics.sample_step(part.time) if f"{name}_mean" in part else 0.0
-    return Signal(part[recorded(part, name)], "N", 1.0, {}, step)
+    kind, used = ACCELERATIONS if name.startswith(SENSOR) else FORCES, recorded(part, name)
+    return Signal(part[used], kind, averaging(part, used))
 
 
 def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:
     """Force of the ring on its mounts, whose direction goes round with the carrier, and a mesh of every central
     gear."""
     around = {k: (k * each - 1.0, k * each + 1.0) for k in range(1, SET_ORDERS + 1)}
-    step = {True: metrics.sample_step(part.time), False: 0.0}
-    found = {
-        name: Signal(values, "N", 1.0, around, step[f"{name}_mean" in part])
-        for name, values in on_mounts(part).items()
-        if name[-1] == "x"
-    }
+    found = {name: replace(_force(part, name), sides=around) for name in on_mounts(part) if name.endswith("x")}
     meshes = [next(iter(meshes.values())) for meshes in own.meshes.values()]
     return found | {f"{mesh}.force": _force(part, f"{mesh}.force") for mesh in meshes if f"{mesh}.force" in part}

@@ -7,15 +7,16 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from gearfmu.report import heading, page, plots_nvh
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import mesh_words, plain
-from gearfmu.report.planets import planet_results, shares
-from gearfmu.report.plots import RPM
-from gearfmu.report.results import dynamic_factors, energy_balance, key_results
+from gearfmu.report.plots import RPM, pin_force
+from gearfmu.report.results import dynamic_factors, energy_balance
 from gearfmu.report.run import Run
-from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
+from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor, recorded
 from gearfmu.stage import assemble
 from gearfmu.stage.run.refinement import left_of_slices
 from gearfmu.stage.run.trace import Trace
@@ -33,6 +34,21 @@ WORDS = {  # key of a result: words, channel of the mesh, unit
     "coast_contact_percent": ("Coast flanks carry, share of the samples of the whole run", "contact", "%"),
     "impacts": ("Impacts, whole run", "impacts", ""),
 }
+OPERATION = {  # words: key of the summary, scale, unit
+    "torque of the input": ("torque", 1.0, "N·m"),
+    "speed of the input": ("speed", RPM, "rpm"),
+    "speed at the end": ("end_speed", RPM, "rpm"),
+}
+FACTS = {
+    "fidelity level": ("level", 1.0, ""),
+    "dynamic modes, all gears": ("n_dyn", 1.0, ""),
+    "slices": ("slices", 1.0, ""),
+    "internal step": ("h", 1e6, "µs"),
+    "communication step": ("H", 1e6, "µs"),
+    "simulated": ("simulated_s", 1.0, "s"),
+    "CPU time": ("cpu_s", 1.0, "s"),
+    "CPU time per simulated second": ("realtime_factor", 1.0, ""),
+}
 NOT_GIVEN = "not given"
 FACTOR_WORDS = (
     "Dynamic factor: largest mesh force over the static one, in the sense of K_v of ISO 6336-1 (there by rating "
@@ -42,56 +58,42 @@ FACTOR_WORDS = (
 
 def tiles(run: Run) -> list[tuple[str, str, str]]:
     """The key results: value, unit, description; of several meshes the largest, with its name."""
-    results, names = {**key_results(run.trace), **dynamic_factors(run.trace)}, meshes(run.trace)
-    found = []
+    results, names, found = run.results, meshes(run.trace), []
     for key, scale, unit, words in (
         ("mesh_force_mean_N", 1e-3, "kN", "mean mesh force"),
         ("dynamic_factor", 1.0, "", "dynamic factor: largest mesh force over the static one"),
         ("te_rms_ac_um", 1.0, "µm rms", "alternating transmission error"),
         ("contact_loss_percent", 1.0, "%", "of the samples with teeth apart"),
     ):
-        known = {mesh: results[own] for mesh in names if (own := _key(mesh, key, names)) in results}
+        keys = {mesh: f"{mesh}_{key}" if len(names) > 1 else key for mesh in names}
+        known = {mesh: results[own] for mesh, own in keys.items() if own in results}
         if known:
             mesh = max(known, key=lambda name: abs(known[name]))
             where = f", {mesh_words(mesh)} (the largest)" if len(known) > 1 and known[mesh] else ""
             found.append((f"{abs(known[mesh]) * scale:.3g}", unit, f"{words}{where}"))
-    if run.planets is not None:
-        found += _most_loaded(run)
-    loudest = {
-        name: results[f"bearing_{name}_rms_ac_N"]
-        for name in bearings(run.trace)
-        if f"bearing_{name}_rms_ac_N" in results
-    }
-    if loudest:
-        name = max(loudest, key=lambda bearing: loudest[bearing])
-    if loudest and loudest[name] >= noise_floor(run.trace):
-        found.append((f"{loudest[name]:.3g}", "N rms", f"alternating bearing force, {name}"))
+    if means := run.mean_shares:
+        mesh = max(means, key=lambda name: means[name])
+        found.append((f"{means[mesh]:.3f}", "", f"largest share of a planet, {mesh_words(mesh)} (1: all alike)"))
+    loud = {name: results.get(f"bearing_{name}_rms_ac_N", -1.0) for name in bearings(run.trace)}
+    name = max(loud, key=lambda bearing: loud[bearing], default="")
+    if loud.get(name, -1.0) >= noise_floor(run.trace):
+        found.append((f"{loud[name]:.3g}", "N rms", f"alternating bearing force, {name}"))
     if "lock_time_s" in results:
         found.append((f"{results['lock_time_s']:.4g}", "s", "clutch locked from here on"))
     return found
 
 
-def _most_loaded(run: Run) -> list[tuple[str, str, str]]:
-    assert run.planets is not None
-    try:
-        means = shares(run.trace, run.planets, run.window)[1]
-    except MetricsError:
-        return []
-    mesh = max(means, key=lambda name: means[name])
-    return [(f"{means[mesh]:.3f}", "", f"largest share of a planet, {mesh_words(mesh)} (1: all alike)")]
-
-
-def _key(mesh: str, key: str, names: Sequence[str]) -> str:
-    return f"{mesh}_{key}" if len(names) > 1 else key
-
-
 def results(run: Run) -> str:
     """The table of key results."""
     names = meshes(run.trace)
-    values = {**key_results(run.trace), **dynamic_factors(run.trace)}
     floor = noise_floor(run.trace)
-    noise = {key for key, value in values.items() if key.endswith("rms_ac_N") and value < floor}
-    rows = "".join(_row(key, 0.0 if key in noise else value, names) for key, value in values.items())
+    noise = {key for key, value in run.results.items() if key.endswith("rms_ac_N") and value < floor}
+    rows = []
+    for key, value in run.results.items():
+        words, channel, unit = result_words(key, names)
+        breaking = escape(channel).replace(".", ".<wbr>")  # behind its dots, not within its words
+        code = page.Ready(f'<code class="channel">{breaking}</code>')
+        rows.append((words, code, f"{0.0 if key in noise else value:.4g}", unit))
     if not rows:
         return page.note("The trace holds no mesh or bearing channel.")
     window = run.window
@@ -102,16 +104,7 @@ def results(run: Run) -> str:
         "Static: the mean." if steady else "Static: the moving average of 10 ms, where it is a tenth of its largest."
     )
     where += f" Forces below {floor:.2g} N, 1e-4 of the largest mesh force, are shown as 0." if noise else ""
-    head = '<tr><th></th><th>channel</th><th class="n">value</th><th>unit</th></tr>'
-    return f'<div class="scroll"><table>{head}{rows}</table></div>{page.note(where)}'
-
-
-def _row(key: str, value: float, names: Sequence[str]) -> str:
-    words, channel, unit = result_words(key, names)
-    return (
-        f'<tr><td>{escape(words)}</td><td><code class="channel">{_breaking(channel)}</code></td>'
-        f'<td class="n">{value:.4g}</td><td>{unit}</td></tr>'
-    )
+    return page.table(("", "channel", "value", "unit"), rows, (0, 1, 3)) + page.note(where)
 
 
 def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
@@ -129,21 +122,28 @@ def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
 
 
 def planets(run: Run) -> list[str]:
-    """The table of planets of a set."""
-    if run.planets is None:
+    """Key numbers of a set, and the table of its planets: mean, alternating part and share of every mesh force,
+    transmission error, pin force; over the window."""
+    if run.planets is None or not run.mean_shares:
         return []
-    try:
-        table = page.table(*planet_results(run.trace, run.planets, run.window))
-    except MetricsError:
-        return []
-    window = run.window
+    part, window, rows = run.part, run.window, []
+    for planet, mesh in (pair for own in run.planets.meshes.values() for pair in own.items()):
+        force = part[recorded(part, f"{mesh}.force")]
+        te = part[f"{mesh}.te"] * 1e6 if f"{mesh}.te" in part else np.array([np.nan])
+        pin = pin_force(part, planet)
+        held = np.nan if pin is None else np.mean(pin)
+        numbers = (np.mean(force), np.std(force), run.mean_shares[mesh], np.mean(te), np.std(te), held)
+        rows.append((mesh_words(mesh), *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
+    head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
     where = (
         f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}. Share: 1 where all planets carry alike. "
     )
-    factors = [v for v in dynamic_factors(run.trace).values() if math.isfinite(v)]
-    where += FACTOR_WORDS if factors else ""
-    numbers = page.table(("", ""), heading.of_set(run), (0, 1))
-    return [page.section("Key numbers", numbers, name="results"), page.section("Planets", table, page.note(where))]
+    where += FACTOR_WORDS if any(math.isfinite(v) for v in dynamic_factors(run.trace).values()) else ""
+    key_numbers = page.table(("", ""), heading.of_set(run), (0, 1))
+    return [
+        page.section("Key numbers", key_numbers, name="results"),
+        page.section("Planets", page.table(head, rows), page.note(where)),
+    ]
 
 
 def warned(trace: Trace) -> list[str]:
@@ -172,29 +172,10 @@ def octaves(run: Run) -> str:
     )
 
 
-def _breaking(channel: str) -> str:
-    """A channel's name that may break behind its dots, not within its words."""
-    return escape(channel).replace(".", ".<wbr>")
-
-
 def facts(summary: Mapping[str, object]) -> dict[str, str]:
     """How it was run."""
-    known = {
-        "torque of the input": _text(summary, "torque", 1, "N·m"),
-        "speed of the input": _text(summary, "speed", RPM, "rpm"),
-        "speed at the end": _text(summary, "end_speed", RPM, "rpm"),
-    }
-    given = {name: text for name, text in known.items() if text != NOT_GIVEN}
-    return given | {
-        "fidelity level": _text(summary, "level"),
-        "dynamic modes, all gears": _text(summary, "n_dyn"),
-        "slices": _text(summary, "slices"),
-        "internal step": _text(summary, "h", 1e6, "µs"),
-        "communication step": _text(summary, "H", 1e6, "µs"),
-        "simulated": _text(summary, "simulated_s", 1, "s"),
-        "CPU time": _text(summary, "cpu_s", 1, "s"),
-        "CPU time per simulated second": _text(summary, "realtime_factor"),
-    }
+    shown = {words: own for words, own in OPERATION.items() if summary.get(own[0]) is not None} | FACTS
+    return {words: _text(summary, *own) for words, own in shown.items()}
 
 
 def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = "") -> str:
@@ -210,9 +191,9 @@ def _left_of_slices(run: Run) -> str:
     """Error by the number of slices of a helical pair; "" for other stages, where that takes minutes, and
     without torque or bodies."""
     torque = run.summary.get("torque")
-    if not run.spec or not run.bodies or not isinstance(torque, (int, float)) or not torque:
+    if not run.spec or not run.bodies or len(run.spec.engagements) != 1:
         return ""
-    if len(run.spec.engagements) != 1:
+    if not isinstance(torque, (int, float)) or not torque:
         return ""
     left = left_of_slices(assemble(run.spec, run.bodies), [torque], slices=int(run.summary.get("slices") or 0))
     return left.text if left else ""
@@ -234,38 +215,23 @@ def accuracy(run: Run) -> list[str]:
         rows["Work lost between the stage and its shafts, of the work exchanged"] = lost
     if change := _left_of_slices(run):
         rows["Static transmission error, twice the slices"] = change
-    parts = [
-        page.pairs_table(
-            {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}
-        )
-    ]
+    told = {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}
     made_with = fingerprint(body.how.hash for body in bodies or ())
     prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
     if prices:
-        parts += [
+        of_levels = [
             "<h3>Price and error of the fidelity levels of this stage</h3>",
             page.table(HEADER, shown_rows(prices, str(summary.get("level")))),
-            page.note(PRICES),
+            page.note(
+                "Errors of the alternating part against level full at a fifth of its step, after settling, each level "
+                "at its default step; CPU time of the stage as measured when the list was made."
+            ),
         ]
     else:
-        parts.append(
-            page.note(
-                "The error of the fidelity levels of this stage with these bodies has not been measured "
-                "(evidence/study/levels.py does it)."
-            )
-        )
-    return parts + [
-        page.note(_frf_words(body.name, body.error))
-        for body in bodies or ()
-        if body.error is not None and body.error.cut
-    ]
-
-
-PRICES = (
-    "Errors of the alternating part against level full at a fifth of its step, after settling, each level at its "
-    "default step; "
-    "CPU time of the stage as measured when the list was made."
-)
+        missing = "The error of the fidelity levels of this stage with these bodies has not been measured "
+        of_levels = [page.note(f"{missing}(evidence/study/levels.py does it).")]
+    errors = [_frf_words(body.name, body.error) for body in bodies or () if body.error is not None and body.error.cut]
+    return [page.pairs_table(told), *of_levels, *map(page.note, errors)]
 
 
 def _frf_words(name: str, frf: FrfError) -> str:
@@ -279,37 +245,21 @@ def _frf_words(name: str, frf: FrfError) -> str:
 
 def provenance(summary: Mapping[str, object]) -> dict[str, str]:
     """The rest of the summary."""
-    shown = {
-        "scene",
-        "stage",
-        "outcome",
-        "level",
-        "n_dyn",
-        "slices",
-        "h",
-        "H",
-        "simulated_s",
-        "cpu_s",
-        "realtime_factor",
-        "coupling_error",
-        "coupling_error_of",
-        "energy_residual",
-    }
-    flat: dict[str, str] = {}
+    shown = {"scene", "stage", "outcome", "coupling_error", "coupling_error_of", "energy_residual"}
+    shown |= {key for key, _, _ in FACTS.values()}
+    flat: dict[str, object] = {}
     for key, value in summary.items():
-        if isinstance(value, Mapping) and key not in shown:
-            flat |= {f"{key}.{inner}": str(item) for inner, item in value.items()}
-        elif key not in shown:
-            flat[key] = str(value)
-    return flat
+        if key not in shown:
+            flat |= (
+                {f"{key}.{name}": own for name, own in value.items()} if isinstance(value, Mapping) else {key: value}
+            )
+    return {name: str(value) for name, value in flat.items()}
 
 
 def channels(trace: Trace) -> str:
     """The channels of the trace: plain name, name, unit, description."""
     rows = [
-        f"<tr><td>{escape(plain(name))}</td><td><code>{escape(name)}</code></td><td>{escape(own.unit)}</td>"
-        f"<td>{escape(own.description)}</td></tr>"
+        (plain(name), page.Ready(f"<code>{escape(name)}</code>"), own.unit, own.description)
         for name, own in trace.channels.items()
     ]
-    head = "<tr><th></th><th>name</th><th>unit</th><th>meaning</th></tr>"
-    return f'<h3>Channels in trace.h5</h3><div class="scroll"><table>{head}{"".join(rows)}</table></div>'
+    return "<h3>Channels in trace.h5</h3>" + page.table(("", "name", "unit", "meaning"), rows, range(4))

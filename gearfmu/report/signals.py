@@ -18,6 +18,7 @@ GEAR_SPEED = ".gear.w"
 LOCKED = ".locked"
 MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
 NOISE = 1e-4  # of the largest mesh force: forces that cancel leave less
+STEADY = 0.1
 SETTLED = "after the scene's settling time"
 
 
@@ -89,7 +90,9 @@ def lock_time(trace: Trace) -> float | None:
     """Time in s from which a clutch stays locked to the end; None without a clutch or when it slips at the end."""
     for name in trace.channels:
         if name.endswith(LOCKED):
-            return _last_rise(trace.time, trace[name].astype(bool))
+            slipping = np.flatnonzero(~trace[name].astype(bool))
+            first = slipping[-1] + 1 if slipping.size else 0
+            return float(trace.time[first]) if first < trace.time.size else None
     return None
 
 
@@ -113,11 +116,10 @@ def spans(time: np.ndarray, mask: np.ndarray) -> list[tuple[float, float]]:
     return [(float(time[a]), float(time[min(b, time.size - 1)])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _last_rise(time: np.ndarray, locked: np.ndarray) -> float | None:
-    if not locked[-1]:
-        return None
-    slipping = np.flatnonzero(~locked)
-    return float(time[0] if slipping.size == 0 else time[slipping[-1] + 1])
+def steady(values: np.ndarray) -> bool:
+    """Whether nine tenths of values (n,) lie within STEADY of their median."""
+    low, middle, high = np.percentile(values, [5, 50, 95])
+    return bool(high - low < STEADY * middle)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 
-from gearfmu.report.style import COLOURS, MUTED, panels, saved, styled
+from gearfmu.report.style import COLOURS, MUTED, panels, plain_ticks, saved, styled
 from gearfmu.stage.assembly.levels import LEVELS
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
@@ -47,23 +47,15 @@ def draw(panel: Axes, rows: Sequence[Any], slices: int, name: str) -> None:
         panel.loglog(time, error, color=colour, linewidth=1.2 if own else 0.7, **style)
         if own and name == "te":
             _write_steps(panel, line, time, error)
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
+    plain_ticks(panel)
     panel.set_ylabel(f"{QUANTITIES[name]}, %")
 
 
 def _write_steps(panel: Axes, line: Sequence[Any], time: list[float], error: list[float]) -> None:
     """The step beside the first and the last point of a line."""
     for k in sorted({0, len(line) - 1}):
-        panel.annotate(
-            f"{1e6 * line[k].h_s:.3g} µs",
-            (time[k], error[k]),
-            textcoords="offset points",
-            xytext=(4, 4),
-            color=MUTED,
-            fontsize=7,
-        )
+        text, at = f"{1e6 * line[k].h_s:.3g} µs", (time[k], error[k])
+        panel.annotate(text, at, textcoords="offset points", xytext=(4, 4), color=MUTED, fontsize=7)
 
 
 def _label(key: tuple[str, str, int]) -> str:

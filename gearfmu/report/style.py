@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib
 from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
@@ -57,10 +58,10 @@ def styled() -> AbstractContextManager[None]:
     return matplotlib.rc_context(look)
 
 
-def panels(heights: tuple[float, ...], share: bool = True) -> tuple[Figure, list[matplotlib.axes.Axes]]:
-    """A figure of stacked panels with the given heights in inches and, when `share`, one common horizontal axis."""
+def panels(heights: tuple[float, ...]) -> tuple[Figure, list[Axes]]:
+    """A figure of stacked panels with the given heights in inches and one common horizontal axis."""
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.55), layout="constrained")
-    axes = figure.subplots(len(heights), 1, sharex=share, squeeze=False, height_ratios=heights)[:, 0]
+    axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     return figure, list(axes)
 
 
@@ -71,23 +72,33 @@ def png(figure: Figure) -> str:
     Image.open(raw).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
         packed, "PNG", optimize=True
     )
-    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}">'
+    return embedded(packed)
 
 
-def written(figure: Figure, path: Path, dpi: float = 150) -> None:
+def embedded(image: io.BytesIO, look: str = "") -> str:
+    """A PNG as an <img> element; look: its further attributes."""
+    return f'<img alt=""{look} src="data:image/png;base64,{base64.b64encode(image.getvalue()).decode()}">'
+
+
+def written(figure: Figure, path: Path, dpi: float = 150, metadata: dict[str, Any] | None = None) -> None:
     """Write a figure as PNG or as the suffix says, whole or not at all."""
     with written_whole(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
+        figure.savefig(temporary, dpi=dpi, metadata=metadata)
 
 
 def saved(figure: Figure, path: Path) -> list[Path]:
     """Write a figure as SVG and PNG; without a date, so that the same rows give the same bytes."""
-    written = [path.with_suffix(suffix) for suffix in (".svg", ".png")]
-    for target in written:
-        with written_whole(target) as temporary:
-            metadata = {"Date": None} if target.suffix == ".svg" else {}
-            figure.savefig(temporary, format=target.suffix[1:], dpi=160, metadata=metadata)
-    return written
+    vectors, pixels = path.with_suffix(".svg"), path.with_suffix(".png")
+    written(figure, vectors, 160, {"Date": None})
+    written(figure, pixels, 160)
+    return [vectors, pixels]
+
+
+def plain_ticks(axes: Axes) -> None:
+    """Label the ticks of both axes as plain numbers."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
 
 
 def round_scale(scale: float) -> float:

@@ -104,7 +104,7 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     window, stage = window_of_interest(trace), spec
     loads, missing = static_loads(trace, window, ["mesh"], spec, bodies)
     assert missing == []
-    plot = transmission_error(trace, window, stage, ["mesh"], loads)
+    plot = transmission_error(trace, window, stage, "mesh", loads["mesh"])
     assert plot is not None and not isinstance(plot.picture, str)
     static, run = plot.picture.panels[0].curves
     assert (static.name, run.name) == ("quasi-static", "in the run")
@@ -119,7 +119,7 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
 def test_without_statics_and_mean_cycle_there_is_no_picture() -> None:
     spec, time = load_stage("fzg_c/stage_relief"), np.arange(100) * 1e-4
     trace = steady(np.ones(100), time, **{"mesh.te": np.zeros(100), "wheel.gear.phi": np.zeros(100)})
-    assert transmission_error(trace, window_of_interest(trace), spec, ["mesh"], {}) is None
+    assert transmission_error(trace, window_of_interest(trace), spec, "mesh", None) is None
 
 
 def test_a_short_run_is_called_short() -> None:

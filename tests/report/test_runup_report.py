@@ -135,8 +135,8 @@ def test_a_run_up_shows_the_orders_of_the_loudest_direction_of_every_sensor() ->
     own = run_up_of_meshes(housed, known_meshings(housed), Window(0.0, DURATION, "here"))
     assert own is not None and list(own.signals)[-1] == "sensor.lid.az" and "sensor.lid.ax" not in own.signals
     signal, found = own.signals["sensor.lid.az"], own.orders["sensor.lid.az"]
-    assert signal.label == "dB re 1 µm/s²"
-    levels = signal.level(found.amplitude[:, found.order == 48.0].ravel())
+    assert signal.kind.label == "dB re 1 µm/s²"
+    levels = signal.kind.level(found.amplitude[:, found.order == 48.0].ravel())
     assert levels[np.isfinite(levels)] == pytest.approx(120.0, abs=0.2)
 
 
