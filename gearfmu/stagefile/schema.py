@@ -29,6 +29,7 @@ def set_schema() -> dict[str, Any]:
 def general_schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of the stage.toml of a general stage: a table for every body by its name."""
     here = {"GearBody": {"name", "bearing"}, "RingBody": {"name", "mounts"}, "ShaftBody": {"name"}}
+    here["CarrierBody"] = {"bearing"}
     schema = _form_schema(Stage, "gearfmu general stage", here)
     schema["required"].append("kind")
     for name in ("Bearing", "MountsSpec"):
