@@ -106,8 +106,9 @@ def shares_gears(stage: Stage) -> bool:
 
 
 def everything(stage: Stage) -> Stage:
-    """All of it; of a set the gears too."""
-    for change in (supports, bodies, rotors, ports, engagements, *[gears] * bool(stage.carriers)):
+    """All of it; of a set the gears too, where its teeth are alike."""
+    alike = bool(stage.carriers) and even(stage) == stage
+    for change in (supports, bodies, rotors, ports, engagements, *[gears] * alike):
         stage = change(stage)
     return stage
 
