@@ -34,7 +34,7 @@ DG4, CENTRAL = 0.0, 3.0
 FREE, STIFF = PlanetSet(ports=(TORQUE, TORQUE)), PlanetSet(ports=(TORQUE, TORQUE), sun=1e10, pin=1e10, carrier=1e10)
 STANDING, TURNING = 0.0, 85.0  # rad/s of the carrier
 DAMPED = {"effect.contact_damping": 1.0, "effect.modal_damping": 1.0}
-FEW_SWEEPS = {r"SWEEPS = \d+": "SWEEPS = 1"}
+FEW_PASSES = {r"\bPASSES = \d+": "PASSES = 1"}
 
 
 @dataclass(frozen=True)
@@ -156,9 +156,9 @@ def test_invariant_holds_in_double(double_library: Path, name: str, carrier: flo
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("edits", "name"), [(FEW_SWEEPS, "T3 struck under 600 N·m"), (WITHOUT_ETA, "T1 one slice")])
+@pytest.mark.parametrize(("edits", "name"), [(FEW_PASSES, "T3 struck under 600 N·m"), (WITHOUT_ETA, "T1 one slice")])
 def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: str) -> None:
-    """T7: a single sweep over the eight engagements. T8: without the scalar."""
+    """T7: a single pass over the eight engagements. T8: without the scalar."""
     found = energies(started(CASES[name], STANDING, library=variant(tmp_path, "control", edits)), STEPS, H)
     print(found)
     assert found.drift > 1e-4
