@@ -15,10 +15,8 @@ from pathlib import Path
 from copies import KEPT, ROOT, Copy
 
 MAP = KEPT / "map"
-FOLDERS = (
-    "geometry relations kernel spec femesh fem cosim reduction body modes planning stage report rexs study".split()
-)
-FOLDERS += ["imports", ".", "sweeps", "bearing", "fmu"]
+FOLDERS = "geometry relations kernel stagefile femesh fem cosim reduction body modes planning stage report rexs".split()
+FOLDERS += "study imports . sweeps bearing fmu sound stability".split()
 STORED = "test_golden", "test_quoted", "test_evidence"  # answers of our own: no judges
 OF_TEXTS = "test_c_sources test_said_twice test_builds test_build_without_compiler test_fuzz test_docs test_packages"
 OF_TEXTS += " test_site test_notebooks test_examples test_chain test_mutants test_interrupted"
