@@ -13,8 +13,8 @@ import pytest
 
 import gearfmu
 
-PACKAGES = "bearing body cosim fem femesh geometry modes planning reduction report rexs scenefile sound stage stagefile".split()
-PACKAGES += ["study", "sweeps"]
+PACKAGES = "bearing body cosim fem femesh geometry modes planning reduction report rexs scenefile sound stage".split()
+PACKAGES += ["stagefile", "study", "sweeps"]
 OTHERS = (
     "scipy.linalg scipy.sparse.linalg scipy.optimize scipy.signal h5py hypothesis matplotlib.pyplot coverage".split()
 )
