@@ -67,19 +67,11 @@ def _extruded(section: Section, width: float, elements: int, twist: float) -> tu
 
 
 def _hexahedra(quads: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    layers = [
-        np.concatenate(
-            [
-                numbers[k][quads[:, :4]],
-                numbers[k + 2][quads[:, :4]],
-                numbers[k][quads[:, 4:]],
-                numbers[k + 2][quads[:, 4:]],
-                numbers[k + 1][quads[:, :4]],
-            ],
-            axis=1,
-        )  # fmt: skip
-        for k in range(0, len(numbers) - 2, 2)
-    ]
+    corners, middles = quads[:, :4], quads[:, 4:]
+    layers = []
+    for k in range(0, len(numbers) - 2, 2):
+        low, level, high = numbers[k : k + 3]
+        layers.append(np.hstack([low[corners], high[corners], low[middles], high[middles], level[corners]]))
     return np.concatenate(layers)
 
 

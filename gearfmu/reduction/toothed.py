@@ -13,7 +13,7 @@ from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.mesh import mount_spaces
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.forms.general import GearBody, RingBody
 from gearfmu.stagefile.forms.planetary import MountsSpec
@@ -37,9 +37,9 @@ def ring_full_order(
     couplings, patches = _teeth(sector, body), ring_mounts(sector, body, mounts)
     if mounted and mounts is not None:
         springs = mount_springs(body, patches, mounts.stiffness)
-        return full_order(ring.name, body, couplings, Judgement((), geometry.r), springs)
+        return full_order(ring.name, body, couplings, (), geometry.r, springs)
     ground = tuple(patch.name for patch in patches)
-    return full_order(ring.name, body, [*couplings, *patches], Judgement(ground, geometry.r))
+    return full_order(ring.name, body, [*couplings, *patches], ground, geometry.r)
 
 
 def gear_full_order(gear: GearBody, scale: float = GEAR_SCALE) -> FullOrder:
@@ -50,7 +50,7 @@ def gear_full_order(gear: GearBody, scale: float = GEAR_SCALE) -> FullOrder:
     body = _whole(sector, gear.material)
     kind = "rigid" if gear.rigid_bore else "averaging"
     bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
-    return full_order(gear.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
+    return full_order(gear.name, body, [*_teeth(sector, body), bore], ("bore",), geometry.r)
 
 
 def ring_mounts(sector: FeMesh, body: Elements, mounts: MountsSpec | None) -> list[Coupling]:

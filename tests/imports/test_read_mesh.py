@@ -13,7 +13,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.imported import ImportedMesh, read_mesh
-from gearfmu.reduction.couplings import Judgement, full_order
+from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import elements_of, set_coupling
@@ -31,7 +31,7 @@ def coupled(mesh: ImportedMesh, interfaces: list[tuple[str, str]]) -> FullOrder:
     """The free body of a mesh with node sets and their kinds as interfaces."""
     faces = solids.boundary(mesh.elements)
     couplings = [set_coupling(mesh, faces, name, kind) for name, kind in interfaces]
-    return full_order("b", elements_of(mesh, None, STEEL), couplings, Judgement((), 0.05))
+    return full_order("b", elements_of(mesh, None, STEEL), couplings, (), 0.05)
 
 
 def test_a_deck_gives_the_frequencies_of_our_own_elements(tmp_path: Path) -> None:

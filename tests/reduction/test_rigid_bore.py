@@ -15,7 +15,7 @@ import small_ring
 
 from gearfmu.fem import hex20
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -44,7 +44,7 @@ def case_of(averaged: SectorBody, bore: str) -> Case:
     full = mesh.full()
     elements = Elements(full.nodes, full.elements, *hex20.assemble(full.nodes, full.elements, small_gear.STEEL))
     coupling = Coupling("bore", "rigid", full.sets[bore], np.zeros(3))
-    order = full_order("gear", elements, [coupling], Judgement(("bore",), 0.02))
+    order = full_order("gear", elements, [coupling], ("bore",), 0.02)
     rows = averaged.load_matrix.toarray()
     loads = np.zeros((len(rows), len(full.nodes), 3))
     np.add.at(loads, (slice(None), mesh.sector_nodes(0)), rows.reshape(len(loads), -1, 3))

@@ -44,14 +44,10 @@ def test_static_residual_removes_the_static_error_of_modal_truncation():
     assert mended[2] / mended[1] == pytest.approx(4, rel=0.02) and mended[2] < 1e-4
 
 
-def test_transfer_is_symmetric_and_a_subset_of_inputs_is_judged_alone():
+def test_transfer_is_symmetric():
     body = small()
     h = transfer(oscillators(body, METHODS["rubin"](body, Size(40)), 0.01), LINES, body.ground)
     assert np.allclose(h, h.transpose(0, 2, 1), rtol=0, atol=1e-12 * np.abs(h).max())
-    other = h.copy()
-    other[:, -1] *= 2
-    assert relative_error(h, other).min() > 0
-    assert relative_error(h, other, np.arange(h.shape[1] - 1)).max() == 0
 
 
 def test_rotations_are_scaled_by_the_length():

@@ -74,7 +74,7 @@ class SectorBody:
     @property
     def patch_point(self) -> np.ndarray:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
-        return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
+        return self.mesh.nodes[self._held_nodes].mean(axis=0)
 
     def _all_loads(self) -> sp.csr_array:
         parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
@@ -87,7 +87,12 @@ class SectorBody:
 
     @property
     def _held_faces(self) -> surface.Faces:
-        return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
+        return surface.faces_within(self.mesh.elements, self._held_nodes)
+
+    @property
+    def _held_nodes(self) -> np.ndarray:
+        """Nodes of the sector on the bore, of a ring on its rim."""
+        return self.mesh.sets["rim" if self.internal else "bore"]
 
     @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:

@@ -8,9 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import solids
-from gearfmu.fem.coupling import averaging_rows, surface_moments
+from gearfmu.fem.coupling import averaging_rows
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import repeated_cells
 from gearfmu.femesh.mesh import FeMesh
@@ -35,10 +36,11 @@ class ImportedSector(SectorBody):
         elastic: Material | tuple[sp.csr_array, sp.csr_array],
         flank: tuple[ToothFlank, Points],
     ):
-        self.cut, self.bore, self.teeth = cut, bore, teeth
+        self.cut, self.teeth = cut, teeth
         self.flank, self.points = flank
         self.internal = self.flank.internal
-        self.mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), {}, teeth, cut.cut_minus, cut.cut_plus)
+        sets = {"rim" if self.internal else "bore": bore}
+        self.mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), sets, teeth, cut.cut_minus, cut.cut_plus)
         self.faces = solids.boundary(cut.elements)
         matrices = elastic if isinstance(elastic, tuple) else solids.assemble(cut.nodes, cut.elements, elastic)
         self.stiffness, self.mass_matrix = matrices
@@ -55,20 +57,13 @@ class ImportedSector(SectorBody):
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
         if not self.internal:
             return np.zeros((0, self.cut.nodes.size))
-        return averaging_rows(self.cut.nodes - self.patch_point, self.faces.within(self.bore))[:3]
+        return averaging_rows(self.cut.nodes - self.patch_point, self._held_faces)[:3]
+
+    @property
+    def _held_faces(self) -> Faces:
+        return self.faces.within(self._held_nodes)
 
     @property
     def knows_stress(self) -> bool:
         """No: material and elements may be another program's."""
         return False
-
-    @property
-    def patch_point(self) -> np.ndarray:
-        """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
-        return self.cut.nodes[self.bore].mean(axis=0)
-
-    @cached_property
-    def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
-        """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
-        moments, gram = surface_moments(self.cut.nodes, self.faces.within(self.bore))
-        return moments, self.turned_sum(gram)
