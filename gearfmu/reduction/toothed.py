@@ -10,7 +10,6 @@ import scipy.sparse as sp
 
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Springs, averaging, full_order
@@ -32,7 +31,7 @@ def ring_full_order(
     the mounts (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
     geometry, counts = ring_geometry(ring, ring, 1), ring.body.mesh
-    sector = ring_sector(geometry, ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
+    sector = gear_sector(geometry, ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, ring.material)
     couplings, patches = _teeth(sector, body), ring_mounts(sector, body, mounts)
     if mounted and mounts is not None:

@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import apart, body_needs, reduce_bodies, reduce_body
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.errors import MeshError
-from gearfmu.femesh import sector_mesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction import memory
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need, gear_need, whole_need
@@ -85,7 +85,7 @@ def test_a_finer_mesh_needs_more(spec: object) -> None:
     needs = []
     for scale in (1.0, 2.0, 4.0):
         mesh = gear.body.mesh.model_copy(update={"scale": scale})
-        needs.append(gear_need(sector_mesh(geometry, gear.face_width, mesh), gear.body).memory)
+        needs.append(gear_need(gear_sector(geometry, gear.face_width, mesh), gear.body).memory)
     assert needs[0] < needs[1] < needs[2]
 
 

@@ -10,7 +10,8 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from sections import section
 
-from gearfmu.femesh import gear_sector, scaled_jacobian, volume
+from gearfmu.femesh.quality import scaled_jacobian, volume
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.stagefile.checks.gears import Meshed, mesh_problems
 from gearfmu.stagefile.forms.expand import pair_gears

@@ -15,8 +15,10 @@ from sections import carrier_moments, section
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.femesh import FeMesh, mesh_report, ring_sector, scaled_jacobian, volume
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.quality import mesh_report, scaled_jacobian, volume
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
@@ -39,7 +41,7 @@ def cut_gap(mesh: FeMesh) -> float:
 
 @pytest.fixture(scope="module")
 def ring() -> FeMesh:
-    return ring_sector(RING, WIDTH, COUNTS)
+    return gear_sector(RING, WIDTH, COUNTS)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def carrier() -> FeMesh:
 
 def test_volume_of_the_ring_converges_to_the_analytic_one():
     errors = [
-        volume(ring_sector(RING, WIDTH, COUNTS.model_copy(update={"scale": s}))) / (section(RING)[0] * WIDTH) - 1
+        volume(gear_sector(RING, WIDTH, COUNTS.model_copy(update={"scale": s}))) / (section(RING)[0] * WIDTH) - 1
         for s in (1, 2)
     ]
     assert abs(errors[0]) < 2e-5 and abs(errors[1]) < abs(errors[0]) / 4
@@ -92,7 +94,7 @@ def test_inertia_of_ring_and_carrier_is_the_analytic_one(carrier):
     (middle, about), (area, polar) = carrier_moments(CARRIER), section(RING)
     shapes = ((carrier, CARRIER.volume, about, middle), (None, RING.z * area * WIDTH, RING.z * polar * WIDTH, 0.0))
     for mesh, size, inertia, centre in shapes:
-        sector = mesh or ring_sector(RING, WIDTH, COUNTS.model_copy(update={"width": 1}))
+        sector = mesh or gear_sector(RING, WIDTH, COUNTS.model_copy(update={"width": 1}))
         fields = rigid_modes(sector.nodes)
         mass = fields.T @ (hex20.assemble(sector.nodes, sector.elements, UNIT)[1] @ fields)
         assert sector.teeth * mass[0, 0] == pytest.approx(size, rel=1e-4)
@@ -168,7 +170,7 @@ def test_many_rings_mesh_well(z, x, tip, fillet, rim, scale):
     if ring.s_tip <= 0 or ring.fillet_centre[1] <= 0 or ring.tip_land_half_angle < 0:
         event("no such ring")
         return
-    mesh = ring_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
+    mesh = gear_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
     assert scaled_jacobian(mesh).min() > 0.35
     assert volume(mesh) == pytest.approx(section(ring)[0] * 5 * m, rel=5e-4)
     assert cut_gap(mesh) < 1e-12 * r + 1e-15

@@ -10,8 +10,10 @@ import pytest
 from sections import section
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, volume, write_vtu
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.quality import mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.section import graded, transfinite
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage

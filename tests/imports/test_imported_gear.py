@@ -14,7 +14,7 @@ from gears import hex20_deck, pinion, stage, tetrahedra
 from gearfmu.body import Body, reduce_bodies, reduce_body
 from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
-from gearfmu.femesh import write_vtu
+from gearfmu.femesh.quality import write_vtu
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
 from gearfmu.stagefile.stored import expected_hash
 

@@ -19,8 +19,8 @@ from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
-from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.modes.bodies import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre

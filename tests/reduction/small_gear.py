@@ -11,7 +11,7 @@ from blocks import free_body
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, flank_loads
 from gearfmu.reduction.cyclic.sector import SectorBody

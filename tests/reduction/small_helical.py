@@ -14,7 +14,7 @@ from small_gear import GEAR, STEEL, WIDTH
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody

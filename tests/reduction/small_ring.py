@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from blocks import free_body
 
 from gearfmu.fem import hex20
-from gearfmu.femesh import ring_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import flank_loads, tooth_flank
@@ -56,7 +56,7 @@ def geometry(beta: float) -> InternalGearGeometry:
 @lru_cache(maxsize=4)
 def coarse(beta: float = 0.0) -> SectorBody:
     own = geometry(beta)
-    return SectorBody(ring_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec()))
+    return SectorBody(gear_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec()))
 
 
 @lru_cache(maxsize=2)

@@ -12,7 +12,7 @@ from small_gear import COARSE, FINER, GEAR, WIDTH, coarse, flank, whole
 
 from gearfmu.errors import MeshError
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, flank_loads
 
 MESH = gear_sector(GEAR, WIDTH, FINER)

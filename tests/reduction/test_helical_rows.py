@@ -15,7 +15,8 @@ from small_helical import BETA, COARSE, body, coarse, flank, gear, turned, whole
 from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.femesh import gear_sector, scaled_jacobian
+from gearfmu.femesh.quality import scaled_jacobian
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import PairGeometry
 from gearfmu.reduction.cyclic.flank import Points, flank_loads
 from gearfmu.reduction.cyclic.modal import Modes, elastic_modes

@@ -14,7 +14,7 @@ from turned_rows import on_tooth
 
 from gearfmu.body import Body, load_bodies, reduce_body
 from gearfmu.errors import ModelError
-from gearfmu.femesh import sector_mesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.kernel import Kernel
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -122,7 +122,7 @@ def statics(set_spec: Stage) -> Statics:
     """Of the finite elements of the ring."""
     ring = set_spec.by_file["ring"]
     geometry = gear_shape(ring)
-    mesh = sector_mesh(geometry, ring.face_width, MESH)
+    mesh = gear_sector(geometry, ring.face_width, MESH)
     return static_tables(SectorBody(mesh, ring.material, *tooth_flank(geometry, ring)), [])
 
 

@@ -16,7 +16,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
 
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
