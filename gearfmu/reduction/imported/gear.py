@@ -109,8 +109,8 @@ def imported_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> Import
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
         else:
             bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
-            elastic = found.matrices or wanted.material
-            body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
+            matrices = found.matrices or solids.assemble(found.cut.nodes, found.cut.elements, wanted.material)
+            body = ImportedSector(found.cut, bore, wanted.teeth, matrices, wanted.flank, wanted.points)
     return ImportedGear(body, found.mesh.nodes, found.facts)
 
 
@@ -201,16 +201,13 @@ def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted:
     elements = elements_of(mesh, matrices, wanted.material)
     body = full_order(mesh.source.stem, elements, [bore], (BORE,), wanted.flank.r_b)
     angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
-    rows = (tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles)
+    rows = [tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles]
     if coupling == "rigid":
         kept = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.sets[BORE])
         pick = (3 * kept[:, None] + np.arange(3)).ravel()
-        rows = (_padded(row[:, pick], body.size) for row in rows)
+        masters = sp.csr_array((rows[0].shape[0], body.size - len(pick)))
+        rows = [sp.csr_array(sp.hstack([row[:, pick], masters])) for row in rows]
     return WholeGear(body, tuple(rows), wanted.points)
-
-
-def _padded(rows: sp.csr_array, size: int) -> sp.csr_array:
-    return sp.csr_array(sp.hstack([rows, sp.csr_array((rows.shape[0], size - rows.shape[1]))]))
 
 
 def hinge_problem(space: Elastic, first_squared: float) -> str | None:
