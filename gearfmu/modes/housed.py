@@ -86,13 +86,8 @@ class Housed:
     mount: np.ndarray
 
 
-def seat_forces(rings: Rings, housing: Housing, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
-    """(L, s): forces on seats that yield, from those on rigid ones, blocked (L, s), at ω (L,) > 0 rad/s."""
-    return _coupled(rings, housing.answers(omega), omega, blocked)[:, :, 0]
-
-
-def _coupled(rings: Rings, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
-    """(L, s, 1): forces on the seats."""
+def seat_forces(rings: Rings, answers: Answers, omega: np.ndarray, blocked: np.ndarray) -> np.ndarray:
+    """(L, s, 1): forces on seats that yield, from those on rigid ones, blocked (L, s), at ω (L,) > 0 rad/s."""
     yielding = np.eye(len(rings.names)) + rings.dynamic_stiffness(omega) @ answers.seats
     return np.linalg.solve(yielding, blocked[:, :, None])
 
@@ -124,7 +119,7 @@ def _solve(
 ) -> None:
     """Fill `found` at some lines."""
     answers = housing.answers(omega)
-    force = _coupled(rings, answers, omega, blocked)
+    force = seat_forces(rings, answers, omega, blocked)
     moved = (answers.coordinates @ force)[:, :, 0]
     found["force"][:], found["mount"][:] = force[:, :, 0], (answers.mounts @ force)[:, :, 0]
     found["coordinates"][:], found["velocity"][:] = moved, 1j * omega[:, None] * moved

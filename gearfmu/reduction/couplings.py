@@ -165,11 +165,11 @@ def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigi
 
 def _cells(body: Elements, rigid: Sequence[Coupling], springs: Springs | None) -> np.ndarray:
     """Node numbers of each element with masters for their slaves, each once, and a cell for each group of springs."""
-    cells = np.sort(_masters(len(body.nodes), rigid)[body.elements], axis=1)
+    stands = _masters(len(body.nodes), rigid)
+    cells = np.sort(stands[body.elements], axis=1)
     cells[:, 1:][cells[:, 1:] == cells[:, :-1]] = -1
     if springs is None:
         return cells
-    stands = _masters(len(body.nodes), rigid)
     touched = {tuple(np.unique(stands[springs.rows[[k]].indices // 3])) for k in range(len(springs.stiffness))}
     groups = [np.array(nodes) for nodes in sorted(touched)]
     width = max(cells.shape[1], *(len(group) for group in groups))

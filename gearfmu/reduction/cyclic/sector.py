@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
-from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
+from gearfmu.fem.coupling import averaging_rows, moved, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
@@ -76,7 +76,7 @@ class SectorBody:
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
         if not self.internal:
             return np.zeros((0, self.mesh.nodes.size))
-        return averaging_rows_at(self.mesh.nodes, self._held_faces, self.patch_point)[:3]
+        return moved(averaging_rows(self.mesh.nodes, self._held_faces), self.patch_point)[:3]
 
     @property
     def patch_point(self) -> np.ndarray:
