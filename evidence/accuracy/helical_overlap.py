@@ -25,7 +25,7 @@ from matplotlib import rc_context
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.body.toothed import flank_of, symmetric_mass
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.cyclic.flank import tooth_flank

@@ -30,7 +30,7 @@ import scipy.linalg as sl
 
 from gearfmu.body.body import Node
 from gearfmu.fem import hex20
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.modes.cyclic import unfolded
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.modal import elastic_modes

@@ -9,7 +9,7 @@ import numpy as np
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
-from gearfmu.femesh import FeMesh
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder

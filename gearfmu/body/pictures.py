@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from gearfmu.body.body import Picture, Shapes, turn_sectors, whole_surface
 from gearfmu.fem import surface
-from gearfmu.femesh import FeMesh, sector_mesh
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.modal import Modes
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -42,7 +43,7 @@ class Outline:
 
 def drawn_outline(geometry: GearShape, face_width: float, nodes: np.ndarray) -> Outline:
     """`outline` of the coarse sector from which a gear is drawn."""
-    return outline(sector_mesh(geometry, face_width, drawn_counts(geometry, face_width)), nodes)
+    return outline(gear_sector(geometry, face_width, drawn_counts(geometry, face_width)), nodes)
 
 
 def drawn_counts(geometry: GearShape, face_width: float) -> MeshSpec:

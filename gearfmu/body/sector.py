@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
-from gearfmu.femesh import FeMesh, sector_mesh
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.carrier import scaled_sector
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
@@ -30,4 +31,4 @@ def body_sector(stage: Stage, name: str, scale: float = 1.0) -> FeMesh:
     if table.imported is not None:
         return imported_sector_mesh(table)
     own = table.body.mesh
-    return sector_mesh(gear_shape(table), table.face_width, own.model_copy(update={"scale": own.scale * scale}))
+    return gear_sector(gear_shape(table), table.face_width, own.model_copy(update={"scale": own.scale * scale}))

@@ -16,7 +16,8 @@ from gearfmu.body.pictures import drawn_outline, pictured_loads, sector_picture,
 from gearfmu.errors import MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
-from gearfmu.femesh import mesh_report, sector_mesh
+from gearfmu.femesh.quality import mesh_report
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, tooth_flank
 from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, frf_error
 from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
@@ -55,7 +56,7 @@ def gear_work(gear: ToothedBody) -> Work | None:
     if gear.imported is not None:
         return None
     geometry = gear_shape(gear)
-    return Work(gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
+    return Work(gear_need(gear_sector(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
 
 
 def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
@@ -91,7 +92,7 @@ def named(progress: Progress | None, name: str) -> Progress:
 def _meshed_here(gear: ToothedBody, report: Progress) -> Parts:
     """A gear meshed here, by its sector."""
     geometry = gear_shape(gear)
-    sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
+    sector = gear_sector(geometry, gear.face_width, gear.body.mesh)
     need = gear_need(sector, gear.body)
     require_memory(need, lower_counts(gear.body.mesh, "body.mesh"))
     report(f"finite elements, {need.text}", 0.0)

@@ -15,8 +15,8 @@ from gearfmu.body.apart import Progress
 from gearfmu.body.body import Body, How, Node, Sensors, Skin
 from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.toothed import named
-from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.quality import mesh_report
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order, carrier_need
 from gearfmu.reduction.cyclic.frf import FrfError

@@ -27,8 +27,8 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
     from gearfmu.body.sector import body_sector
     from gearfmu.commands.files import in_units
-    from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
+    from gearfmu.femesh.quality import mesh_report, write_vtu
     from gearfmu.stagefile.forms.general import GearBody, RingBody
     from gearfmu.stagefile.forms.shapes import gear_shape
     from gearfmu.stagefile.stage import load_stage

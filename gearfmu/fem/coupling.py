@@ -61,11 +61,6 @@ def averaging_rows(nodes: np.ndarray, faces: Faces) -> np.ndarray:
     return np.linalg.solve(gram, moments)
 
 
-def averaging_rows_at(nodes: np.ndarray, faces: Faces, point: np.ndarray) -> np.ndarray:
-    """`averaging_rows` with the mean displacement taken at `point` (3,), m, instead of the origin: (6, 3N)."""
-    return moved(averaging_rows(nodes, faces), point)
-
-
 def moved(rows: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Rows (6, n) of a rigid motion about the origin as rows of the motion of `point` (3,), m."""
     return np.vstack([rigid_fields(np.asarray(point, float)) @ rows, rows[3:]])

@@ -65,7 +65,7 @@ class SectorSpace:
 
     def __init__(self, sector: Sector, mirror: np.ndarray, parity: int):
         self.parity, self.teeth = parity, sector.teeth
-        basis, owner = _parity_basis(mirror, parity) if parity else _all_fields(sector)
+        basis, owner = _parity_basis(mirror, parity)
         minus, plus, interior = _split(owner, sector)
         patch = _patch_motions(sector)
         self.interior, self.cut = len(interior) + patch.shape[1], len(minus)
@@ -120,7 +120,10 @@ def mirror_nodes(nodes: np.ndarray) -> np.ndarray | None:
 
 
 def _parity_basis(mirror: np.ndarray, parity: int) -> tuple[sp.csc_array, np.ndarray]:
-    """Orthonormal fields of one parity, one per degree of freedom of the nodes at z ≥ 0, and their owner dofs."""
+    """Orthonormal fields of one parity, one per degree of freedom of the nodes at z ≥ 0, and their owner dofs; of
+    parity 0 all fields."""
+    if not parity:
+        return sp.csc_array(sp.identity(3 * len(mirror))), np.arange(3 * len(mirror))
     node = np.arange(len(mirror))
     own = mirror == node
     first = np.minimum(node, mirror) == node
@@ -135,11 +138,6 @@ def _parity_basis(mirror: np.ndarray, parity: int) -> tuple[sp.csc_array, np.nda
     values = np.concatenate([weight, (weight * sign[component])[~alone]])
     basis = sp.coo_array((values, (rows, np.concatenate([columns, columns[~alone]]))), (3 * len(mirror), len(owner)))
     return sp.csc_array(basis), owner
-
-
-def _all_fields(sector: Sector) -> tuple[sp.csc_array, np.ndarray]:
-    size = sector.nodes.size
-    return sp.csc_array(sp.identity(size)), np.arange(size)
 
 
 def _cells(elements: np.ndarray, mirror: np.ndarray, kept: np.ndarray) -> np.ndarray:

@@ -15,8 +15,7 @@ from gearfmu.files import written_whole
 
 def scaled_jacobian(mesh: FeMesh) -> np.ndarray:
     """Smallest det J / (|J₁||J₂||J₃|) of each element (E,) over corners and 3³ Gauss points: 1 brick, ≤ 0 folded."""
-    points = np.concatenate([hex20.CORNERS, hex20.gauss_hex()[0]])
-    jacobian = np.einsum("pan,enc->epac", hex20.shape_gradient(points), mesh.nodes[mesh.elements], optimize=True)
+    jacobian = _jacobian(mesh, np.concatenate([hex20.CORNERS, hex20.gauss_hex()[0]]))
     lengths = np.linalg.norm(jacobian, axis=3).prod(axis=2)
     return (np.linalg.det(jacobian) / lengths).min(axis=1)
 
@@ -24,8 +23,12 @@ def scaled_jacobian(mesh: FeMesh) -> np.ndarray:
 def volume(mesh: FeMesh) -> float:
     """Volume (m³) of the mesh, 3³ Gauss points an element."""
     points, weights = hex20.gauss_hex()
-    jacobian = np.einsum("pan,enc->epac", hex20.shape_gradient(points), mesh.nodes[mesh.elements], optimize=True)
-    return float((np.linalg.det(jacobian) @ weights).sum())
+    return float((np.linalg.det(_jacobian(mesh, points)) @ weights).sum())
+
+
+def _jacobian(mesh: FeMesh, points: np.ndarray) -> np.ndarray:
+    """(E, P, 3, 3) of every element at natural coordinates (P, 3)."""
+    return np.einsum("pan,enc->epac", hex20.shape_gradient(points), mesh.nodes[mesh.elements], optimize=True)
 
 
 def flank_element_length(grid: FlankGrid, r_b: float) -> float:

@@ -13,41 +13,15 @@ import numpy as np
 
 from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import graded, parameter, transfinite
-from gearfmu.femesh.mesh import FeMesh
-from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, flank_rolls, rim_parameters, section_of
-from gearfmu.femesh.sector import gear_sector, sector_of
-from gearfmu.geometry import GearGeometry
+from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Blocks, rim_parameters
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.plane import direction
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
 
-def ring_sector(geometry: InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an internal gear, `face_width` b (m) about z = 0; sets: "rim", its share of the outer surface.
-
-    Flank nodes, mid nodes included, lie on the involute of their section; the tip edge is meshed sharp. flank[0] is
-    that of space 0 at its larger angle. MeshError when the geometry leaves no valid element.
-    """
-    section, elements = build_ring_section(geometry, mesh), mesh.scaled(mesh.width)
-    return sector_of(section, geometry.z, face_width, elements, "rim", geometry.twist)
-
-
-def sector_mesh(geometry: GearGeometry | InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """The sector of an external or internal gear."""
-    if isinstance(geometry, InternalGearGeometry):
-        return ring_sector(geometry, face_width, mesh)
-    return gear_sector(geometry, face_width, mesh)
-
-
-def build_ring_section(ring: InternalGearGeometry, mesh: MeshSpec) -> Section:
-    """The section of `ring` with the counts of `mesh`; MeshError when the rim leaves no room for the root block."""
-    elements = mesh.scaled(mesh.flank, 2)
-    roll = flank_rolls(ring, elements)
-    tooth, root, rim = _blocks(ring, mesh, roll)
-    return section_of((tooth, root, rim), np.concatenate([tooth[-1, ::-1], rim[1:, 0]]), roll[: 2 * elements + 1])
-
-
-def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ring_blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[Blocks, np.ndarray]:
+    """Tooth, root and rim, and the edge (P, 2) to the next sector; roll (R,): of the nodes on the flank, m. MeshError
+    when the rim leaves no room for the root block."""
     across = graded(mesh.scaled(mesh.thickness), mesh.growth(mesh.thickness_grading))[:, None]
     share = graded(mesh.scaled(mesh.root, 2), 1.0)
     flank, surface = ring.flank_point(roll), _root_curve(ring, share)
@@ -69,7 +43,8 @@ def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tup
     tooth, root = transfinite(neck, tip, flank, middle), transfinite(neck, below, surface, core)
     first, last = (core[k] + up * (outer[k] - core[k]) for k in (0, -1))
     first[-1], last[-1] = outer[0], outer[-1]
-    return tooth, root, transfinite(first, last, core, outer)
+    rim = transfinite(first, last, core, outer)
+    return (tooth, root, rim), np.concatenate([tooth[-1, ::-1], rim[1:, 0]])
 
 
 def _root_curve(ring: InternalGearGeometry, share: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from gearfmu.stagefile.tables.bodies import MeshSpec
 ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
 RIM_SHARE = 0.45  # … and in parts of the rim
 CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three blocks of 60° meet there
+
+
+Blocks: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # lattices (P, Q, 2), m, of tooth, root and rim
 
 
 @dataclass(frozen=True)
@@ -47,15 +51,7 @@ class Section:
     flank_roll: np.ndarray
 
 
-def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
-    """The section of `gear` with the counts of `mesh`. MeshError when the rim leaves no room for the root block."""
-    elements = mesh.scaled(mesh.flank, 2)
-    roll = flank_rolls(gear, elements)
-    tooth, root, rim = _blocks(gear, mesh, roll)
-    return section_of((tooth, root, rim), np.concatenate([root[:, -1], rim[1:, -1]]), roll[: 2 * elements + 1])
-
-
-def section_of(blocks: tuple[np.ndarray, np.ndarray, np.ndarray], cut: np.ndarray, roll: np.ndarray) -> Section:
+def section_of(blocks: Blocks, cut: np.ndarray, roll: np.ndarray) -> Section:
     """The section whose upper half consists of the blocks tooth, root and rim; cut (P, 2): its edge to the next sector;
     roll (R,): of the nodes on the flank, the tooth's first edge."""
     tooth, _, rim = blocks
@@ -83,7 +79,9 @@ def flank_rolls(gear: GearGeometry | InternalGearGeometry, elements: int) -> np.
     return roll
 
 
-def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def gear_blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[Blocks, np.ndarray]:
+    """Tooth, root and rim, and the edge (P, 2) to the next sector; roll (R,): of the nodes on the flank, m. MeshError
+    when the rim leaves no room for the root block."""
     across = graded(mesh.scaled(mesh.thickness), mesh.growth(mesh.thickness_grading))[:, None]
     share = graded(mesh.scaled(mesh.root, 2), 1.0)
     flank, surface = gear.flank_point(roll), root_curve(gear, share)
@@ -103,7 +101,8 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
     tooth = transfinite(neck, tip, flank, middle)
     root = transfinite(neck, surface[-1] - across * depth * space, surface, core)
     under, below = core[0] + down * (bore[0] - core[0]), core[-1] + down * (bore[-1] - core[-1])
-    return tooth, root, transfinite(under, below, core, bore)
+    rim = transfinite(under, below, core, bore)
+    return (tooth, root, rim), np.concatenate([root[:, -1], rim[1:, -1]])
 
 
 def rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:

@@ -11,39 +11,39 @@ import numpy as np
 from gearfmu.errors import MeshError
 from gearfmu.femesh.mesh import FeMesh, FlankGrid
 from gearfmu.femesh.quality import scaled_jacobian
-from gearfmu.femesh.section import Section, build_section
+from gearfmu.femesh.ring import ring_blocks
+from gearfmu.femesh.section import Section, flank_rolls, gear_blocks, section_of
 from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
 
-def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an external gear: tooth 0 on +x, half a space on either side, `face_width` b (m) about z = 0.
+def gear_sector(geometry: GearGeometry | InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
+    """One sector of a gear: tooth 0 on +x, half a space on either side, `face_width` b (m) about z = 0; of an internal
+    gear space 0 with half a tooth on either side. sets: "bore", or "rim" of an internal gear.
 
-    Flank nodes, mid nodes included, lie on the involute of their section; the tip edge is meshed sharp. The mesh of a
-    spur gear is its own mirror image about z = 0 and about y = 0, that of a helical gear stays as it is when turned by
-    half a turn about x. MeshError when the geometry leaves no valid element.
+    Flank nodes, mid nodes included, lie on the involute of their section; the tip edge is meshed sharp. flank[0] of an
+    internal gear is that of space 0 at its larger angle. The mesh of a spur gear is its own mirror image about z = 0
+    and about y = 0, that of a helical gear stays as it is when turned by half a turn about x. MeshError when the
+    geometry leaves no valid element.
     """
-    section, elements = build_section(geometry, mesh), mesh.scaled(mesh.width)
-    return sector_of(section, geometry.z, face_width, elements, "bore", geometry.twist)
-
-
-def sector_of(section: Section, teeth: int, face_width: float, elements: int, held: str, twist: float = 0.0) -> FeMesh:
-    """A section extruded over the face width b (m) with `elements` across it and turned by `twist` (rad/m); `held`
-    names
-    the set of its held edge.
-
-    MeshError when an element is folded.
-    """
-    numbers, nodes = _extruded(section, face_width, elements, twist)
+    along = mesh.scaled(mesh.flank, 2)
+    roll = flank_rolls(geometry, along)
+    if isinstance(geometry, InternalGearGeometry):
+        held, (blocks, cut) = "rim", ring_blocks(geometry, mesh, roll)
+    else:
+        held, (blocks, cut) = "bore", gear_blocks(geometry, mesh, roll)
+    section = section_of(blocks, cut, roll[: 2 * along + 1])
+    numbers, nodes = _extruded(section, face_width, mesh.scaled(mesh.width), geometry.twist)
     result = FeMesh(
         nodes=nodes,
         elements=_hexahedra(section.quads, numbers),
         sets={held: _column(section.bore, numbers)},
-        teeth=teeth,
+        teeth=geometry.z,
         cut_minus=_column(section.cut_minus, numbers),
         cut_plus=_column(section.cut_plus, numbers),
         flank={side: _flank_grid(section, side, numbers, nodes) for side in (0, 1)},
-        twist=twist,
+        twist=geometry.twist,
     )
     if not (worst := float(scaled_jacobian(result).min())) > 0:
         raise MeshError(
@@ -67,19 +67,11 @@ def _extruded(section: Section, width: float, elements: int, twist: float) -> tu
 
 
 def _hexahedra(quads: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    layers = [
-        np.concatenate(
-            [
-                numbers[k][quads[:, :4]],
-                numbers[k + 2][quads[:, :4]],
-                numbers[k][quads[:, 4:]],
-                numbers[k + 2][quads[:, 4:]],
-                numbers[k + 1][quads[:, :4]],
-            ],
-            axis=1,
-        )  # fmt: skip
-        for k in range(0, len(numbers) - 2, 2)
-    ]
+    corners, middles = quads[:, :4], quads[:, 4:]
+    layers = []
+    for k in range(0, len(numbers) - 2, 2):
+        low, level, high = numbers[k : k + 3]
+        layers.append(np.hstack([low[corners], high[corners], low[middles], high[middles], level[corners]]))
     return np.concatenate(layers)
 
 

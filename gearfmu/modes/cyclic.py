@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.femesh import FeMesh
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.modes.shapes import BodyModes, Mode, cylindrical, energy_shares, main_harmonic
 
 Progress = Callable[[str, float], None]

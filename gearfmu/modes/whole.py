@@ -7,7 +7,7 @@ import numpy as np
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.cyclic import mirror_nodes
-from gearfmu.femesh import FeMesh
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.modes.shapes import BodyModes, Mode, energy_shares, harmonic_shares
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder

@@ -10,7 +10,7 @@ from gearfmu.fem import hex20
 from gearfmu.fem.repeated import Parts
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
@@ -31,7 +31,7 @@ def carrier_full_order(carrier: CarrierBody, scale: float = 1.0) -> FullOrder:
     if carrier.imported is not None:
         return imported_carrier(carrier)[0]
     sector = scaled_sector(carrier, scale)
-    full = full_order("carrier", *carrier_elements(carrier, sector), Judgement(("bore",), carrier.circle))
+    full = full_order("carrier", *carrier_elements(carrier, sector), ("bore",), carrier.circle)
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(carrier) else full
 
 

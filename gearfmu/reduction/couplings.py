@@ -51,24 +51,18 @@ class Springs:
     stiffness: np.ndarray
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """How the reduction of a body is judged: interfaces held then, and the length (m) that scales rotations."""
-
-    ground: tuple[str, ...]
-    length: float
-
-
 def full_order(
     name: str,
     body: Elements,
     couplings: Sequence[Coupling],
-    judgement: Judgement,
+    ground: tuple[str, ...],
+    length: float,
     springs: Springs | None = None,
 ) -> FullOrder:
     """The body with its couplings as interfaces, in their order; held by `springs` when given, else free.
 
-    Raises MeshError for an empty coupling and for a node that two rigid couplings claim.
+    ground : interfaces held when the reduction is judged. length : m, that scales rotations. Raises MeshError for an
+    empty coupling and for a node that two rigid couplings claim.
     """
     _check(couplings)
     rigid = [c for c in couplings if c.kind == "rigid"]
@@ -83,8 +77,8 @@ def full_order(
         mass=symmetric(transform.T @ body.mass @ transform),
         rigid=_rigid_columns(body.nodes, rigid) if springs is None else np.zeros((transform.shape[1], 0)),
         interfaces=interfaces,
-        ground=judgement.ground,
-        length=judgement.length,
+        ground=ground,
+        length=length,
         cells=_cells(body, rigid, springs),
         node_of_dof=node_of_dof,
     )
@@ -171,11 +165,11 @@ def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigi
 
 def _cells(body: Elements, rigid: Sequence[Coupling], springs: Springs | None) -> np.ndarray:
     """Node numbers of each element with masters for their slaves, each once, and a cell for each group of springs."""
-    cells = np.sort(_masters(len(body.nodes), rigid)[body.elements], axis=1)
+    stands = _masters(len(body.nodes), rigid)
+    cells = np.sort(stands[body.elements], axis=1)
     cells[:, 1:][cells[:, 1:] == cells[:, :-1]] = -1
     if springs is None:
         return cells
-    stands = _masters(len(body.nodes), rigid)
     touched = {tuple(np.unique(stands[springs.rows[[k]].indices // 3])) for k in range(len(springs.stiffness))}
     groups = [np.array(nodes) for nodes in sorted(touched)]
     width = max(cells.shape[1], *(len(group) for group in groups))

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.fem.repeated import Parts, RepeatedFactor
+from gearfmu.fem.repeated import RepeatedFactor
 from gearfmu.fem.solver import Solves, definite_factor, symmetric_factor
 from gearfmu.reduction.full_order import FullOrder
 
@@ -115,11 +115,12 @@ class Elastic:
         count = kernel.shape[1]
         held = shared[sl.qr(kernel[shared].T, mode="r", pivoting=True)[1][:count]] if count else np.empty(0, int)
         if self.parts is not None:
-            return self.by_parts(self.parts, 0.0, held)
+            return self.by_parts(0.0, held)
         return _Supported(self, np.setdiff1d(shared, held))
 
-    def by_parts(self, parts: Parts, shift: float, held: np.ndarray | None = None) -> RepeatedFactor:
+    def by_parts(self, shift: float, held: np.ndarray | None = None) -> RepeatedFactor:
         """K − σM factorised part by part; it is never made as a whole."""
+        assert self.parts is not None
 
         def block(index: np.ndarray) -> sp.csr_array:
             return sp.csr_array(self.stiffness[index][:, index] - shift * self.mass_matrix[index][:, index])
@@ -128,7 +129,7 @@ class Elastic:
             image: np.ndarray = self.stiffness @ vectors
             return image - shift * self.mass(vectors) if shift else image
 
-        return RepeatedFactor(block, product, parts, (self.cells, self.node_of_dof), held)
+        return RepeatedFactor(block, product, self.parts, (self.cells, self.node_of_dof), held)
 
     @cached_property
     def _holding(self) -> tuple[np.ndarray, _SmallSystem]:
@@ -211,7 +212,7 @@ class Shifted:
     def _factorised(self) -> Solves:
         space = self.space
         if space.parts is not None:
-            return space.by_parts(space.parts, self.shift)
+            return space.by_parts(self.shift)
         matrix = sp.csr_array(space.stiffness - self.shift * space.mass_matrix)
         return symmetric_factor(matrix, space.cells, space.node_of_dof)
 

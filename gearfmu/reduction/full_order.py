@@ -69,10 +69,9 @@ class FullOrder:
         chosen = [i for i in self.interfaces if not names or i.name in names]
         return sp.csr_array(sp.vstack([i.rows for i in chosen]))
 
-    def scales(self, *names: str) -> np.ndarray:
-        """Factors that make rotations of the named interfaces lengths: `length` for rx, ry, rz, else 1; (m,)."""
-        chosen = [i for i in self.interfaces if not names or i.name in names]
-        turning = [component in COMPONENTS[3:] for i in chosen for component in i.components]
+    def scales(self) -> np.ndarray:
+        """Factors that make rotations of the interfaces lengths: `length` for rx, ry, rz, else 1; (m,)."""
+        turning = [component in COMPONENTS[3:] for i in self.interfaces for component in i.components]
         return np.where(turning, self.length, 1.0)
 
     def held(self, rows: sp.csr_array) -> FullOrder:

@@ -43,25 +43,16 @@ class Need:
         return f"{self.size}, about {self.memory / 1e9:.1f} GB"
 
 
-@dataclass(frozen=True)
-class ReductionSize:
-    """Sizes beside the mesh that the memory of a reduction grows with: teeth, modes stored, loads on one tooth."""
-
-    teeth: int
-    modes: int
-    loads: int
-
-
 def gear_need(sector: FeMesh, body: BodySpec) -> Need:
     """Need of a gear: its sector (FeMesh) and counts of the reduction (BodySpec)."""
-    return sector_need(sector, ReductionSize(sector.teeth, body.modes, 2 * body.roll_points * body.width_functions))
+    return sector_need(sector, sector.teeth, body.modes, 2 * body.roll_points * body.width_functions)
 
 
-def sector_need(sector: FeMesh | CyclicCut, size: ReductionSize) -> Need:
-    """Need of a gear that is reduced by cyclic symmetry; sector: its nodes, cut_minus and cut_plus."""
+def sector_need(sector: FeMesh | CyclicCut, teeth: int, modes: int, tooth_loads: int) -> Need:
+    """Need of a gear that is reduced by cyclic symmetry; sector: its nodes, cut_minus and cut_plus; modes: stored."""
     cut, unknowns = 3 * len(sector.cut_minus), 3 * (len(sector.nodes) - len(sector.cut_plus))
-    loads, family = 2 * size.loads, size.modes / size.teeth + 4
-    matrices = 3 * (2 * cut) ** 2 + loads**2 * (size.teeth / 2 + 4)
+    loads, family = 2 * tooth_loads, modes / teeth + 4
+    matrices = 3 * (2 * cut) ** 2 + loads**2 * (teeth / 2 + 4)
     fields = unknowns * (3 * loads + 2 * _SPACE * family)
     return Need(unknowns, _BASE + 8 * (_FACTOR * unknowns ** (4 / 3) + matrices + fields) + _SPARSE * unknowns)
 

@@ -33,23 +33,20 @@ class Expansion:
     """One expansion point of a body: `advance` adds the next block of moments to a basis.
 
     known : vectors whose Rayleigh quotients tell of eigenvalues at which the point must not lie.
-    shift : σ as used, rad²/s² (moved when it was an eigenvalue). powers : blocks added so far.
+    shift : σ as used, rad²/s² (moved when it was an eigenvalue).
     """
 
     def __init__(self, body: FullOrder, shift: float, known: Growing | None = None):
-        self.body, self.powers = body, 0
+        self.body = body
         estimates = None if known is None else _ritz_values(body, known)
         self._solver = elastic(body).shifted(shift, estimates) if shift else None
         self.shift = self._solver.shift if self._solver else 0.0
         self._loads: np.ndarray | None = None
 
-    def advance(self, basis: Growing) -> int:
-        """Add the next power of this point to `basis`. Returns how many vectors."""
-        if self._loads is not None and not self._loads.shape[1]:
-            return 0
-        self._loads = basis.add(self._next())
-        self.powers += 1
-        return self._loads.shape[1]
+    def advance(self, basis: Growing) -> None:
+        """Add the next power of this point to `basis`, unless the last one brought nothing new."""
+        if self._loads is None or self._loads.shape[1]:
+            self._loads = basis.add(self._next())
 
     def _next(self) -> np.ndarray:
         if self._solver:

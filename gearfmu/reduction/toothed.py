@@ -10,10 +10,9 @@ import scipy.sparse as sp
 
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.mesh import mount_spaces
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.forms.general import GearBody, RingBody
 from gearfmu.stagefile.forms.planetary import MountsSpec
@@ -32,14 +31,14 @@ def ring_full_order(
     the mounts (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
     geometry, counts = ring_geometry(ring, ring, 1), ring.body.mesh
-    sector = ring_sector(geometry, ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
+    sector = gear_sector(geometry, ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, ring.material)
     couplings, patches = _teeth(sector, body), ring_mounts(sector, body, mounts)
     if mounted and mounts is not None:
         springs = mount_springs(body, patches, mounts.stiffness)
-        return full_order(ring.name, body, couplings, Judgement((), geometry.r), springs)
+        return full_order(ring.name, body, couplings, (), geometry.r, springs)
     ground = tuple(patch.name for patch in patches)
-    return full_order(ring.name, body, [*couplings, *patches], Judgement(ground, geometry.r))
+    return full_order(ring.name, body, [*couplings, *patches], ground, geometry.r)
 
 
 def gear_full_order(gear: GearBody, scale: float = GEAR_SCALE) -> FullOrder:
@@ -50,7 +49,7 @@ def gear_full_order(gear: GearBody, scale: float = GEAR_SCALE) -> FullOrder:
     body = _whole(sector, gear.material)
     kind = "rigid" if gear.rigid_bore else "averaging"
     bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
-    return full_order(gear.name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
+    return full_order(gear.name, body, [*_teeth(sector, body), bore], ("bore",), geometry.r)
 
 
 def ring_mounts(sector: FeMesh, body: Elements, mounts: MountsSpec | None) -> list[Coupling]:

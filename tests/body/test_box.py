@@ -25,7 +25,7 @@ from gearfmu.fem import hex20, solids
 from gearfmu.fem.surface import faces_within
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.reduction.basis import Size
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
 from gearfmu.reduction.imported.skin import enveloping_surface
 from gearfmu.reduction.transfer import Judging
@@ -63,7 +63,7 @@ def full() -> tuple[FullOrder, tuple[Interface, ...]]:
             own = averaging(name if (axis, side) != (2, -1) else "foot", nodes, chosen)
             couplings.append(Coupling(own.name, own.kind, chosen, own.point, own.rows))
     found = [Coupling(name, "nodes", _nearest(nodes, place), np.array(place)) for name, place in SENSORS.items()]
-    order = full_order("box", body, [*couplings, *found], Judgement(("foot",), 0.1))
+    order = full_order("box", body, [*couplings, *found], ("foot",), 0.1)
     return _parted(order)
 
 

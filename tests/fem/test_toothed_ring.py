@@ -13,7 +13,7 @@ from sections import section
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.femesh import ring_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.tables.bodies import MeshSpec
 
@@ -38,7 +38,7 @@ def difference(z: int, module: float, nodal_diameter: int) -> np.ndarray:
     """Relative differences (2,) to the smooth ring of the same volume and outer radius."""
     shape = toothed(z, module)
     inner = math.sqrt(RIM**2 - z * section(shape)[0] / math.pi)
-    mesh = ring_sector(shape, WIDTH, MeshSpec(flank=3, thickness=1, root=2, rim=3, width=2))
+    mesh = gear_sector(shape, WIDTH, MeshSpec(flank=3, thickness=1, root=2, rim=3, width=2))
     smooth = smooth_sector((4, 2, 2), inner, RIM, WIDTH, 30)
     return bending(mesh, nodal_diameter) / bending(smooth, nodal_diameter) - 1
 

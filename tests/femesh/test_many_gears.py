@@ -11,8 +11,9 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from sections import section
 
-from gearfmu.femesh import FeMesh, gear_sector, ring_sector, scaled_jacobian, volume
-from gearfmu.femesh.mesh import rotated
+from gearfmu.femesh.mesh import FeMesh, rotated
+from gearfmu.femesh.quality import scaled_jacobian, volume
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.stagefile.checks.gears import Meshed, mesh_problems
@@ -176,7 +177,7 @@ def test_many_rings_mesh_well(z, x, tip, fillet, rim, scale):
     if ring.s_tip <= 0 or ring.fillet_centre[1] <= 0 or ring.tip_land_half_angle < 0:
         event("no such ring")
         return
-    mesh = ring_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
+    mesh = gear_sector(ring, 5 * m, MeshSpec(width=1, scale=scale))
     assert scaled_jacobian(mesh).min() > 0.35
     assert volume(mesh) == pytest.approx(section(ring)[0] * 5 * m, rel=5e-4)
     assert cut_gap(mesh) < 1e-12 * r + 1e-15

@@ -14,8 +14,10 @@ from test_many_gears import cut_gap
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_modes
-from gearfmu.femesh import FeMesh, ring_sector, scaled_jacobian, volume
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.quality import scaled_jacobian, volume
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.stagefile.forms.planetary import CarrierMeshSpec
 from gearfmu.stagefile.forms.shapes import carrier_geometry, ring_geometry
@@ -39,7 +41,7 @@ def test_inertia_of_ring_and_carrier_is_the_analytic_one(carrier):
     (middle, about), (area, polar) = carrier_moments(CARRIER), section(RING)
     shapes = ((carrier, CARRIER.volume, about, middle), (None, RING.z * area * WIDTH, RING.z * polar * WIDTH, 0.0))
     for mesh, size, inertia, centre in shapes:
-        sector = mesh or ring_sector(RING, WIDTH, COUNTS.model_copy(update={"width": 1}))
+        sector = mesh or gear_sector(RING, WIDTH, COUNTS.model_copy(update={"width": 1}))
         fields = rigid_modes(sector.nodes)
         mass = fields.T @ (hex20.assemble(sector.nodes, sector.elements, UNIT)[1] @ fields)
         assert sector.teeth * mass[0, 0] == pytest.approx(size, rel=1e-4)

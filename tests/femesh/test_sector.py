@@ -12,9 +12,10 @@ from sections import section
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20
-from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, sector_mesh, volume, write_vtu
-from gearfmu.femesh.mesh import rotated
+from gearfmu.femesh.mesh import FeMesh, rotated
+from gearfmu.femesh.quality import mesh_report, scaled_jacobian, volume, write_vtu
 from gearfmu.femesh.section import graded, transfinite
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -38,7 +39,7 @@ BODIES = {
 def case(request: pytest.FixtureRequest) -> tuple[GearGeometry, FeMesh]:
     """A gear or ring and its sector."""
     shape = BODIES[request.param]
-    return shape, sector_mesh(shape, WIDTH, COARSE)
+    return shape, gear_sector(shape, WIDTH, COARSE)
 
 
 def untwisted(shape: GearGeometry, vectors: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -9,7 +9,8 @@ import numpy as np
 from decks import write_deck
 
 from gearfmu.fem import hex20
-from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.reading.files import find_stage

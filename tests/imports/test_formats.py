@@ -15,7 +15,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.femesh.imported import ImportedMesh, read_mesh, repeated_cells
-from gearfmu.reduction.couplings import Judgement, full_order
+from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import elements_of, set_coupling
@@ -248,7 +248,7 @@ def coupled(mesh: ImportedMesh, interfaces: list[tuple[str, str]]) -> FullOrder:
     """The free body of a mesh with node sets and their kinds as interfaces."""
     faces = solids.boundary(mesh.elements)
     couplings = [set_coupling(mesh, faces, name, kind) for name, kind in interfaces]
-    return full_order("b", elements_of(mesh, None, STEEL), couplings, Judgement((), 0.05))
+    return full_order("b", elements_of(mesh, None, STEEL), couplings, (), 0.05)
 
 
 @pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "hexahedron"])

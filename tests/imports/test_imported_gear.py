@@ -14,7 +14,7 @@ from gears import hex20_deck, pinion, stage, tetrahedra
 from gearfmu.body import Body, reduce_body
 from gearfmu.body.layout import value_of
 from gearfmu.fem import solids
-from gearfmu.femesh import write_vtu
+from gearfmu.femesh.quality import write_vtu
 from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'

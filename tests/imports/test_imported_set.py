@@ -18,8 +18,8 @@ from gearfmu.body import reduce_body
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
-from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.stagefile.forms.general import Stage

@@ -7,7 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from gearfmu.body.sector import body_sector
-from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.stagefile.forms.shapes import gear_geometry

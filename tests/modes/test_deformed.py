@@ -17,7 +17,7 @@ import small_gear
 from gearfmu.body import load_bodies
 from gearfmu.body.body import turn_sectors
 from gearfmu.body.pictures import DRAWN, outline, sector_shapes
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.modes.vtu import write_series
 from gearfmu.reduction.cyclic.modal import elastic_modes

@@ -13,7 +13,7 @@ from blocks import free_body
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank

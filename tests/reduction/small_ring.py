@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from gearfmu.femesh import ring_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -40,7 +40,7 @@ def geometry(beta: float) -> InternalGearGeometry:
 
 def body(beta: float = 0.0, mesh: MeshSpec = COARSE) -> SectorBody:
     own = geometry(beta)
-    return SectorBody(ring_sector(own, SPEC.face_width, mesh), SPEC.material, *tooth_flank(own, SPEC))
+    return SectorBody(gear_sector(own, SPEC.face_width, mesh), SPEC.material, *tooth_flank(own, SPEC))
 
 
 @cache

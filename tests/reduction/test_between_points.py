@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BarycentricInterpolator
 
-from gearfmu.femesh import sector_mesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables
@@ -30,7 +30,7 @@ def test_compliance_between_roll_points_is_within_half_a_percent(name):
     fine, nodes = np.linspace(*flank.roll_range, 81), points.rolls
     mesh = MeshSpec(flank=elements, thickness=3, root=3, rim=2, width=2, thickness_grading=1.8)
     both = Points(np.concatenate([fine, nodes]), 1)
-    body = SectorBody(sector_mesh(shape, gear.face_width, mesh), gear.material, flank, both)
+    body = SectorBody(gear_sector(shape, gear.face_width, mesh), gear.material, flank, both)
     table = static_tables(body, []).static_ff[0, :, :2, :, :, 0, 0]
     weights = BarycentricInterpolator(nodes, np.eye(len(nodes)))(fine)
     count = len(fine)

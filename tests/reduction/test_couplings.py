@@ -16,7 +16,7 @@ from gearfmu.fem.coupling import rigid_fields
 from gearfmu.fem.factor import Factor
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, Springs, averaging, full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.forms.shapes import carrier_geometry
@@ -92,7 +92,7 @@ def test_springs_of_mounts_carry_the_load_to_the_ground(elements):
               for k in range(4)]  # fmt: skip
     rows = sp.csr_array(sp.vstack([averaging(elements, m.nodes, m.point)[:3] for m in mounts]))
     node = Coupling("node", "nodes", np.array([7]), elements.nodes[7])
-    body = full_order("test", elements, [node], Judgement((), 0.05), Springs(rows, np.full(12, 1e7)))
+    body = full_order("test", elements, [node], (), 0.05, Springs(rows, np.full(12, 1e7)))
     assert body.rigid.shape[1] == 0 and abs(body.stiffness - body.stiffness.T).max() == 0
     load = body.rows("node").toarray().T
     response = Factor(body.stiffness, body.cells, body.node_of_dof).solve(load)
@@ -106,9 +106,9 @@ def test_two_rigid_couplings_cannot_share_a_node(elements):
     seat = _seat(elements, 0)
     both = [Coupling(name, "rigid", seat, np.zeros(3)) for name in ("first", "second")]
     with pytest.raises(MeshError, match="'first' and 'second'"):
-        full_order("test", elements, both, Judgement((), 1.0))
+        full_order("test", elements, both, (), 1.0)
     with pytest.raises(MeshError, match="has no nodes"):
-        full_order("test", elements, [Coupling("empty", "rigid", seat[:0], np.zeros(3))], Judgement((), 1.0))
+        full_order("test", elements, [Coupling("empty", "rigid", seat[:0], np.zeros(3))], (), 1.0)
 
 
 def _seat(elements: Elements, bolt: int) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from small_gear import COARSE, FINER, GEAR, WIDTH, flank
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, flank_loads
 
 MESH = gear_sector(GEAR, WIDTH, FINER)

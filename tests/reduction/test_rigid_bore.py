@@ -13,7 +13,7 @@ import small_ring
 from small_gear import BETA, whole
 
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.couplings import Coupling, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, full_order
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
 from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -39,7 +39,7 @@ class Case:
 def case_of(averaged: SectorBody, bore: str) -> Case:
     rigid = SectorBody(averaged.mesh, averaged.material, averaged.flank, averaged.points, rigid_bore=True)
     coupling = Coupling("bore", "rigid", averaged.mesh.full().sets[bore], np.zeros(3))
-    order = full_order("gear", whole(averaged).elements, [coupling], Judgement(("bore",), 0.02))
+    order = full_order("gear", whole(averaged).elements, [coupling], ("bore",), 0.02)
     loads = whole(averaged).loads(0)
     loads = loads.reshape(len(loads), -1, 3)
     kept = np.setdiff1d(np.arange(loads.shape[1]), coupling.nodes)

@@ -15,7 +15,7 @@ from turned_rows import on_tooth
 
 from gearfmu.body import Body, load_bodies, reduce_body
 from gearfmu.errors import ModelError
-from gearfmu.femesh import sector_mesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.kernel import Kernel
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -156,7 +156,7 @@ def test_the_ring_at_rest_is_deformed_as_its_unreduced_statics_say(
     ring, z = set_bodies[2], 54
     shape, wheel = gear_shape(set_spec.by_file["ring"]), set_spec.by_file["ring"]
     statics = static_tables(
-        SectorBody(sector_mesh(shape, wheel.face_width, MESH), wheel.material, *tooth_flank(shape, wheel)), []
+        SectorBody(gear_sector(shape, wheel.face_width, MESH), wheel.material, *tooth_flank(shape, wheel)), []
     )
     q = amplitudes(at_rest, "ring", ring)
     by_modes = np.array([on_tooth(ring.flank, ring.sensors.rows, sector, z) @ q for sector in range(z)])

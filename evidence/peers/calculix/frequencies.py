@@ -24,7 +24,8 @@ import numpy as np
 from evidence.peers.calculix.ccx import require_ccx, run
 from evidence.peers.calculix.positions import read
 from gearfmu.body.sector import body_sector
-from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.files import written_whole
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.stagefile.forms.shapes import gear_geometry

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.femesh import gear_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import static_tables

@@ -15,8 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import surface
-from gearfmu.femesh import FeMesh
-from gearfmu.femesh.mesh import FlankGrid
+from gearfmu.femesh.mesh import FeMesh, FlankGrid
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.gear import InternalGearGeometry
 

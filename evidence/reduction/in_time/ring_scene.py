@@ -29,7 +29,7 @@ from evidence.reduction.in_time.scenes import (
     touching,
 )
 from evidence.reduction.in_time.transient import Assembly, Joints, Member
-from gearfmu.femesh.ring import ring_sector
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.full_order import Interface
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.stagefile.forms.general import Stage
@@ -66,7 +66,7 @@ def placed_ring(spec: Any, meshes: Meshes) -> Placed:
     counts = spec.ring.body.mesh
     mesh = counts.model_copy(update={"scale": counts.scale * meshes.ring})
     ring = set_geometry(spec).ring_mesh.ring
-    return Placed(ring_sector(ring, spec.ring.face_width, mesh), ring, np.zeros(2), 0.0)
+    return Placed(gear_sector(ring, spec.ring.face_width, mesh), ring, np.zeros(2), 0.0)
 
 
 def _ring(stage: Stage, meshes: Meshes, flank: sp.csr_array) -> Solid:

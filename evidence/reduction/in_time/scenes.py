@@ -22,7 +22,7 @@ from gearfmu.femesh.mesh import rotated
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry.mesh import PlanetaryGeometry, contact_modulus, half_width
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -130,7 +130,7 @@ def _ramp(time: float) -> float:
 def _carrier(spec: Any, meshes: Meshes) -> Solid:
     carrier = spec.by_file["carrier"]
     elements, couplings = carrier_elements(carrier, scaled_sector(carrier, meshes.carrier))
-    full = full_order("carrier", elements, couplings, Judgement(("bore",), spec.written.set.center_distance))
+    full = full_order("carrier", elements, couplings, ("bore",), spec.written.set.center_distance)
     return Solid(np.zeros(3), elements, tuple(couplings), full)
 
 
@@ -160,7 +160,7 @@ def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_arra
     nodes = rotated(mesh.nodes, placed.angle)
     elements = Elements(nodes, mesh.elements, *hex20.assemble(nodes, mesh.elements, material))
     bore = Coupling("bore", "averaging", mesh.sets["bore"], np.zeros(3))
-    full = full_order(name, elements, [bore], Judgement(("bore",), placed.geometry.r))
+    full = full_order(name, elements, [bore], ("bore",), placed.geometry.r)
     if flank is not None:
         labels = tuple(f"n{k}" for k in range(flank.shape[0]))
         full = replace(full, interfaces=(*full.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))

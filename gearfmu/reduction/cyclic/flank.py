@@ -52,6 +52,12 @@ class ToothFlank:
         """Smallest and largest roll of the flank, m."""
         return min(self.s_form, self.s_tip), max(self.s_form, self.s_tip)
 
+    def radii(self, slack: float = 0.0) -> tuple[float, float]:
+        """Smallest and largest radius (m) of the flank, `slack` (m) of roll wider."""
+        low, high = self.roll_range
+        smallest, largest = involute.radius_at_roll(np.array([low - slack, high + slack]), self.r_b)
+        return float(smallest), float(largest)
+
     def strip(self, rolls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Clipped strips: roll points (R,), m → first and last arc length (R,), m."""
         arc, low, high = (np.square(s) / (2 * self.r_b) for s in (np.asarray(rolls, float), *self.roll_range))

@@ -91,7 +91,7 @@ def frf_error(
     file)."""
     inputs = frf_inputs(len(body.points.rolls), body.points.functions)
     scale = port_scale(len(inputs), case.length)
-    static = _static_matrix(body, statics, inputs)
+    static = static_matrix(statics, inputs)
     moments = [m * np.outer(scale, scale) for m in [static, *_moments(body, inputs, progress)]]
     rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
     full = Series(rows, modes.frequency, moments)
@@ -134,8 +134,9 @@ def rigid_compliance(flank: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     return rows @ np.linalg.solve(inertia, rows.T)
 
 
-def _static_matrix(body: SectorBody, statics: Statics, inputs: np.ndarray) -> np.ndarray:
-    size = body.flank_count
+def static_matrix(statics: Statics, inputs: np.ndarray) -> np.ndarray:
+    """Static compliance between chosen flank loads of tooth 0, flat indices (k,), and the bore: (k + 6, k + 6)."""
+    size = statics.static_fb[..., 0].size
     flank = statics.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(size, size)[np.ix_(inputs, inputs)]
     bore = statics.static_fb.reshape(size, 6)[inputs]
     return np.block([[flank, bore], [bore.T, statics.static_bb]])

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
-from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
+from gearfmu.fem.coupling import averaging_rows, moved, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
@@ -21,7 +21,8 @@ from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_
 class SectorBody:
     """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
 
-    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
+    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. elastic : material,
+    SI, or ready-made stiffness (3N, 3N), N/m, and mass, kg, of the free sector.
     flank : ToothFlank. points : where the flanks are loaded. rigid_bore : the surface of the bore (of a ring: of the
     rim) moves as one rigid body, as on a stiff shaft; else it deforms about its mean motion.
     load_matrix : all loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows.
@@ -29,16 +30,22 @@ class SectorBody:
     """
 
     def __init__(
-        self, mesh: FeMesh, material: hex20.Material, flank: ToothFlank, points: Points, rigid_bore: bool = False
+        self,
+        mesh: FeMesh,
+        elastic: hex20.Material | tuple[sp.csr_array, sp.csr_array],
+        flank: ToothFlank,
+        points: Points,
+        rigid_bore: bool = False,
     ):
         self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
-        stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
-        self.stiffness, self.internal = stiffness, "rim" in mesh.sets
+        self.material = None if isinstance(elastic, tuple) else elastic
+        ready = elastic if isinstance(elastic, tuple) else hex20.assemble(mesh.nodes, mesh.elements, elastic)
+        (self.stiffness, self.mass_matrix), self.internal = ready, "rim" in mesh.sets
         sector = Sector(
-            mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
+            mesh.nodes, mesh.elements, self.stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
             bool(flank.base_helix_angle), self._held_faces.nodes if rigid_bore else None,
         )  # fmt: skip
-        self.material, self.spaces = material, sector_spaces(sector)
+        self.spaces = sector_spaces(sector)
         self.load_matrix = self._all_loads()
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
@@ -69,12 +76,12 @@ class SectorBody:
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
         if not self.internal:
             return np.zeros((0, self.mesh.nodes.size))
-        return averaging_rows_at(self.mesh.nodes, self._held_faces, self.patch_point)[:3]
+        return moved(averaging_rows(self.mesh.nodes, self._held_faces), self.patch_point)[:3]
 
     @property
     def patch_point(self) -> np.ndarray:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
-        return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
+        return self.mesh.nodes[self._held_nodes].mean(axis=0)
 
     def _all_loads(self) -> sp.csr_array:
         parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
@@ -87,7 +94,12 @@ class SectorBody:
 
     @property
     def _held_faces(self) -> surface.Faces:
-        return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
+        return surface.faces_within(self.mesh.elements, self._held_nodes)
+
+    @property
+    def _held_nodes(self) -> np.ndarray:
+        """Nodes of the sector on the bore, of a ring on its rim."""
+        return self.mesh.sets["rim" if self.internal else "bore"]
 
     @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
@@ -103,8 +115,9 @@ class SectorBody:
 
     @property
     def knows_stress(self) -> bool:
-        """Whether stresses of the spinning body follow from its mesh, and so their effect on its modes."""
-        return True
+        """Whether stresses of the spinning body follow from its mesh, and so their effect on its modes: not where
+        material and elements may be another program's."""
+        return self.material is not None
 
     @cached_property
     def growth(self) -> np.ndarray:
@@ -114,6 +127,7 @@ class SectorBody:
     @cached_property
     def stress_stiffness(self) -> sp.csr_array:
         """K_σ (N, N) of the stresses of that load, kg, the same for each component."""
+        assert self.material is not None
         return stress_stiffness(self.mesh.nodes, self.mesh.elements, self.material, self.growth)
 
     def rigid_rows(self) -> np.ndarray:

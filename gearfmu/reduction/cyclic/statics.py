@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from gearfmu.fem.cyclic import SectorSpace
 from gearfmu.fem.harmonic import Harmonic
+from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.modal import Progress
 from gearfmu.reduction.cyclic.sector import SectorBody
 
@@ -211,11 +212,21 @@ def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
-    rolls, functions, z = len(body.points.rolls), body.points.functions, body.teeth
-    back = ff[(-np.arange(z)) % z].transpose(0, 2, 1)
-    both, flank = 0.5 * (ff + back), 2 * rolls * functions
-    shaped = both[:, :flank, :flank].reshape(z, 2, rolls, functions, 2, rolls, functions)
-    static_ff = np.ascontiguousarray(shaped.transpose(1, 4, 0, 2, 5, 3, 6))
-    static_fp = both[:, :flank, flank:].reshape(z, 2, rolls, functions, -1).transpose(1, 0, 2, 3, 4)
-    static_fb = fb[:flank].reshape(2, rolls, functions, 6)
+    points, z, flank = body.points, body.teeth, body.flank_count
+    both = symmetric_offsets(ff)
+    static_fp = both[:, :flank, flank:].reshape(z, 2, len(points.rolls), points.functions, -1).transpose(1, 0, 2, 3, 4)
+    static_fb = fb[:flank].reshape(2, len(points.rolls), points.functions, 6)
+    static_ff = by_load(both[:, :flank, :flank], points)
     return Statics(static_ff, static_fb, 0.5 * (bb + bb.T), static_fp, both[:, flank:, flank:], pictures)
+
+
+def symmetric_offsets(tables: np.ndarray) -> np.ndarray:
+    """Compliance (z, k, k) by tooth offset, the same from tooth 0 to m as from m to 0."""
+    back = tables[(-np.arange(len(tables))) % len(tables)].transpose(0, 2, 1)
+    return 0.5 * (tables + back)
+
+
+def by_load(tables: np.ndarray, points: Points) -> np.ndarray:
+    """Tables (z, 2·R·A, 2·R·A) between all loads of two flanks as `Statics.static_ff`."""
+    loads = 2, len(points.rolls), points.functions
+    return np.ascontiguousarray(tables.reshape(len(tables), *loads, *loads).transpose(1, 4, 0, 2, 5, 3, 6))

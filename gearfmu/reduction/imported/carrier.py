@@ -15,10 +15,10 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.mesh import CarrierGeometry
-from gearfmu.reduction.couplings import Judgement, full_order
+from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import elements_of, set_coupling
-from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.files import naming, ready_matrices, sound_mesh, whole_facts
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import carrier_geometry
@@ -45,9 +45,8 @@ def imported_carrier(carrier: CarrierBody) -> tuple[FullOrder, dict[str, Any]]:
         faces = solids.boundary(mesh.elements)
         couplings = [set_coupling(mesh, faces, names[i], carrier.coupling_of(i), points[i], i) for i in names]
         body = elements_of(mesh, matrices, carrier.material)
-        full = full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))
-    dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
-    return full, mesh_facts(mesh) | {"method": "whole body"} | dofs
+        full = full_order("carrier", body, couplings, ("bore",), geometry.a)
+    return full, whole_facts(mesh, full.size)
 
 
 def _points(

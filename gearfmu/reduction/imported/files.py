@@ -57,6 +57,11 @@ def mesh_facts(mesh: ImportedMesh) -> dict[str, Any]:
     }
 
 
+def whole_facts(mesh: ImportedMesh, size: int) -> dict[str, Any]:
+    """`mesh_facts` of a body of `size` unknowns that is reduced as a whole."""
+    return mesh_facts(mesh) | {"method": "whole body", "dof_body": size, "dof_sector": size, "teeth": 1}
+
+
 def ready_matrices(source: FilesSpec, mesh: ImportedMesh, turn: np.ndarray, material: Material) -> Matrices | None:
     """Ready-made matrices of a FilesSpec, checked against mesh and material; None without files.
 

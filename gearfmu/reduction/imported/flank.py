@@ -9,7 +9,6 @@ resultant is exact whatever the mesh.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -45,83 +44,61 @@ def corner_geometry(
     return corners, centre, (-1 if internal else 1) * normal / np.maximum(length, 1e-300)
 
 
-@dataclass(frozen=True)
-class FitRange:
-    """Where flanks are looked for and how good they must be: teeth z, the flank meant, and the largest distance (m) of
-    a node from its involute."""
-
-    teeth: int
-    flank: ToothFlank
-    tolerance: float
-
-    def radii(self, slack: float = 0.0) -> tuple[float, float]:
-        """Smallest and largest radius (m) of the flank, `slack` (m) of roll wider."""
-        low, high = self.flank.roll_range
-        smallest, largest = involute.radius_at_roll(np.array([low - slack, high + slack]), self.flank.r_b)
-        return float(smallest), float(largest)
-
-
-def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit:
+def fit_flanks(nodes: np.ndarray, faces: Faces, teeth: int, flank: ToothFlank, tolerance: float) -> InvoluteFit:
     """The involutes of a mesh whose axis is near z: fitted to the corner nodes of flank faces between form and tip.
 
-    MeshError when there are no flanks, or when a node lies further from them than the tolerance: no involute.
+    flank : the one that is meant. MeshError when there are no flanks, or when a node lies further from them than the
+    tolerance (m): no involute.
     """
-    r_b, internal = wanted.flank.r_b, wanted.flank.internal
+    r_b, internal = flank.r_b, flank.internal
     corners, centre, normal = corner_geometry(nodes, faces, internal)
     try:
-        found = flank_faces(centre, normal, wanted.teeth, r_b)
-        first = fit_involute(_nodes_of(nodes, corners, found, wanted), wanted.teeth, r_b)
+        found = flank_faces(centre, normal, teeth, r_b)
+        first = fit_involute(_nodes_of(nodes, corners, found, flank), teeth, r_b)
         local = first.in_gear_frame(nodes)
         corners, centre, normal = corner_geometry(local, faces, internal)
-        every = _all_between(local, centre, normal, first, wanted)
-        fit = fit_involute(_nodes_of(nodes, corners, every, wanted), wanted.teeth, first.r_b)
+        every = _all_between(centre, normal, first, flank)
+        fit = fit_involute(_nodes_of(nodes, corners, every, flank), teeth, first.r_b)
     except FitError as error:
         raise MeshError(
-            f"no involute flanks of {wanted.teeth} teeth found ({error}); give the set that holds them, the number of "
+            f"no involute flanks of {teeth} teeth found ({error}); give the set that holds them, the number of "
             "teeth, and check the unit of length"
         ) from None
-    if fit.worst > wanted.tolerance:
+    if fit.worst > tolerance:
         raise MeshError(
             f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} "
             "µm) off the "
             f"best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * r_b:.5g} mm), allowed are "
-            f"{1e6 * wanted.tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage "
+            f"{1e6 * tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage "
             "file), or raise "
             "`flank_tolerance`"
         )
     return fit
 
 
-def _all_between(
-    local: np.ndarray, centre: np.ndarray, normal: np.ndarray, fit: InvoluteFit, wanted: FitRange
-) -> FlankPoints:
+def _all_between(centre: np.ndarray, normal: np.ndarray, fit: InvoluteFit, flank: ToothFlank) -> FlankPoints:
     """All steep faces between form and tip circle, whether they lie on an involute or not."""
     moment = centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0]
-    low, high = wanted.radii()
+    low, high = flank.radii()
     radius = np.hypot(centre[:, 0], centre[:, 1])
-    chosen = (
-        (np.abs(normal[:, 2]) < _STEEP)
-        & (np.abs(moment) > _INWARD * wanted.flank.r_b)
-        & (radius > low)
-        & (radius < high)
-    )
+    chosen = (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * flank.r_b) & (radius > low) & (radius < high)
     side = np.where(chosen, np.sign(moment), 0).astype(int)
     base = np.arctan2(centre[:, 1], centre[:, 0]) + side * (
         involute.inv(np.arccos(np.minimum(fit.r_b / np.maximum(radius, fit.r_b), 1.0))) - fit.psi_b
     )
-    tooth = np.round(base * wanted.teeth / (2 * np.pi))
-    side = np.where(np.abs(base - tooth * 2 * np.pi / wanted.teeth) < _ASIDE * fit.psi_b, side, 0)
-    return FlankPoints(centre, tooth.astype(int) % wanted.teeth, side)
+    tooth = np.round(base * fit.teeth / (2 * np.pi))
+    side = np.where(np.abs(base - tooth * 2 * np.pi / fit.teeth) < _ASIDE * fit.psi_b, side, 0)
+    return FlankPoints(centre, tooth.astype(int) % fit.teeth, side)
 
 
-def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, wanted: FitRange) -> FlankPoints:
+def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, flank: ToothFlank) -> FlankPoints:
     """The corner nodes of flank faces, each once, between form and tip circle."""
     chosen = np.flatnonzero(faces.side)
     index, first = np.unique(corners[chosen].ravel(), return_index=True)
     owner = chosen[first // 4]
     points = FlankPoints(nodes[index], faces.tooth[owner], faces.side[owner])
     radius = np.hypot(points.points[:, 0], points.points[:, 1])
-    low, high = wanted.radii(_END * abs(wanted.flank.s_tip - wanted.flank.s_form))
+    low, high = flank.radii(_END * abs(flank.s_tip - flank.s_form))
     return points.of((radius > low) & (radius < high))
 
 
@@ -171,7 +148,7 @@ def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -
     moment = sg * (centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0])
     radius = np.hypot(local[corners, 0], local[corners, 1])
     angle = sg * np.arctan2(centre[:, 1], centre[:, 0])
-    low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in flank.roll_range)
+    low, high = flank.radii()
     chosen = (
         (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
     ) & ((radius.max(axis=1) > low) & (radius.min(axis=1) < high))

@@ -14,15 +14,15 @@ from gearfmu.fem import solids
 from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.involute_fit import InvoluteFit
-from gearfmu.reduction.couplings import Judgement, full_order
+from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
 from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
-from gearfmu.reduction.imported.flank import FitRange, fit_flanks, tooth_loads
+from gearfmu.reduction.imported.flank import fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
 from gearfmu.reduction.imported.sector import ImportedSector
-from gearfmu.reduction.memory import MESH_COARSER, Need, ReductionSize, require_memory, sector_need, whole_need
+from gearfmu.reduction.memory import MESH_COARSER, Need, require_memory, sector_need, whole_need
 from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 BORE = "bore"
@@ -109,28 +109,27 @@ def imported_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> Import
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
         else:
             bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
-            elastic = found.matrices or wanted.material
-            body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
+            matrices = found.matrices or solids.assemble(found.cut.nodes, found.cut.elements, wanted.material)
+            body = ImportedSector(found.cut, bore, wanted.teeth, matrices, wanted.flank, wanted.points)
     return ImportedGear(body, found.mesh.nodes, found.facts)
 
 
 def _need(found: CheckedGear, wanted: Wanted) -> Need:
     """Memory that the reduction of checked finite elements takes."""
-    sized = ReductionSize(wanted.teeth, wanted.modes, 2 * len(wanted.points.rolls) * wanted.points.functions)
+    loads = 2 * len(wanted.points.rolls) * wanted.points.functions
     if found.cut is not None:
-        return sector_need(found.cut, sized)
-    return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads, 1)
+        return sector_need(found.cut, wanted.teeth, wanted.modes, loads)
+    return whole_need(found.mesh.nodes.size, wanted.modes + 3 * loads, 1)
 
 
 def _fit(mesh: ImportedMesh, source: ImportSpec | RingImportSpec, wanted: Wanted) -> InvoluteFit:
-    flank = wanted.flank
     middle = (
         mesh.nodes[mesh.node_set(source.bore)].mean(axis=0)
         if source.bore and _around(mesh, source.bore)
         else np.zeros(3)
     )
-    search = FitRange(wanted.teeth, flank, source.flank_tolerance)
-    fit = fit_flanks(mesh.nodes - middle, solids.boundary(mesh.elements), search)
+    faces = solids.boundary(mesh.elements)
+    fit = fit_flanks(mesh.nodes - middle, faces, wanted.teeth, wanted.flank, source.flank_tolerance)
     return replace(fit, origin=fit.origin + middle)
 
 
@@ -164,7 +163,7 @@ def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
 
 def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
-    low, high = (np.hypot(wanted.flank.r_b, s) for s in wanted.flank.roll_range)
+    low, high = wanted.flank.radii()
     return (radius > low) & (radius < high)
 
 
@@ -200,18 +199,15 @@ def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted:
     faces = solids.boundary(mesh.elements)
     bore = set_coupling(mesh, faces, BORE, coupling, np.zeros(3))
     elements = elements_of(mesh, matrices, wanted.material)
-    body = full_order(mesh.source.stem, elements, [bore], Judgement((BORE,), wanted.flank.r_b))
+    body = full_order(mesh.source.stem, elements, [bore], (BORE,), wanted.flank.r_b)
     angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
-    rows = (tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles)
+    rows = [tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles]
     if coupling == "rigid":
         kept = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.sets[BORE])
         pick = (3 * kept[:, None] + np.arange(3)).ravel()
-        rows = (_padded(row[:, pick], body.size) for row in rows)
+        masters = sp.csr_array((rows[0].shape[0], body.size - len(pick)))
+        rows = [sp.csr_array(sp.hstack([row[:, pick], masters])) for row in rows]
     return WholeGear(body, tuple(rows), wanted.points)
-
-
-def _padded(rows: sp.csr_array, size: int) -> sp.csr_array:
-    return sp.csr_array(sp.hstack([rows, sp.csr_array((rows.shape[0], size - rows.shape[1]))]))
 
 
 def hinge_problem(space: Elastic, first_squared: float) -> str | None:

@@ -17,11 +17,11 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.surface import Faces
 from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.reduction.couplings import Coupling, Judgement, elimination, full_order
+from gearfmu.reduction.couplings import Coupling, elimination, full_order
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.reduction.imported.couplings import elements_of, set_coupling
-from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.files import naming, ready_matrices, sound_mesh, whole_facts
 from gearfmu.reduction.imported.skin import Surface, closed_surface, enveloping_surface
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
 from gearfmu.stagefile.tables.housing import HousingBody, HousingImportSpec
@@ -57,17 +57,16 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
         held = _seats(mesh, faces, source) + _feet(mesh, faces, source)
         felt = [_sensor(mesh, faces, name, node_set) for name, node_set in source.sensors.items()]
         body = elements_of(mesh, matrices, housing.material)
-        judgement = Judgement(tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max()))
-        full = full_order(housing.name, body, [*held, *felt], judgement)
+        feet, reach = tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max())
+        full = full_order(housing.name, body, [*held, *felt], feet, reach)
         loaded, sensors = full.interfaces[: len(held)], full.interfaces[len(held) :]
         surface = closed_surface(mesh, faces, source.skin) if source.skin else enveloping_surface(mesh, faces)
         transform = elimination(mesh.nodes, [c for c in held if c.kind == "rigid"])[0]
         skin = sp.csr_array(sp.kron(surface.sample, sp.identity(3), format="csr") @ transform)
-    dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
     heights = {c.name: mesh.nodes[c.nodes, 2] for c in held}
     return ImportedHousing(
         replace(full, interfaces=loaded),
-        mesh_facts(mesh) | {"method": "whole body"} | dofs,
+        whole_facts(mesh, full.size),
         {name: (float(z.min()), float(z.max())) for name, z in heights.items()},
         tuple(replace(s, components=COMPONENTS[:3], rows=sp.csr_array(s.rows[:3])) for s in sensors),
         surface,

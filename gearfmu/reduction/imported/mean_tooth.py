@@ -21,9 +21,18 @@ import scipy.sparse as sp
 
 from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Points
-from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, Series, compare, frf_inputs, port_scale, rigid_compliance
+from gearfmu.reduction.cyclic.frf import (
+    FrfCase,
+    FrfError,
+    Series,
+    compare,
+    frf_inputs,
+    port_scale,
+    rigid_compliance,
+    static_matrix,
+)
 from gearfmu.reduction.cyclic.modal import Modes, Progress
-from gearfmu.reduction.cyclic.statics import Statics
+from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 
@@ -194,12 +203,9 @@ def mean_statics(
         fb += (rows @ bore) @ turns[tooth] / z
     whole = gear.bore_rows @ bore
     bb = np.mean([turn.T @ whole @ turn for turn in turns], axis=0)
-    back = tables[(-np.arange(z)) % z].transpose(0, 2, 1)
     rolls, functions = len(points.rolls), points.functions
-    shaped = (0.5 * (tables + back)).reshape(z, 2, rolls, functions, 2, rolls, functions)
-    static_ff = np.ascontiguousarray(shaped.transpose(1, 4, 0, 2, 5, 3, 6))
     statics = Statics(
-        static_ff=static_ff,
+        static_ff=by_load(symmetric_offsets(tables), points),
         static_fb=fb.reshape(2, rolls, functions, 6),
         static_bb=0.5 * (bb + bb.T),
         static_fp=np.zeros((2, z, rolls, functions, 0)),
@@ -222,10 +228,7 @@ def mean_frf(gear: WholeGear, space: Elastic, modes: Modes, statics: Statics, ca
     second = space.flexibility(inertia)
     moments = [ports @ first, first.T @ inertia, second.T @ inertia, second.T @ space.mass(second)]
     full = Series((ports @ shapes) * scale[:, None], np.sqrt(squared) / (2 * np.pi), [m * weight for m in moments])
-    size = gear.flank_rows[0].shape[0]
-    flank = statics.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(size, size)[np.ix_(inputs, inputs)]
-    coupling = statics.static_fb.reshape(size, 6)[inputs]
-    static = np.block([[flank, coupling], [coupling.T, statics.static_bb]]) * weight
+    static = static_matrix(statics, inputs) * weight
     rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
     rigid = rigid_compliance(gear.flank_rows[0][inputs] @ gear.body.rigid, gear.inertia) * weight
     return compare(full, Series(rows, modes.frequency, [static]), rigid, case)

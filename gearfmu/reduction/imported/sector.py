@@ -8,67 +8,42 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.fem import solids
-from gearfmu.fem.coupling import averaging_rows, surface_moments
-from gearfmu.fem.cyclic import Sector, sector_spaces
-from gearfmu.fem.hex20 import Material
+from gearfmu.fem.coupling import averaging_rows
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import repeated_cells
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.imported.couplings import Matrices
 from gearfmu.reduction.imported.flank import tooth_loads
 
 
 class ImportedSector(SectorBody):
     """`SectorBody` on a cut of an imported mesh.
 
-    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). elastic : a material,
-    or ready-made stiffness (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh
-    are not as they should be.
+    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). matrices : stiffness
+    (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
     """
 
     def __init__(
-        self,
-        cut: CyclicCut,
-        bore: np.ndarray,
-        teeth: int,
-        elastic: Material | tuple[sp.csr_array, sp.csr_array],
-        flank: tuple[ToothFlank, Points],
+        self, cut: CyclicCut, bore: np.ndarray, teeth: int, matrices: Matrices, flank: ToothFlank, points: Points
     ):
-        self.cut, self.bore, self.teeth = cut, bore, teeth
-        self.flank, self.points = flank
-        self.internal = self.flank.internal
-        self.mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), {}, teeth, cut.cut_minus, cut.cut_plus)
         self.faces = solids.boundary(cut.elements)
-        matrices = elastic if isinstance(elastic, tuple) else solids.assemble(cut.nodes, cut.elements, elastic)
-        self.stiffness, self.mass_matrix = matrices
-        self.spaces = sector_spaces(
-            Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
-        )
-        self.load_matrix = self._all_loads()
+        sets = {"rim" if flank.internal else "bore": bore}
+        mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), sets, teeth, cut.cut_minus, cut.cut_plus)
+        super().__init__(mesh, matrices, flank, points)
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
-        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction)
+        return tooth_loads(self.mesh.nodes, self.faces, self.flank, self.points, direction=direction)
 
     @cached_property
     def patch_rows(self) -> np.ndarray:
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
         if not self.internal:
-            return np.zeros((0, self.cut.nodes.size))
-        return averaging_rows(self.cut.nodes - self.patch_point, self.faces.within(self.bore))[:3]
+            return np.zeros((0, self.mesh.nodes.size))
+        return averaging_rows(self.mesh.nodes - self.patch_point, self._held_faces)[:3]
 
     @property
-    def knows_stress(self) -> bool:
-        """No: material and elements may be another program's."""
-        return False
-
-    @property
-    def patch_point(self) -> np.ndarray:
-        """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
-        return self.cut.nodes[self.bore].mean(axis=0)
-
-    @cached_property
-    def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
-        """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
-        moments, gram = surface_moments(self.cut.nodes, self.faces.within(self.bore))
-        return moments, self.turned_sum(gram)
+    def _held_faces(self) -> Faces:
+        return self.faces.within(self._held_nodes)

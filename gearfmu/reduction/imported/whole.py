@@ -16,7 +16,7 @@ from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.geometry.plane import about_z
-from gearfmu.reduction.couplings import Coupling, Judgement, Springs, full_order
+from gearfmu.reduction.couplings import Coupling, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
 from gearfmu.reduction.imported.flank import middle_node
@@ -45,13 +45,13 @@ def imported_gear_order(
         couplings.append(Coupling(f"tooth{tooth}", "nodes", np.array([node]), mesh.nodes[node]))
     if not wanted.flank.internal:
         couplings.append(set_coupling(mesh, faces, BORE, coupling, np.zeros(3)))
-        return full_order(name, body, couplings, Judgement((BORE,), length))
+        return full_order(name, body, couplings, (BORE,), length)
     springs = None
     if mounts is not None:
         patches = [set_coupling(mesh, faces, own) for own in mesh.sets if own != BORE]
         rows = [patch.rows[:3] for patch in patches if patch.rows is not None]
         springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), mounts.stiffness))
-    return full_order(name, body, couplings, Judgement((), length), springs)
+    return full_order(name, body, couplings, (), length, springs)
 
 
 def _whole(found: CheckedGear, wanted: Wanted, mounts: MountsSpec | None) -> tuple[ImportedMesh, Matrices | None]:
