@@ -99,7 +99,8 @@ def _problems_of_gears(raw: Mapping[str, Any], file: str) -> list[Problem]:
     except UnitError:
         torque = None
     first, second = pair_gears(pair, gears)
-    mesh = Meshed((first, second), pair.center_distance, pair.backlash, torque)
+    judged_at = torque if torque is not None and torque > 0.0 else None  # another one is told by its own field
+    mesh = Meshed((first, second), pair.center_distance, pair.backlash, judged_at)
     names = {"distance": "pair.center_distance", "backlash": "pair.backlash"}
     return [
         Problem(file, names.get(field, field.replace("bodies.", "gears.", 1)), shown(value), remedy)
