@@ -14,8 +14,8 @@ from doubled import doubled
 from driven import begun
 
 from gearfmu.body import load_bodies
-from gearfmu.errors import SpecError
-from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
+from gearfmu.errors import ModelError, SpecError
+from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import Stage
@@ -81,6 +81,11 @@ def test_torque_comes_through_a_train_by_its_ratio(two_stage) -> None:
     for direction in "xyz":  # what is static at level fast is read where gears stand without load: 1.4e-4
         bearings = [v for n, v in found.items() if n.startswith("bearing.input") and n.endswith(f".f{direction}")]
         assert sum(bearings) == pytest.approx(found[f"seat.pinion1.f{direction}"], abs=3e-4 * scale)
+
+
+def test_an_engagement_that_a_train_lacks_is_refused(two_stage) -> None:
+    with pytest.raises(ModelError, match="two_stage has no engagement 'stage3'; it has stage1, stage2"):
+        loaded_te(two_stage, [100.0], 3, mesh="stage3")
 
 
 def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
