@@ -147,6 +147,19 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
         assert 0 < kernel.get("mesh.film_loss") <= 1.001 * found.dissipated[-1]
 
 
+def test_the_loss_of_films_that_are_squeezed_out_hardly_depends_on_the_step(pair_free: FreePair) -> None:
+    """Jammed flanks that meet through oil again and again. Found 3 %; without the last part of a film, what it carried
+    before it closed, 31 %."""
+    lost = []
+    for h in (1e-5, 2.5e-6):
+        settings = {"effect.film": 1.0, "oil_viscosity": 1e-2, "h": h, "level": 1.0,
+                    "effect.contact_damping": 0.0, "effect.modal_damping": 0.0}  # fmt: skip
+        kernel = started(pair_free, Rattle(speed=0.2, play=-5e-6), settings)
+        energies(kernel, 1e-5, 0.02)
+        lost.append(kernel.get("mesh.film_loss"))
+    assert lost[0] == pytest.approx(lost[1], rel=0.1)
+
+
 def test_off_reads_nothing_of_the_oil(plain: StageModel) -> None:
     bits = []
     for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
