@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 
 from copies import KEPT, ROOT, Copy
@@ -51,6 +52,8 @@ def modules() -> Iterator[Path]:
 
 def make_map() -> None:
     """Runs every module that has no current entry."""
+    if find_spec("coverage") is None:
+        raise SystemExit("the map needs the package coverage: pip install coverage")
     MAP.mkdir(parents=True, exist_ok=True)
     wanted = [str(path.relative_to(ROOT)) for path in modules() if not _place(path).exists()]
     copy = Copy("map")
