@@ -1,5 +1,4 @@
-"""The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once,
-and the same verdict as the rules in Python on random damage."""
+"""The kernel's checks of a blob: SHA-256 against hashlib, and each rule broken once."""
 
 from __future__ import annotations
 
@@ -8,13 +7,10 @@ import struct
 
 import numpy as np
 import pytest
-from checked_blob import checked_blob
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mutations import mutated
 from probes import Probes
 
-from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, seal, write_blob
 
 BAD_BLOB = 1
@@ -99,48 +95,36 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
         (patched(entry(0) + COUNT, b"\7"), "'name' is not UTF-8 text that ends with NUL"),
         (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\xff"), "'name' is not UTF-8"),
         (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\0"), "'name' is not UTF-8"),
+    ]
+    + [
+        (patched(place, data, REPEATING), "does not repeat an earlier one")
+        for place, data in (
+            (entry(0) + REPEATS, b"\1"),  # itself
+            (entry(0) + REPEATS, b"\3"),  # a later one
+            (entry(2) + REPEATS, b"\2"),  # another section
+            (entry(3) + REPEATS, b"\3"),  # one that repeats itself
+            (entry(3) + REPEATS, b"\xff\xff\xff\xff"),
+            (entry(3) + TYPE, b"\2"),
+            (entry(3) + COUNT, struct.pack("<Q", 599)),
+            (entry(3) + OFFSET, struct.pack("<Q", 2**63)),
+        )
     ],
 )
 def test_each_rule(probes: Probes, damage: bytes, words: str) -> None:
     outcome, message, _, sections = probes.blob_open(damage)
     assert outcome == BAD_BLOB and words in message and sections == 0
-    with pytest.raises(ModelError, match=words.replace("kernel", "package").replace("(", r"\(")):
-        checked_blob(damage)
 
 
 def test_every_changed_byte_and_every_other_length_is_noticed(probes: Probes) -> None:
     changed = [BLOB[:i] + bytes([BLOB[i] ^ 0x40]) + BLOB[i + 1 :] for i in range(len(BLOB))]
     for damage in (*changed, *(BLOB[:i] for i in range(len(BLOB))), BLOB + b"\0"):
         assert probes.blob_open(damage)[0] == BAD_BLOB
-        with pytest.raises(ModelError):
-            checked_blob(damage)
 
 
 def test_a_section_that_repeats_another_has_its_contents(probes: Probes) -> None:
     assert probes.blob_open(REPEATING)[0] == 0
     assert [probes.blob_sum(REPEATING, f"long{i}", F64) for i in range(3)] == 3 * [(LONG.sum(), 600)]
     assert len(REPEATING) < len(write_blob({"long0": LONG, "long1": LONG + 1.0}))
-
-
-@pytest.mark.parametrize(
-    ("place", "data"),
-    [
-        (entry(0) + REPEATS, b"\1"),  # itself
-        (entry(0) + REPEATS, b"\3"),  # a later one
-        (entry(2) + REPEATS, b"\2"),  # another section
-        (entry(3) + REPEATS, b"\3"),  # one that repeats itself
-        (entry(3) + REPEATS, b"\xff\xff\xff\xff"),
-        (entry(3) + TYPE, b"\2"),
-        (entry(3) + COUNT, struct.pack("<Q", 599)),
-        (entry(3) + OFFSET, struct.pack("<Q", 2**63)),
-    ],
-)
-def test_what_repeats_no_earlier_section_is_refused(probes: Probes, place: int, data: bytes) -> None:
-    damage = patched(place, data, REPEATING)
-    outcome, message, _, _ = probes.blob_open(damage)
-    assert outcome == BAD_BLOB and "does not repeat an earlier one" in message
-    with pytest.raises(ModelError, match="does not repeat an earlier one"):
-        checked_blob(damage)
 
 
 @settings(max_examples=300)
@@ -166,20 +150,3 @@ def test_every_unicode_boundary(probes: Probes) -> None:
         start = ENTRY.unpack_from(blob, HEADER.size)[4]
         blob[start : start + len(wrong)] = wrong
         assert probes.blob_open(seal(bytes(blob)))[0] == BAD_BLOB, wrong
-
-
-@pytest.mark.parametrize("blob", [BLOB, REPEATING])
-def test_kernel_and_python_agree_on_random_damage(probes: Probes, blob: bytes) -> None:
-    rng = np.random.default_rng(3)
-    accepted = 0
-    for _ in range(3000):
-        damage = mutated(blob, rng)
-        try:
-            checked_blob(damage)
-            expected = 0
-        except ModelError:
-            expected = BAD_BLOB
-        outcome, message, _, _ = probes.blob_open(damage)
-        assert outcome == expected and bool(message) == bool(outcome), (expected, outcome, message)
-        accepted += outcome == 0
-    assert 100 < accepted < 2900  # both sides of the border were visited

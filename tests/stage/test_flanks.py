@@ -105,28 +105,6 @@ def test_unloaded_te_is_the_gap_of_the_modified_profile(
     assert np.ptp(by_hand) > 1e-6 and error < (40e-9 if "linear" in name else 12e-9)
 
 
-def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_and_the_largest_gap(
-    spec: Stage, bodies: list[Body], pair: PairGeometry
-) -> None:
-    """Whatever the pairs share: pressed further by more than the largest gap they would carry more than the load, by
-    less than the smallest less. Axes are held, so that the pinion's rolls have grown by te."""
-    modified = changed(spec, PROFILES["crowning"] | PROFILES["linear root relief"], PROFILES["slope"])
-    held = NO_CORNERS | {"effect.bearings": 0.0}
-    plain, found = (loaded_te(assemble(s, bodies), [302.0], 16, **held) for s in (spec, modified))
-    for p, te, nominal in zip(found.position, found.te[0], plain.te[0], strict=True):
-        pairs = Pair(spec, ()).rolls(p).values()
-        gaps = [
-            sum(
-                depth_by_hand(g, s, roll)
-                for g, s, roll in zip(modified.gears, pair.gears, (rolls[0] + te, rolls[1]), strict=True)
-            )
-            for rolls in pairs
-        ]
-        assert nominal + min(gaps) - 0.1e-6 < te < nominal + max(gaps) + 0.1e-6
-        if len(gaps) == 1:
-            assert te == pytest.approx(nominal + gaps[0], abs=0.1e-6)  # rows at rolls of the pair turned by the gap
-
-
 @pytest.mark.parametrize(
     ("effect", "pinion"),
     [("flank_deviations", PROFILES["slope"]), ("runout", {"eccentricity": Eccentricity(amount=20e-6)})],
@@ -165,17 +143,6 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     found = orders(revolution(model, teeth, 4, torque))
     print(f"amplitude {1e6 * found[1]:.4f} µm, twice a turn {1e6 * found[2]:.4f} µm")
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
-
-
-def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: Stage, bodies: list[Body]) -> None:
-    """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
-    e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
-    psi, pair = 0.7, spec.written.geometry
-    model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6, angle=psi)}), bodies)
-    te = revolution(model, 16, 4, 0.01)
-    phi = 2 * math.pi * np.arange(te.size) / te.size
-    expected = -20e-6 * np.sin(phi + psi + pair.alpha_wt)
-    assert np.abs(te - te.mean() - expected).max() < 0.1e-6
 
 
 @dataclass(frozen=True)
@@ -235,20 +202,6 @@ def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle
         print(f"{order}: {1e9 * found[order]:.2f} and {1e9 * true[order]:.2f} nm")
         assert found[order] == pytest.approx(true[order], rel=0.04, abs=0.4e-9)
         assert round(1e9 * found[order]) == int(nm)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("torque", [20.0, 200.0])
-def test_an_eccentric_helical_pinion_is_a_true_one_at_another_place(torque: float) -> None:
-    """To 1 ‰ of the eccentricity, and of the deflection what the line of contact is longer or shorter there: by
-    e/sin α_wt of the path of contact. Elastic rows have it at the nominal place (theory, 2.6)."""
-    spec, e = load_stage("helical_demo"), 20e-6
-    pair = spec.written.geometry
-    turn = Turn.of(spec, load_bodies(spec), 4, torque, e)
-    longer = e / math.sin(pair.alpha_wt) / (pair.path["E"] - pair.path["A"])
-    found, limit = np.abs(turn.eccentric - turn.true).max(), 1e-3 * e + longer * turn.true.mean()
-    print(f"{1e9 * found:.1f} nm, limit {1e9 * limit:.1f} nm, line {100 * longer:.2f} % longer")
-    assert found < limit and np.ptp(turn.true) > 35e-6
 
 
 # ---- wobble ----------------------------------------------------------------------------------------------------------

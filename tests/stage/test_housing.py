@@ -11,14 +11,13 @@ import pytest
 from housings import housing_of
 
 from gearfmu.body import load_bodies
-from gearfmu.body.body import Body, Node, rigid_rows
+from gearfmu.body.body import Body, rigid_rows
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.modes.housing import placed_housing
-from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.assemble import mount_sets
 from gearfmu.stage.assembly.ground_part import GroundPart
-from gearfmu.stage.assembly.groups import Group, Layout, Support, mount, node_directions
+from gearfmu.stage.assembly.groups import Group, Layout, mount, node_directions
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.te import statics_of
@@ -71,41 +70,6 @@ def with_feet(chosen: Stage, **springs: float) -> Stage:
     """The stage with other springs under every foot."""
     feet = (s.model_copy(update=springs) if s.body == "housing" else s for s in chosen.supports)
     return chosen.model_copy(update={"supports": tuple(feet)})
-
-
-def block(name: str, mass: float) -> GroundPart:
-    """A rigid body with one node at its origin."""
-    return GroundPart(
-        name=name,
-        mass=np.diag([mass] * 3 + [mass * 1e-2] * 3),
-        omega=np.zeros(0),
-        zeta=np.zeros(0),
-        nodes=(Node("node", "rigid", COMPONENTS, np.zeros(3)),),
-        rows=np.zeros((1, 6, 0)),
-        residual=np.zeros((6, 6)),
-    )
-
-
-def spring(name: str, first: int, second: int | None, stiffness: float) -> Support:
-    ends = (first, 0), None if second is None else (second, 0)
-    return Support(name, *ends, tuple(range(6)), np.eye(6) / stiffness, np.zeros(6))
-
-
-def test_two_masses_on_springs_by_hand() -> None:
-    """A rotor of 2 kg on 30 N/µm in a housing of 10 kg on 80 N/µm: ω² of k₁/m₁, (k₁ + k₂)/m₂, k₁²/(m₁ m₂)."""
-    m1, m2, k1, k2 = 2.0, 10.0, 30e6, 80e6
-    layout = Layout(
-        [block("rotor", m1), block("housing", m2)],
-        [(0,)],
-        [spring("bearing", 0, 1, k1), spring("mount", 1, None, k2)],
-        planar=False,
-    )
-    assert layout.freedoms(1) == (0, 1, 2, 3, 4, 5)  # it belongs to no rotor: nothing of it is a spin
-    a, b, c = k1 / m1, (k1 + k2) / m2, k1 * k1 / (m1 * m2)
-    root = np.sqrt(((a - b) / 2) ** 2 + c)
-    omega = mount(layout).omega
-    for wanted in (np.sqrt((a + b) / 2 - root), np.sqrt((a + b) / 2 + root)):
-        assert np.sum(np.abs(omega / wanted - 1) < 1e-12) >= 3  # along x, y and z
 
 
 def drawn_layout(body: Body, chosen: Stage | None = None) -> Layout:

@@ -12,9 +12,7 @@ from gearfmu.body import Body
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.tables.connections import ChainSpec
 
 LOAD = 302.0  # N·m on the pinion
 PITCH = 2 * math.pi / 24  # rad, of the wheel
@@ -38,16 +36,6 @@ def above(values: np.ndarray, harmonic: int) -> float:
     return float(np.sqrt(np.mean(np.fft.irfft(lines, values.size) ** 2)))
 
 
-def test_vanishes_with_the_load_and_grows_with_it(plain: StageModel) -> None:
-    """The unmodified rigid pair just touches at zero: what is left is compliance × force, positive under load."""
-    kernel = ready(plain)
-    torques = [1e-6, 1e-3, 1.0, 10.0, 80.0, LOAD, 600.0]
-    values = np.array([te(kernel, torque) for torque in torques])
-    assert np.all(values > 0) and np.all(np.diff(values, axis=0) > 0)
-    assert values[0].max() < 1e-12
-    assert np.allclose(values[1] / values[0], 1e3, rtol=1e-2)  # the local law is linear at vanishing force
-
-
 def test_overload_finds_its_equilibrium_everywhere(plain: StageModel, relieved: StageModel) -> None:
     """Fifteen times the largest torque: rows in single precision leave 1e-7 of the deflection undecided, no more."""
     for model in (plain, relieved):
@@ -67,13 +55,6 @@ def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageMode
     assert np.all(result.stage_stiffness[0] > 0.4 * result.stage_stiffness[1])
 
 
-def test_repeats_after_one_pitch_and_after_a_turn(plain: StageModel) -> None:
-    kernel = ready(plain)
-    once = te(kernel, LOAD)
-    for pitches in (1, -1, 24, 240):
-        assert np.allclose(te(kernel, LOAD, POSITIONS + pitches), once, rtol=1e-9, atol=0)
-
-
 def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair: PairGeometry) -> None:
     result = loaded_te(plain, [LOAD * 0.99, LOAD, LOAD * 1.01], 16)
     slope = 0.02 * LOAD / pair.gears[0].r_b / (result.te[2] - result.te[0])
@@ -91,34 +72,6 @@ def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -
     behind = 1 / soft.stage_stiffness - 1 / soft.mesh_stiffness
     expected = sum(1 / gear.bearing.stiffness for gear in spec.written.gears)
     assert np.median(behind) == pytest.approx(expected, rel=2e-2)
-
-
-def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
-    """What is dynamic at level full is residual at level rigid: the same static compliance, but where a tip corner
-    carries: its rows have a kink between two nodes of the tables."""
-    rigid = te(ready(plain, level=0.0), LOAD)
-    for level in (1.0, 2.0, 3.0):
-        found = te(ready(plain, level=level), LOAD) / rigid - 1
-        assert np.abs(found).max() < 2e-5 and np.median(np.abs(found)) < 2e-6
-
-
-def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[Body]) -> None:
-    """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
-    chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
-    ports = {shaft: port.model_copy(update={"chain": chain}) for shaft, port in spec.ports.items()}
-    chained = assemble(with_ports(spec, ports), bodies)
-    assert np.array_equal(loaded_te(chained, [LOAD], 5).te, loaded_te(plain, [LOAD], 5).te)
-
-
-def test_direction_of_approach_does_not_matter(relieved: StageModel) -> None:
-    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from
-    scratch."""
-    kernel, fresh = ready(relieved), te(ready(relieved), LOAD)
-    kernel.transmission(0.0, 600.0)
-    forwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS]
-    kernel.transmission(0.0, 1.0)
-    backwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS[::-1]][::-1]
-    assert np.allclose(forwards, fresh, rtol=0, atol=1e-10) and np.allclose(backwards, fresh, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
