@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from flank_rows import flank_rows, flank_supports
+from dense import OnGear, answer, group_answer, relative
 from handmade import on_axis
 
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
-from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part, read_tables
-from gearfmu.stage.assembly.groups import Layout, Support, mount, node_directions
-from gearfmu.stage.assembly.teeth import OFFSETS, resampling
+from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
+from gearfmu.stage.assembly.groups import Layout, Support, mount
+from gearfmu.stage.assembly.teeth import resampling
 
 STEEL = Steel(206e9, 0.3, 7850.0)
 SHAFTS = [
@@ -104,56 +104,6 @@ def test_a_train_of_two_shafts_has_the_frequencies_of_its_finite_elements():
         assert error.max() < {30e3: 1e-3, 120e3: 3e-5}[cut]
 
 
-def turn6(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    return np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
-
-
-def load_rows(shape, body, load, psi):
-    """(6,) rigid row of a load on a flank of an untilted gear, tooth at psi: normal, moment about the origin."""
-    _, flank, roll, degree = load
-    sign = (1, -1)[flank]
-    s = np.linspace(shape.s_form, shape.s_tip, 12)[roll]
-    t = psi + sign * (shape.psi_b - s / shape.r_b)
-    n = sign * np.array([-np.sin(t), np.cos(t), 0.0])
-    along = body.flank.face_width / 6 * (degree == 1)
-    about = np.array([-n[1], n[0], 0.0]) * along + np.array([0, 0, sign * shape.r_b]) * (degree == 0)
-    return np.concatenate([n * (degree == 0), about])
-
-
-def unreduced(layout, loads, rigid_of_load, compliance):
-    """Displacement at loads, and forces on the supports, of bodies with supports as unknown forces and every rotor's
-    spin held in the mass metric; loads on body 1."""
-    n, bodies = len(loads), len(layout.bodies)
-    c_ll, c_ln = compliance
-    support_rigid = np.hstack(
-        [node_directions(layout, b) @ np.vstack([node.rigid_rows for node in body.nodes])
-         for b, body in enumerate(layout.bodies)]
-    )  # fmt: skip
-    yields = sl.block_diag(*[s.compliance for s in layout.supports])
-    for b, body in enumerate(layout.bodies):
-        rows = body.rows.reshape(6 * len(body.nodes), body.omega.size)
-        static = body.residual + rows / body.omega**2 @ rows.T
-        yields = yields + node_directions(layout, b) @ static @ node_directions(layout, b).T
-    spins = np.zeros((6 * bodies, len(layout.rotors)))
-    for r, rotor in enumerate(layout.rotors):
-        for b in rotor:
-            spins[6 * b : 6 * b + 6, r] = layout.bodies[b].mass[5]
-    rigid = np.zeros((n, 6 * bodies))
-    rigid[:, 6:12] = rigid_of_load
-    c_ls = c_ln @ node_directions(layout, 1).T
-    s, r = len(yields), len(layout.rotors)
-    system = np.block(
-        [[np.zeros((6 * bodies, 6 * bodies)), support_rigid.T, spins], [support_rigid, yields, np.zeros((s, r))],
-         [spins.T, np.zeros((r, s + r))]]
-    )  # fmt: skip
-    scale = 1 / np.sqrt(np.abs(system).max(axis=1))
-    right = -np.vstack([rigid.T, c_ls.T, np.zeros((r, n))])
-    found = scale[:, None] * np.linalg.solve(scale[:, None] * system * scale, scale[:, None] * right)
-    x, force = found[: 6 * bodies], found[6 * bodies : 6 * bodies + s]
-    return rigid @ x + c_ll + c_ls @ force, -force
-
-
 LOADS = [(0, 0, 3, 0), (0, 0, 8, 1), (1, 0, 9, 0), (-1, 1, 2, 2), (2, 1, 5, 1)]
 
 
@@ -161,7 +111,7 @@ LOADS = [(0, 0, 3, 0), (0, 0, 8, 1), (1, 0, 9, 0), (-1, 1, 2, 2), (2, 1, 5, 1)]
 def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair, held, angle):
     """Statics in space: gear of finite elements, rigid seat, stepped shaft, two bearings with tilt, disc on the same
     shaft."""
-    body, shape, rolls, step = bodies[0], pair.gears[0], 12, 2 * np.pi / 16
+    body, shape, rolls = bodies[0], pair.gears[0], 12
     grid, degrees = resampling(body.flank.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
     gear = ground_part(body, Reading(np.arange(body.modes), degrees, grid))
     shaft = ground_part(reduce_shaft(SHAFTS[1], 60e3, damping_ratio=0.01))
@@ -170,29 +120,11 @@ def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair
     layout = Layout([shaft, gear, disc("disc", *DISCS[2][2:])], [(0, 1, 2)], supports, planar=False)
     if held:
         layout = Layout(layout.bodies, layout.rotors, [s.hold() for s in supports], planar=False)
-    group, flank = mount(layout), gear.flank
-    rigid = np.array([load_rows(shape, body, load, angle + load[0] * step) for load in LOADS])
-    c_ll = np.zeros((len(LOADS), len(LOADS)))
-    c_ln, e, c_fs, residual = np.zeros((len(LOADS), 6)), [], [], np.zeros_like(c_ll)
-    rows, to_supports = flank_rows(group, 1), flank_supports(group, 1)
-    for i, (j, f, p, a) in enumerate(LOADS):
-        e.append(read_tables(rows[:, f, p, a], angle + j * step))
-        c_fs.append(read_tables(to_supports[:, f, p, a], angle + j * step))
-        c_ln[i] = turn6(angle + j * step) @ (grid[p] @ body.flank.node[f, :, a])
-        for k, (m, g, q, b) in enumerate(LOADS):
-            c_ll[i, k] = grid[p] @ body.flank.static[f, g, (m - j) % body.flank.static.shape[2], :, :, a, b] @ grid[q]
-            residual[i, k] = flank.residual[f, g, OFFSETS.index(m - j), p, q, a, b]
-    want, want_force = unreduced(layout, LOADS, rigid, (c_ll, c_ln))
-    w, c_fs = rigid @ group.rigid(1) + np.array(e), np.array(c_fs)
-    q = w.T / group.omega[:, None] ** 2
-    have = residual - c_fs @ group.kappa @ c_fs.T + w @ q
-    force = group.kappa @ (group.support_rows @ q + c_fs.T)
-    scale = np.sqrt(np.diag(want))
-    error = np.abs((have - want) / np.outer(scale, scale)).max()
-    force_error = np.abs(force - want_force).max() / np.abs(want_force).max()
-    print(f"gear on shaft, held {held}, angle {angle}: displacement {error:.1e}, forces {force_error:.1e}")
-    print(f"  lowest {group.omega[0] / 6.2832:.0f} Hz, highest {group.omega[-1] / 6.2832:.2e} Hz")
-    assert error < 1e-8 and force_error < 1e-8
+    group, on_gear = mount(layout), OnGear(1, body, shape, LOADS, angle, degrees, rolls)
+    want, want_force = answer(layout, on_gear.free(layout))
+    have, force = group_answer(group, on_gear.read(group))
+    assert relative(have, want) < 1e-8
+    assert np.abs(force - want_force).max() < 1e-8 * np.abs(want_force).max()
 
 
 def test_supports_that_leave_a_motion_free_leave_it_at_zero_frequency():
