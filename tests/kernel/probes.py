@@ -35,15 +35,11 @@ def compilers() -> dict[str, tuple[str, ...]]:
     return found
 
 
-def compile_probes(out: Path, command: Sequence[str] = ("cc",), flags: Sequence[str] = ()) -> Path:
+def compile_probes(out: Path) -> Path:
     """Compile the probe library with the project's flags, then `flags`; returns `out`."""
     files = [source_folder() / name for name in SOURCES] + sorted(HERE.glob("probe_*.c"))
-    return compile_c([*command, *FLAGS, "-fvisibility=default", "-fPIC", "-shared", *flags], files, out)
-
-
-def compile_c(command: Sequence[str], files: Sequence[Path], out: Path) -> Path:
-    """Compile and link C files that may include the kernel's headers; fails with the compiler's messages."""
-    line = [*command, f"-I{source_folder()}", "-o", str(out), *map(str, files), "-lm"]
+    line = ["cc", *FLAGS, "-fvisibility=default", "-fPIC", "-shared", f"-I{source_folder()}", "-o", str(out)]
+    line += [*map(str, files), "-lm"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, " ".join(line) + "\n" + done.stderr
     return out
