@@ -36,7 +36,7 @@ def compilers() -> dict[str, tuple[str, ...]]:
 
 
 def compile_probes(out: Path) -> Path:
-    """Compile the probe library with the project's flags, then `flags`; returns `out`."""
+    """Compile the probe library with the project's flags; returns `out`, fails with the compiler's messages."""
     files = [source_folder() / name for name in SOURCES] + sorted(HERE.glob("probe_*.c"))
     line = ["cc", *FLAGS, "-fvisibility=default", "-fPIC", "-shared", f"-I{source_folder()}", "-o", str(out)]
     line += [*map(str, files), "-lm"]

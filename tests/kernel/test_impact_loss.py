@@ -63,5 +63,4 @@ def test_the_loss_of_an_impact_is_that_of_the_exact_motion(steps: int, delay: fl
     h = CONTACT / steps
     damping = delay * h / COMPLIANCE
     exact, found = exact_loss(damping), losses(damping, h)
-    print(f"exact {exact:.4f}; {found.min():.4f} to {found.max():.4f}, mean {found.mean():.4f}")
     assert np.abs(found - exact).mean() < close / steps * exact

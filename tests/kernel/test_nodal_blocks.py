@@ -53,7 +53,6 @@ def test_rigid_blocks_are_a_spring_of_penalty_times_area(share: float, nodes: tu
     time, length = (np.arange(len(found)) + 1) * h, math.pi * math.sqrt(reduced / stiffness)
     peak = SPEED * math.sqrt(reduced * stiffness)
     exact = np.where(time < length, peak * np.sin(math.pi * time / length), 0.0)
-    print(f"force errs by {np.abs(found[:, 0] - exact).max() / peak:.1e} of its peak, {peak:.1f} N")
     assert time[-1] > length and np.abs(found[:, 0] - exact).max() < 1e-5 * peak
     left = SPEED * (MASSES[0] - MASSES[1]) / sum(MASSES)
     assert found[-1, 1] == pytest.approx(left, rel=1e-5)
@@ -71,7 +70,6 @@ def test_elastic_blocks_keep_momentum_and_energy() -> None:
     assert np.abs(momentum / (MASSES[0] * SPEED) - 1).max() < 1e-9
     assert np.abs(found[:, 2] / (0.5 * MASSES[0] * SPEED**2) - 1).max() < 1e-5
     drifts = [np.ptp(run(blob, h, round(4e-3 / h), names, integrator=CENTRAL)[:, 2]) for h in (16e-6, 4e-6)]
-    print(f"central drifts by {drifts} J, order {0.5 * math.log2(drifts[0] / drifts[1]):.2f}")
     assert 0.5 * math.log2(drifts[0] / drifts[1]) > 1.4
 
 

@@ -36,5 +36,4 @@ def test_the_product_solves_its_steps_as_well_as_the_double_build(
     """Worst of the cases: 2.4e-8; with a tolerance of 1e-5 7e-7, of 1e-3 1e-4."""
     found, wanted = (after_a_jump(library, torques, damping) for library in (None, double_library))
     error = np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)
-    print(f"{torques} N·m: force {error[0]:.1e}, te {error[1]:.1e} of the largest")
     assert error.max() < 1e-7

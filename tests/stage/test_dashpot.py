@@ -36,5 +36,4 @@ def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(relief_spec: 
     torque = 0.5 * relief_spec.written.torque_max
     have = own_path(assemble(relief_spec, bodies), torque)
     want = by_hand(relief_spec, bodies, 0.5 * torque / relief_spec.written.geometry.gears[0].r_b)
-    print(f"own path {have:.4e} m/N, at the pitch point {want:.4e}")
     assert have == pytest.approx(want, rel=0.1)

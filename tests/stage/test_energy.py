@@ -63,7 +63,6 @@ def test_invariant_holds_and_damping_never_adds(
     for law in case.laws:
         slices, h = case.slices[law % len(case.slices)], case.steps[law % len(case.steps)]
         line = energy.row(pair, name, case, (build, law, slices, h), {**SHORT, "libraries": libraries})
-        print(f"{name}, {build}: drift {line['drift']:.1e} ≤ {line['limit']:.0e}, growth {line['growth']:.1e}")
         assert energy.keeps(case, line)
 
 
@@ -80,7 +79,6 @@ def test_energy_of_free_flight_has_no_trend(relieved_free: FreePair, speed: floa
     stored = held - work
     assert not contact.any()
     trend = len(stored) * np.polyfit(np.arange(1, len(stored)), stored[1:], 1)[0]
-    print(f"{speed} rad/s: {trend / elastic:.1e}")
     assert abs(trend) < 4e-7 * elastic
 
 
@@ -127,7 +125,6 @@ def test_order_in_closed_contact(
         np.sqrt(np.mean((speeds(relieved_free, double_library, h, integrator) - converged) ** 2))
         for h in (0.8e-6, 0.4e-6)
     ]
-    print(f"errors {errors} rad/s")
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
@@ -139,7 +136,6 @@ def test_balance_of_a_loaded_damped_run(relieved: StageModel) -> None:
     trace = simulate(relieved, Steady(relieved, speed, LOAD), 0.06, 60e-6, {"level": FAST})
     stored, work, lost, left = (trace[f"energy.{name}"][1:] for name in ("stored", "work", "dissipated", "residual"))
     through = float(np.trapezoid(np.abs(trace["pinion.tau"] * trace["pinion.gear.w"]), trace.time))
-    print(f"through {through:.1f} J, net work {work[-1]:.4f} J, lost {lost[-1]:.4f} J, left {np.ptp(left):.2e} J")
     assert np.ptp(left) < 1e-5 * through and np.ptp(left) < 0.12 * work[-1]
     assert np.ptp(stored - work + lost - left) < 1e-9 * stored.max()
 

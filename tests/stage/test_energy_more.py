@@ -95,5 +95,4 @@ def test_runs_confirm_the_predicted_limit(relieved_free: FreePair) -> None:
     """Stable just below it; unstable some way above (the prediction is for the stiffest roll position)."""
     predicted = predicted_limit(started(relieved_free, Rattle(), {"level": FAST, "integrator": CENTRAL}))
     measured = measured_limit(relieved_free, FAST, predicted)
-    print(f"predicted {1e6 * predicted:.2f} µs, measured {1e6 * measured:.2f} µs")
     assert 0.95 * predicted < measured < 1.3 * predicted

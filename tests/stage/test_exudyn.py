@@ -32,7 +32,6 @@ def test_a_kicked_gear_whirls_as_in_exudyn(rotor: exudyn_rotor.Rotor) -> None:
             exudyn_rotor.difference(np.array(REFERENCE["ends"]), ends),
             exudyn_rotor.difference(np.array(REFERENCE["seen"]), seen),
         ]
-        print(known, found)
         assert found[0] < bore and found[1] < high
         assert known or min(found) > 0.08
 

@@ -101,7 +101,6 @@ def test_unloaded_te_is_the_gap_of_the_modified_profile(
     found = loaded_te(assemble(modified, bodies), [0.0], 24, **NO_CORNERS)
     by_hand = np.array([gap_by_hand(modified, pair, p) for p in found.position])
     error = np.abs(found.te[0] - by_hand).max()
-    print(f"{name}: te {1e6 * by_hand.min():.3f} to {1e6 * by_hand.max():.3f} µm, off by {1e9 * error:.2f} nm")
     assert np.ptp(by_hand) > 1e-6 and error < (40e-9 if "linear" in name else 12e-9)
 
 
@@ -141,7 +140,6 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     update = {"eccentricity": Eccentricity(amount=20e-6, angle=0.7)}
     model = assemble(changed(spec, *((update, {}) if gear == 0 else ({}, update))), bodies)
     found = orders(revolution(model, teeth, 4, torque))
-    print(f"amplitude {1e6 * found[1]:.4f} µm, twice a turn {1e6 * found[2]:.4f} µm")
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
 
 
@@ -199,7 +197,6 @@ def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle
     said = re.search(r"side bands of (\d+) and (\d+) nm beside mesh order 1, (\d+) and (\d+) nm beside order 2", page)
     assert said is not None and found[16] == pytest.approx(true[16], rel=1e-3)
     for order, nm in zip((15, 17, 31, 33), said.groups(), strict=True):
-        print(f"{order}: {1e9 * found[order]:.2f} and {1e9 * true[order]:.2f} nm")
         assert found[order] == pytest.approx(true[order], rel=0.04, abs=0.4e-9)
         assert round(1e9 * found[order]) == int(nm)
 
@@ -265,7 +262,6 @@ def test_a_topography_is_the_same_flank_as_its_closed_form(
         np.linspace(shape.s_form, shape.s_tip, rolls),
         np.linspace(-gear.face_width / 2, gear.face_width / 2, places),
     )
-    print(f"largest difference on the grid {np.abs(field - by_formula.T).max():.1e} m")
     assert teeth == 1 and np.abs(field - by_formula.T).max() < 1e-15 and "lead0" in closed
     same = [loaded_te(model, [302.0], 8).te[0] for model in (measured, designed)]
     assert same[0] == pytest.approx(same[1], rel=1e-9)
@@ -280,7 +276,6 @@ def test_one_tooth_of_a_topography_is_met_once_a_turn(tmp_path: Path, spec: Stag
     model = assemble(changed(spec, {"topography": str(tmp_path / "teeth.csv")}), bodies)
     te = revolution(model, 16, 8, 0.01)
     met = np.flatnonzero(te < -4.99e-6)
-    print(f"{met.size / 8:.2f} pitches long, at pitches {met.min() / 8:.2f} to {met.max() / 8:.2f}")
     assert 8 < met.size < 14 and np.all(np.diff(met) == 1) and te.min() > -5.01e-6
     assert te[(met.max() + 8) % 128 : met.min() - 8] == pytest.approx(0.0, abs=0.2e-6)
     other = revolution(model, 16, 2, -0.01)
@@ -312,7 +307,6 @@ def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
                     x = 2 * (roll - shape.s_form) / (shape.s_tip - shape.s_form) - 1
                     gaps.append(20e-6 * x**2)
         found.append(min(gaps))
-    print(f"te {1e6 * te} µm, by hand {1e6 * np.array(found)}")
     assert te == pytest.approx(found, abs=0.3e-6)
 
 

@@ -21,6 +21,5 @@ def test_sampled_forces_are_of_second_order(relieved: StageModel) -> None:
         wanted = exact[name][51:]
         error = {h: np.abs(run[name][51:] - wanted) for h, run in runs.items()}
         scale = np.std(wanted)
-        print(name, {h: (100 * np.sqrt(np.mean(e**2)) / scale, 100 * np.median(e) / scale) for h, e in error.items()})
         assert np.sqrt(np.mean(error[1.25e-6] ** 2)) < np.sqrt(np.mean(error[5e-6] ** 2)) / 6
         assert np.median(error[5e-6]) < 0.015 * scale

@@ -171,7 +171,6 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
         kernel.set("pinion.w", 0.0)
 
     found = swing(spec, blob, kernel, turn, lambda angle: 0.5 * stiffness * (angle - outer) ** 2, 10000)
-    print(f"error {found.error:.1e} of the first swing, {found}")
     assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
@@ -200,7 +199,6 @@ def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: Stage, bodies:
     about where the wheel lifts it to: its torque is set before each step for the angle in its middle."""
     blob, kernel, fall, hangs = pendulum(spec, bodies, 7.5)
     found = swing(spec, blob, kernel, fall, lambda angle: -WEIGHT * math.cos(TIMES * (angle - hangs)), 30000)
-    print(f"error {found.error:.1e} of the first swing, {found}")
     assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
@@ -241,7 +239,6 @@ def test_below_the_limit_of_friction_nothing_moves(spec: Stage, bodies: list[Bod
         kernel.step(i * 1e-3, 1e-3)
         slid.append(s_a * kernel.get("pinion.gear.phi") + s_b * kernel.get("wheel.gear.phi"))
     free, lost = 0.1e-3 * s_a, kernel.get("mesh.friction_loss")
-    print(f"slid {np.ptp(slid):.1e} m in 0.1 s, of {free:.1e} m without friction; lost {lost:.1e} J")
     drift = abs(np.mean(slid[50:]) - np.mean(slid[:50]))
     assert abs(lost) < 1e-12 and drift < 2e-4 * free  # it yields and rings, undamped
     assert np.ptp(slid) < 3e-3 * free  # 2.4e-3 at 1 ms, what shorter steps converge to: 2.3e-3 … 2.4e-3
@@ -261,9 +258,6 @@ def test_friction_takes_what_the_energy_loses(pair_free: FreePair, start: Rattle
     """Mesh damping off, frozen position: stored energy and what friction took are constant; it never grows."""
     kernel = started(pair_free, start, {**RIGID, "h": h, "friction_coefficient": 0.1})
     found = energies(kernel, h, 0.02)
-    print(
-        f"drift {found.drift:.1e}, growth {found.growth:.1e}, lost {found.dissipated[-1]:.2e} of {found.kinetic:.2e} J"
-    )
     highest = np.max(found.total - np.minimum.accumulate(found.total)) / found.kinetic
     assert found.drift < 1e-5 and highest < 5e-5 * found.stored[0] / found.kinetic + 1e-6
     assert found.dissipated[-1] > 1e-4 * found.kinetic
@@ -286,7 +280,6 @@ def test_force_across_the_line_of_action_jumps_at_the_pitch_point(spec: Stage, b
         np.polyval(np.polyfit(after, across[after], 1), at) - np.polyval(np.polyfit(before, across[before], 1), at)
     )
     force = 2 * mu * trace["mesh.force"][at - 360 : at + 360].mean()
-    print(f"{rpm} rpm: {jump:.2f} N, 2 µ F {force:.2f} N")
     assert jump == pytest.approx(force, rel=0.01)
 
 
@@ -309,7 +302,6 @@ def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: Stage, bodies: 
     """A spur pair with a constant coefficient: teeth that yield share the load more gently than evenly, so that the
     run loses less, but not by a tenth."""
     found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
-    print(found.columns())
     assert found.meshes["mesh"].coefficient == pytest.approx(0.05, rel=0.02) and found.retried_steps == 0
     assert found.lost == pytest.approx(found.closed, rel=0.1)
     assert 0.98 < found.efficiency < 1.0

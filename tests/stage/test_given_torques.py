@@ -75,7 +75,6 @@ def test_a_pair_braked_by_its_speed_is_of_second_order(pair: StageModel) -> None
     exact = braked(pair, 0.625e-6)
     errors = [np.sqrt(np.mean((braked(pair, h) - exact) ** 2)) for h in (10e-6, 2.5e-6)]
     order = math.log(errors[0] / errors[1], 4)
-    print(f"errors {np.array(errors) / exact.std()} of the ripple, order {order:.2f}")
     assert order > 1.7
 
 
@@ -94,5 +93,4 @@ def test_energy_is_kept_under_torques_that_jump(pair: StageModel, level: float) 
         kernel.step(i * h, h)
         left.append(kernel.get("energy.residual"))
         stored.append(kernel.get("energy.stored"))
-    print(f"residual {np.ptp(left):.1e} J of {max(stored):.3f} J")
     assert np.ptp(left) < 1e-6 * max(stored) and kernel.get("solver.retried_steps") == 0

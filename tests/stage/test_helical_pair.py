@@ -60,7 +60,6 @@ def test_axial_force_is_the_tangential_one_times_tan_beta(
     tangential = torque / (gear.m_t * gear.z / 2)
     (pinion, _), (wheel, _) = (support(kernel, shaft) for shaft in SHAFTS)
     normal = abs(torque) / (gear.r_b * math.cos(gear.beta_b))
-    print(f"F_t {tangential:.3f} N, axial {pinion[2]:.4f} N, F_t tan β {tangential * math.tan(gear.beta):.4f} N")
     assert abs(kernel.get("mesh.force")) == pytest.approx(normal, rel=1e-6)
     assert pinion[2] == pytest.approx(tangential * math.tan(gear.beta), rel=1e-6)
     assert wheel[2] == pytest.approx(-pinion[2], rel=1e-6)
@@ -104,7 +103,6 @@ def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Bod
     assert np.allclose(slices_at_rest(assemble(slope(-f), bodies), TORQUE), turned[::-1], rtol=1e-6)
     for change, share in (("out_of_plane", math.cos(alpha)), ("in_plane", math.sin(alpha))):
         found = [slices_at_rest(assemble(misaligned(**{change: sign * f / share}), bodies), TORQUE) for sign in (1, -1)]
-        print(np.round(turned), np.round(found[0]), np.round(found[1]))
         assert min(np.abs(f - turned).max() for f in found) < 2e-3 * even.sum(), change
 
 
@@ -122,7 +120,6 @@ def test_a_slice_past_the_end_of_its_flank_carries_by_its_tip_edge(demo: SimpleN
         kernel.prepare()
         forces = kernel.transmission(-turn * gear.r_b / pair.gears[1].r_b, TORQUE).forces
         pair_forces = next(np.array(f) for f in forces.values() if f[4] > 0 and f[9] == 0 and f[0] > 0)
-        print(edges, np.round(pair_forces))
         carried.append(pair_forces[5] / pair_forces[4])
     assert carried[0] > 0.1 and carried[1] == 0
 

@@ -78,6 +78,5 @@ def test_a_pin_carries_the_moment_that_tilts_its_planet(name: str) -> None:
         about_tangent = moment @ [-math.sin(angle), math.cos(angle)]
         about_radius = moment @ [math.cos(angle), math.sin(angle)]
         z_s, z_r = (centroid(kernel, f"{gear}_planet{k + 1}") for gear in ("sun", "ring"))
-        print(about_tangent / by_hand, about_radius / by_hand, 1e3 * z_s, 1e3 * z_r)
         assert about_tangent == pytest.approx(by_hand + force * math.tan(alpha) * (z_s - z_r), abs=tangent * by_hand)
         assert about_radius == pytest.approx(force * (z_s + z_r), abs=radius * by_hand)

@@ -105,7 +105,6 @@ def test_gap_is_the_distance_of_two_involutes(stage: Stage, mesh: RingMesh, inne
             worst, count = max(worst, abs(distance - (place.gap - allowance))), count + 1
             assert near.x[0] == pytest.approx(place.roll[0], abs=2e-6)
             assert place.curvature == pytest.approx(1 / place.roll[0] - 1 / place.roll[1], rel=1e-9)
-    print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 6 and worst < 1e-10
 
 
@@ -151,7 +150,6 @@ def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
             assert near.x == pytest.approx(place.roll[o], abs=2e-6)
             own = place.curvature - HOLLOW[o] / place.roll[o]
             assert HOLLOW[c] / mesh.gears[c].s_tip - 1e-9 < own < 1 / mesh.gears[c].tip_edge + 1e-9
-    print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 3 and worst < 1e-9
 
 
@@ -172,7 +170,6 @@ def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMe
     load = force / width
     beta = 2 * a / (1 / roll - 1 / (roll + mesh.length))
     local = load * (a * (math.log(4 * COARSE.strip_half_width) - 1) - 0.5 * a * math.log(beta * load))
-    print(f"te {1e6 * result.te[0, alone]:.3f} µm, on paper {1e6 * (force * total + local):.3f} µm")
     assert result.te[0, alone] == pytest.approx(force * total + local, rel=4e-3)  # slices share unevenly
 
 
@@ -210,5 +207,4 @@ def test_loaded_te_against_an_independent_program(tmp_path: Path) -> None:
         theirs = {float(row["position"]): float(row["te_um"]) for row in rows if float(row["torque_Nm"]) == torque}
         places = [round(benchmark.POSITIONS * position) for position in theirs]
         means = np.mean(list(theirs.values())), 1e6 * np.mean(ours.te[k, places])
-        print(f"{torque} N·m, {len(theirs)} positions: {means[0]:.3f} and {means[1]:.3f} µm")
         assert len(theirs) >= 4 and means[1] == pytest.approx(means[0], rel=0.03)

@@ -146,10 +146,8 @@ def test_the_limits_themselves_are_taken_and_nothing_beyond(number: Number) -> N
         said = [p for p in number.problems(limit) if "out of range" in p.remedy]
         assert not said, said
         for off in (1e-6, 1e6):
-            beyond = outwards * (
-                math.ceil(off) if isinstance(number.annotation, Whole) else off * (abs(limit) or own.high)
-            )
-            (problem,) = number.problems(limit + beyond)
+            beyond = math.ceil(off) if isinstance(number.annotation, Whole) else off * (abs(limit) or own.high)
+            (problem,) = number.problems(limit + outwards * beyond)
             assert problem.file == FILE and names.get(problem.field, problem.field).startswith(number.field)
             assert f"must be from {own.shown(own.low)} to {own.shown(own.high)}; {own.remedy}" in problem.remedy
 
@@ -194,7 +192,7 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
     assert start.remedy.startswith("too near the end of the flank: at least 0.006")
 
 
-def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file(tmp_path: Path) -> None:
+def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file() -> None:
     from gearfmu.stagefile.checks.stage import stage_problems
 
     stage = gf.load("two_stage")

@@ -70,9 +70,6 @@ def test_free_rattle_keeps_its_energy_and_its_backlash(
         stored, te = trace["energy.stored"][1:], trace["mesh.te"]
         drift = np.ptp(stored) / stored[0]
         impacts.append(trace["mesh.impacts"][-1])
-        print(
-            f"{impacts[-1]} impacts, energy within {drift:.1e}, te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm"
-        )
         assert trace.meta["outcome"] == "completed" and trace["solver.retried_steps"][-1] == 0
         assert drift < 1.5e-3
         assert trace["mesh.force_drive"].max() > 100 and trace["mesh.force_coast"].max() > 100

@@ -140,7 +140,6 @@ def test_invariant_holds(name: str, carrier: float) -> None:
     """T1 to T6. States in single precision: 6e-7 of what is stored at the start; where the carrier turns that is mostly
     its rotation, 20 J, of which 3e-7 are left: coupled engagements balance theirs to 1e-6."""
     found = energies(started(CASES[name], carrier), STEPS, H)
-    print(f"{name}, {carrier:g} rad/s: {found}")
     assert found.drift < (2e-6 if carrier == STANDING else 1e-6)
     assert found.changes >= CASES[name].changes and found.retried_steps == 0
 
@@ -150,7 +149,6 @@ def test_invariant_holds(name: str, carrier: float) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_invariant_holds_in_double(double_library: Path, name: str, carrier: float) -> None:
     found = energies(started(CASES[name], carrier, library=double_library), STEPS, H)
-    print(f"{name}, {carrier:g} rad/s: {found}")
     assert found.drift < 1e-8 and found.retried_steps == 0
 
 
@@ -159,7 +157,6 @@ def test_invariant_holds_in_double(double_library: Path, name: str, carrier: flo
 def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: str) -> None:
     """T7: a single pass over the eight engagements. T8: without the scalar."""
     found = energies(started(CASES[name], STANDING, library=variant(tmp_path, "control", edits)), STEPS, H)
-    print(found)
     assert found.drift > 1e-4
 
 
@@ -173,7 +170,6 @@ def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: 
 def test_damping_never_adds(name: str, carrier: float) -> None:
     """T9: contact dashpots, modal damping and the dashpots of all supports."""
     found = energies(started(CASES[name], carrier, DAMPED, damped=True), STEPS, H)
-    print(found)
     assert found.growth < (2e-5 if carrier == STANDING else 1e-7)
 
 
@@ -187,7 +183,6 @@ def test_a_torque_that_changes_leaves_no_step_unsolved(level: float) -> None:
     for i in range(60):
         kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2)
         kernel.step(i * 2e-5, 2e-5)
-    print(kernel.get("solver.retried_steps"), kernel.get("solver.iterations"))
     assert kernel.get("solver.retried_steps") == 0 and kernel.get("solver.iterations") < 50 * kernel.get("solver.steps")
 
 
@@ -198,5 +193,4 @@ def test_a_pair_that_enters_in_penetration_leaves_no_step_unsolved() -> None:
     everything = {name: 1.0 for name in CONSERVING if name.startswith("effect.")}
     kernel = started(case, TURNING, everything, damped=True)
     found = energies(kernel, 300, H)
-    print(found)
     assert found.retried_steps == 0 and found.changes > 10

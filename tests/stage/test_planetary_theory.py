@@ -51,9 +51,6 @@ def test_natural_frequencies_are_those_of_lin_and_parker(planets: int) -> None:
     printed = np.sort(lin_parker.published()["published"][str(planets)])
     on_paper, paper_shapes = lin_parker.modes(*lin_parker.matrices(KNOWN, rigid.angles()))
     assert found.size == printed.size and found[0] < 0.01
-    print(
-        f"{np.abs(found[1:] / printed[1:] - 1).max():.1e} from print, {np.abs(found[1:] / on_paper[1:] - 1).max():.1e}"
-    )
     assert np.allclose(found[1:], printed[1:], rtol=5e-4)
     assert np.allclose(found[1:], on_paper[1:], rtol=2e-7)
     classes = [lin_parker.class_of(shape, planets) for shape in shapes.T]
@@ -229,7 +226,6 @@ def test_mean_torques_balance() -> None:
         kernel.step(step * i, step)
         found[i] = kernel.get("sun.tau_mean"), kernel.get("bearing.ring.mz_mean")
     sun, mounts = found[-1000:].mean(axis=0)
-    print(sun, mounts, sun + mounts - torque, sun - torque / rigid.ratio)
     assert sun + mounts == pytest.approx(torque, rel=1e-6)
     assert sun == pytest.approx(torque / rigid.ratio, rel=1e-6)
 
@@ -301,7 +297,6 @@ def test_a_free_set_keeps_energy_momentum_and_angular_momentum() -> None:
     time = 2 * H * np.arange(1, len(found) + 1)
     left = uniform - np.stack([np.polyval(np.polyfit(time, one, 1), time) for one in uniform.T], axis=1)
     size = FREE.sun.mass * np.abs(central[:, 0]).max()
-    print(np.abs(left).max() / size, np.abs(moment - uniform).max() / size)
     assert np.abs(left).max() < 1e-5 * size
 
 
@@ -323,6 +318,5 @@ def test_a_sun_in_free_flight_moves_straight_on(coriolis: float) -> None:
     bent = np.diff(place, 2)[flies] / step**2 + (stiffness / rigid.sun.mass + speed**2) * here
     off = 2j * speed * velocity + 2 * speed**2 * here
     size = np.abs(off).max()
-    print(flies.sum(), np.abs(bent).max() / size, np.abs(bent - off).max() / size)
     assert flies.sum() > 200
     assert np.abs(bent - (0.0 if coriolis else off)).max() < 0.01 * size

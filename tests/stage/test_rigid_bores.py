@@ -59,7 +59,6 @@ def test_te_takes_rigid_bores_and_leaves_the_bodies_of_the_stage_alone(
     rigid = mean_te(stage, "--bore", "rigid")
     assert "bores rigid" in capsys.readouterr().out
     made = {path: path.stat().st_mtime_ns for path in (stage.parent / "bores_rigid").glob("*.h5")}
-    print(f"averaging {averaged:.3f}, rigid {rigid:.3f} µm: {100 * (rigid / averaged - 1):.2f} %")
     assert -0.06 < rigid / averaged - 1 < -0.03
     assert mean_te(stage, "--bore", "averaging") == averaged  # what the stage file says anyway
     assert mean_te(stage, "--bore", "rigid") == rigid

@@ -53,7 +53,6 @@ def test_mean_values_are_those_of_the_load(steady: Trace, relieved: StageModel, 
     samples = steady.time > SETTLED
     force = pair.gears[0].r_b * steady["mesh.force_mean"][samples].mean()
     te, static = steady["mesh.te"][samples].mean(), loaded_te(relieved, [LOAD], 64).te.mean()
-    print(f"mean torque {force:.2f} N·m, te {1e6 * te:.3f} µm, quasi-static {1e6 * static:.3f} µm")
     assert force == pytest.approx(LOAD, rel=5e-3) and te == pytest.approx(static, rel=5e-3)
     assert steady["wheel.tau_mean"][samples].mean() == pytest.approx(-LOAD * 24 / 16, rel=5e-3)
 
@@ -66,10 +65,9 @@ def test_te_is_what_its_name_says(steady: Trace, pair: PairGeometry) -> None:
 
 
 def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, Trace]) -> None:
-    for scheme, name in ((DG4, "dg4"), (EM, "em"), (RK45, "rk45")):
+    for scheme in (DG4, EM, RK45):
         trace = run(relieved, 0.03, integrator=scheme, h=H / 64)
         te, force = error(trace, fine[FAST], "mesh.te"), error(trace, fine[FAST], "mesh.force")
-        print(f"{name}: te {te:.2%}, force {force:.2%} of the alternating part")
         # rk45 reads the closing speed from the coordinates, the steps from the path's deflection: they differ by what
         # the rows' own motion along the flank adds (decisions.md)
         assert te < 5e-3 and force < (5e-2 if scheme == RK45 else 2e-2)
@@ -78,9 +76,7 @@ def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, 
 def test_rk45_without_contact_dashpots_is_the_same_model(relieved: StageModel) -> None:
     off = {"effect.contact_damping": 0.0}
     step, paper_way = (run(relieved, 0.01, integrator=scheme, h=H / 64, **off) for scheme in (DG4, RK45))
-    te = error(paper_way, step, "mesh.te")
-    print(f"te {te:.3%}")
-    assert te < 1e-3
+    assert error(paper_way, step, "mesh.te") < 1e-3
 
 
 @pytest.mark.parametrize("level", [RIGID, FAST])
@@ -88,7 +84,6 @@ def test_dg4_is_of_second_order_in_a_turning_mesh(relieved: StageModel, fine: di
     steps = H / np.array([8, 16, 32, 64])
     errors = [error(run(relieved, 0.03, level=level, h=h), fine[level], "mesh.te") for h in steps]
     order = np.polyfit(np.log(steps[1:]), np.log(errors[1:]), 1)[0]  # at 7.5 µs two errors cancel in part
-    print(f"level {level}: te errors {', '.join(f'{e:.2%}' for e in errors)} at 7.5 … 0.94 µs, order {order:.2f}")
     assert order > 1.7 and errors[0] < 2e-2
 
 

@@ -94,7 +94,6 @@ def test_te_hardly_depends_on_the_number_of_slices(torque: float, mean: float, s
     by width functions alone 20 and 35 %."""
     found = [loaded_te(involute(), (torque,), 16, slices=float(n), **HELD).te[0] for n in (5, 7, 10)]
     means, swings = [te.mean() for te in found], [np.ptp(te) for te in found]
-    print(means, swings)
     assert max(means) < (1 + mean) * min(means) and max(swings) < (1 + swing) * min(swings)
 
 

@@ -81,10 +81,6 @@ def test_smooth_over_the_pitch(name: str, torque: float, spec: Stage, relief_spe
     chosen = {"relieved": relief_spec, "plain": spec}[name]
     grids = [assemble(chosen, bodies), assemble(chosen, bodies, rolls=64)]
     once, twice = (te(ready(model), torque, np.arange(1024) / 1024) for model in grids)
-    print(
-        f"{name} {torque:g} N·m: above 12th harmonic {1e6 * above(once, 12):.4f} µm rms, "
-        f"grid {1e6 * above(once - twice, 12):.4f} µm rms"
-    )
     assert above(once - twice, 12) < 0.02e-6 and np.std(once - twice) < 0.05e-6
     if name == "relieved":
         assert above(once, 12) < 0.05e-6

@@ -100,7 +100,6 @@ def test_a_train_of_two_shafts_has_the_frequencies_of_its_finite_elements():
         seen = want[want < 6e3].size
         assert want[0] < 0.5 and have[0] < 0.5 and want[1] > 20  # one free rotation of the train
         error = np.abs(have[1:seen] / want[1:seen] - 1)
-        print(f"two-shaft train, shafts to {cut / 1e3:g} kHz: {seen - 1} frequencies, largest error {error.max():.1e}")
         assert error.max() < {30e3: 1e-3, 120e3: 3e-5}[cut]
 
 
