@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven import stepped
 from exact_bars import Bar, impact
 from small_model import bars_blob
 
@@ -38,12 +39,9 @@ def test_exact_impact(system_library: Path, one: int, two: int, n: int) -> None:
     parameters = {"left.w_start": 1.0, "h": h, "level": 3, "effect.hertz": 0}
     kernel = Kernel(blob, parameters, system_library)
     kernel.initialize()
-    found = []
-    for i in range(int(6 * max(one, two) / shorter * STEPS_PER_CELL * n)):
-        kernel.step(i * h, h)
-        found.append((kernel.get("mesh.force"), kernel.get("mesh.force_mean")))
+    steps = int(6 * max(one, two) / shorter * STEPS_PER_CELL * n)
+    force, mean = stepped(kernel, steps, h, "mesh.force", "mesh.force_mean").T
     assert kernel.get("solver.retried_steps") == 0
-    force, mean = np.transpose(found)
     impulse = mean.sum() * h
     assert 1 - impulse / bars[0].mass == pytest.approx(exact.v1, abs=0.02)
     assert impulse / bars[1].mass == pytest.approx(exact.v2, abs=0.02)

@@ -7,8 +7,6 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from probes import Probes
 
 from gearfmu.stage.assembly.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, seal, write_blob
@@ -125,19 +123,6 @@ def test_a_section_that_repeats_another_has_its_contents(probes: Probes) -> None
     assert probes.blob_open(REPEATING)[0] == 0
     assert [probes.blob_sum(REPEATING, f"long{i}", F64) for i in range(3)] == 3 * [(LONG.sum(), 600)]
     assert len(REPEATING) < len(write_blob({"long0": LONG, "long1": LONG + 1.0}))
-
-
-@settings(max_examples=300)
-@given(st.binary(min_size=1, max_size=12))
-def test_utf8_verdict_is_python_s(probes: Probes, data: bytes) -> None:
-    blob = bytearray(write_blob({"t": "x" * len(data)}))
-    start = ENTRY.unpack_from(blob, HEADER.size)[4]
-    blob[start : start + len(data)] = data
-    try:
-        good = "\0" not in data.decode()
-    except UnicodeDecodeError:
-        good = False
-    assert (probes.blob_open(seal(bytes(blob)))[0] == 0) == good
 
 
 def test_every_unicode_boundary(probes: Probes) -> None:

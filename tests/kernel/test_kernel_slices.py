@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven import stepped
 from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
 
@@ -74,10 +75,7 @@ def kernel_run(two: tuple[FlatBody, FlatBody], block: FlatContact, integrator: i
     }
     kernel = Kernel(flat_blob("slices", two, block), parameters, library)
     kernel.initialize()
-    record = np.empty((STEPS, 3))
-    for i in range(STEPS):
-        kernel.step(i * H, H)
-        record[i] = [kernel.get(name) for name in ("mesh.force", "energy.stored", "energy.dissipated")]
+    record = stepped(kernel, STEPS, H, "mesh.force", "energy.stored", "energy.dissipated")
     assert kernel.get("solver.retried_steps") == 0
     return record
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import stepped
 from small_model import pair_blob, with_nodes
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
@@ -36,11 +37,7 @@ def run(blob: bytes, h: float, steps: int, names: tuple[str, ...], **parameters:
     """(steps, names) after every step; the left block is thrown against the right one."""
     kernel = Kernel(blob, {"level": PAPER, "contact": NODAL, "left.w_start": SPEED, "h": h} | parameters)
     kernel.initialize()
-    found = np.empty((steps, len(names)))
-    for i in range(steps):
-        kernel.step(i * h, h)
-        found[i] = [kernel.get(name) for name in names]
-    return found
+    return stepped(kernel, steps, h, *names)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -92,11 +89,7 @@ def test_a_model_with_nodes_that_are_not_asked_for_is_the_same() -> None:
 def _pair_run(blob: bytes, level: int, parameters: dict[str, float]) -> np.ndarray:
     kernel = Kernel(blob, {"level": level, "pinion.w_start": 200.0, "wheel.w_start": -133.0} | parameters)
     kernel.initialize()
-    found = []
-    for i in range(40):
-        kernel.step(i * 5e-6, 5e-6)
-        found.append([kernel.get(name) for name in ("mesh.force", "mesh.te", "energy.stored")])
-    return np.array(found)
+    return stepped(kernel, 40, 5e-6, "mesh.force", "mesh.te", "energy.stored")
 
 
 @pytest.mark.parametrize(

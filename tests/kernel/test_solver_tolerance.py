@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven import begun, stepped
 from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
@@ -18,14 +19,8 @@ RIGID = {"level": 0, "slices": 1, "integrator": EM, "effect.elastic": 0, "effect
 def after_a_jump(library: Path | None, torques: tuple[float, float], damping: float) -> np.ndarray:
     """Mesh force (N) and transmission error (m) of every step after a jump of the torque (N·m)."""
     kernel = Kernel(pair_blob(("torque", "fixed")), {**RIGID, "contact_damping": damping}, library)
-    kernel.set("pinion.tau", torques[0])
-    kernel.initialize()
-    kernel.set("pinion.tau", torques[1])
-    found = []
-    for i in range(STEPS):
-        kernel.step(i * STEP, STEP)
-        found.append([kernel.get("mesh.force"), kernel.get("mesh.te")])
-    return np.array(found)
+    begun(kernel, {"pinion.tau": torques[0]}).set("pinion.tau", torques[1])
+    return stepped(kernel, STEPS, STEP, "mesh.force", "mesh.te")
 
 
 @pytest.mark.parametrize("damping", [0.0, 2e4])

@@ -18,6 +18,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.scenefile.scene import Effects
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, costs, torque_on_flanks_alone
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
@@ -47,9 +48,7 @@ def free(spec: Stage, bodies: list[Body]) -> StageModel:
 
 
 def state(model: StageModel, position: float, torque: float, **parameters: float):
-    kernel = model.kernel(**{"level": RIGID, **parameters})
-    kernel.prepare()
-    return kernel.transmission(-position * PITCH, torque)
+    return statics_of(model, **parameters).transmission(-position * PITCH, torque)
 
 
 def te(model: StageModel, position: float, torque: float, **parameters: float) -> float:

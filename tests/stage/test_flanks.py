@@ -14,12 +14,10 @@ import pytest
 from by_hand import Pair
 
 from gearfmu.body import Body, load_bodies
-from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.relief import relief_at
-from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
-from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
@@ -338,22 +336,3 @@ def test_te_over_several_pitches_is_that_of_one_after_the_other(plain: StageMode
         single, double = getattr(one, name), getattr(two, name)
         assert double == pytest.approx(np.concatenate([single, single], axis=1), rel=1e-6, abs=1e-9)
     assert two.harmonics(3) == pytest.approx(one.harmonics(3), rel=1e-6)
-
-
-def test_the_kernel_refuses_what_are_no_deviations(spec: Stage, bodies: list[Body]) -> None:
-    update = {"profile": ProfileSpec(slope=4e-6), "eccentricity": Eccentricity(amount=5e-6)}
-    sections = read_blob(assemble(changed(spec, update), bodies).blob)
-    size, depth = np.asarray(sections["flank_size0"]), np.asarray(sections["flank0"])
-    wrong: dict[str, dict[str, Any]] = {
-        "sizes of the deviations": {"flank_size0": np.array([3, *size[1:]], np.int32)},
-        "flank has the wrong length": {"flank0": depth[:-1]},
-        "flank is out of range": {"flank0": depth + 1.0},
-        "runout is out of range": {"runout0": np.array([1.0, 0.0, 0.0, 0.0])},
-        "runout has the wrong length": {"runout0": np.zeros(3)},
-    }
-    for words, change in wrong.items():
-        with pytest.raises(ModelError, match=words):
-            Kernel(write_blob(sections | change))
-    for name in ("flank_size0", "flank0"):
-        with pytest.raises(ModelError, match="are not whole|wrong length"):
-            Kernel(write_blob({key: value for key, value in sections.items() if key != name}))

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from driven import begun, stepped
+from driven import begun
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
@@ -74,8 +75,7 @@ def with_bearings(spec: Stage) -> Stage:
 
 def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.ndarray:
     """Force of every slice, all tooth pairs together, N."""
-    kernel = model.kernel(**{"level": 0.0, "slices": slices, "effect.tip_contact": 0.0})
-    kernel.prepare()
+    kernel = statics_of(model, **{"slices": slices, "effect.tip_contact": 0.0})
     forces = kernel.transmission(0.0, torque).forces
     return np.sum([of_pair for (flank, _), of_pair in forces.items() if flank == 0], axis=0)
 
@@ -114,24 +114,8 @@ def test_a_slice_past_the_end_of_its_flank_carries_by_its_tip_edge(demo: SimpleN
     turn = roll / gear.r_b - gear.psi_b - pair.alpha_wt
     carried = []
     for edges in (1.0, 0.0):
-        kernel = involute.kernel(
-            **{"level": 0.0, "slices": slices, "effect.tip_contact": edges, "effect.bearings": 0.0}
-        )
-        kernel.prepare()
+        kernel = statics_of(involute, **{"slices": slices, "effect.tip_contact": edges, "effect.bearings": 0.0})
         forces = kernel.transmission(-turn * gear.r_b / pair.gears[1].r_b, TORQUE).forces
         pair_forces = next(np.array(f) for f in forces.values() if f[4] > 0 and f[9] == 0 and f[0] > 0)
         carried.append(pair_forces[5] / pair_forces[4])
     assert carried[0] > 0.1 and carried[1] == 0
-
-
-def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: StageModel) -> None:
-    """At rest they are the slices that `te` finds; in motion they add up to the mesh force."""
-    slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.written.contact.slices)]
-    kernel = begun(involute.kernel(level=1.0, **{"effect.tip_contact": 0.0}), {"pinion.tau": TORQUE})
-    assert f"mesh.slice_{len(slices) + 1}" not in kernel.variables
-    shares = np.array([kernel.get(name) for name in slices])
-    assert shares == pytest.approx(slices_at_rest(involute, TORQUE, len(slices)), rel=1e-3)
-    kernel.set("pinion.tau", 0.9 * TORQUE)
-    *parts, force = stepped(kernel, 40, 2e-5, *slices, "mesh.force").T
-    assert sum(parts) == pytest.approx(force, rel=1e-9) and np.ptp(force) > 0.05 * force.mean()
-    assert np.ptp(shares) > 0.2 * shares.mean()

@@ -10,7 +10,6 @@ from gearfmu.body import load_bodies
 from gearfmu.body.body import Body
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.run.trace import Trace
-from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 
 SET, HOUSED = "planetary54", "planetary54/stage_housed"

@@ -11,8 +11,8 @@ import pytest
 from gearfmu.body import Body
 from gearfmu.errors import SimulationError
 from gearfmu.geometry import PairGeometry
-from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
@@ -45,15 +45,9 @@ def rattle(
     return simulate(model, lambda time: {}, duration, 30e-6, {"level": FAST, "h": 5e-6, **start, **parameters})
 
 
-def ready(model: StageModel, **parameters: float) -> Kernel:
-    kernel = model.kernel(**{"level": 0.0, **parameters})
-    kernel.prepare()
-    return kernel
-
-
 def compliance(model: StageModel, positions: float | np.ndarray, torque: float, **parameters: float) -> np.ndarray:
     """te over torque, m/(N·m), at positions in pitches."""
-    kernel = ready(model, **parameters)
+    kernel = statics_of(model, **parameters)
     return np.array([kernel.transmission(-p * PITCH, torque).te / torque for p in np.atleast_1d(positions)])
 
 
@@ -105,7 +99,7 @@ def test_bearings_off(plain: StageModel) -> None:
 
 def test_backlash_is_what_the_coast_flank_is_away(plain: StageModel, pair: PairGeometry) -> None:
     backlash = np.array([0.0, 5e-5, 1e-4, 2e-4])
-    te = [ready(plain, backlash=j).transmission(0.0, -1e-3).te for j in backlash]
+    te = [statics_of(plain, backlash=j).transmission(0.0, -1e-3).te for j in backlash]
     assert np.allclose(te, -backlash * math.cos(pair.alpha_wt), rtol=1e-4, atol=1e-9)
 
 

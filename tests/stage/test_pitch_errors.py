@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from gearfmu.body import Body
-from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
-from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.assembly.blob import read_blob, write_blob
+from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stored import expected_hash
@@ -76,12 +74,3 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
     assert assemble(changed, bodies).hash != plain.hash
     none, own = (read_blob(m.blob) for m in (assemble(with_deviations(spec, {3: 0.0}, {}), bodies), plain))
     assert all(np.array_equal(none[name], own[name]) for name in own if name not in ("made_of", "guid"))
-
-
-def test_the_kernel_refuses_what_are_no_index_deviations(spec: Stage, bodies: list[Body]) -> None:
-    sections = read_blob(assemble(with_deviations(spec, {3: DEVIATION}, {}), bodies).blob)
-    angles = sections["index0"]
-    for wrong in (angles[:-1], np.append(angles, 0.0), np.full(angles.size, 0.1)):
-        with pytest.raises(ModelError, match="index has the wrong length|index deviations"):
-            Kernel(write_blob(sections | {"index0": wrong}))
-    assert Kernel(write_blob(sections | {"index0": -angles})).hash
