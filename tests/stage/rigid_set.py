@@ -2,8 +2,7 @@
 
 The spec is that of planetary54 with other teeth, places, springs and planets; what `assemble` reads of a reduced body
 is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard
-that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact. A helical tooth
-in more slices than width functions needs flanks of steel: without local compliance forces are not unique.
+that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,7 +52,7 @@ class Rigid:
 class RigidSet:
     """teeth of sun and planet; contact_ratio of both meshes; mesh (N/m): of one pair of teeth; ring_twist (N/m):
     stiffness against turning of the ring over the square of its base radius; torque (N·m) on the carrier: the static
-    load is small beside what the teeth would need to leave their places; youngs_modulus (Pa): of the flanks."""
+    load is small beside what the teeth would need to leave their places."""
 
     planets: int
     teeth: tuple[int, int] = (26, 34)
@@ -76,7 +74,6 @@ class RigidSet:
     width: float = WIDTH
     slices: int = 1
     functions: int = 1
-    youngs_modulus: float = HARD
 
     @property
     def transverse(self) -> tuple[float, float]:
@@ -154,7 +151,7 @@ class RigidSet:
 
     def _common(self, gear: Any) -> dict[str, Any]:
         """Hard material, no relief, sharp tips that give the contact ratio."""
-        material = gear.material.model_copy(update={"youngs_modulus": self.youngs_modulus})
+        material = gear.material.model_copy(update={"youngs_modulus": HARD})
         found: dict[str, Any] = {"material": material, "tip_edge_radius": EDGE, "tip_diameter": self._tip(gear.name)}
         found["face_width"] = self.width
         return found | ({} if gear.name == "ring" else {"tip_relief": None})
@@ -189,9 +186,9 @@ class RigidSet:
         return assemble(self.spec(), self.bodies(), rolls=4)
 
 
-def kernel_of(model: StageModel, library: Path | None = None, **parameters: float) -> Kernel:
+def kernel_of(model: StageModel, **parameters: float) -> Kernel:
     """Prepared: nothing but springs of the meshes, one slice."""
-    kernel = Kernel(model.blob, SPRINGS | parameters, library)
+    kernel = Kernel(model.blob, SPRINGS | parameters)
     kernel.prepare()
     return kernel
 

@@ -1,26 +1,35 @@
-"""The ground group of the pair: statics against the same bodies put together another way."""
+"""Ground groups against the same bodies put together another way: the pair, and an elastic gear on an elastic shaft."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from dense import OnGear, answer, group_answer, relative
+from handmade import on_axis
 
-from gearfmu.stage.assembly.groups import mount
+from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
+from gearfmu.stage.assembly.groups import Layout, Support, mount
 from gearfmu.stage.assembly.layout import stage_layout
-from gearfmu.stage.assembly.teeth import ROLLS
+from gearfmu.stage.assembly.teeth import ROLLS, resampling
 
-LOADS = [
-    (0, 0, 5, 0),
-    (0, 0, 30, 1),
-    (1, 0, 40, 0),
-    (-1, 0, 11, 2),
-    (2, 1, 20, 0),
-    (0, 1, 5, 0),
-]  # tooth, flank, roll, function
+# tooth, flank, roll, function
+LOADS = [(0, 0, 5, 0), (0, 0, 30, 1), (1, 0, 40, 0), (-1, 0, 11, 2), (2, 1, 20, 0), (0, 1, 5, 0)]
+IN_SPACE = [(0, 0, 3, 0), (0, 0, 8, 1), (1, 0, 9, 0), (-1, 1, 2, 2), (2, 1, 5, 1)]
 ANISOTROPIC = np.array([[4.0e-9, 1.5e-9], [1.5e-9, 2.5e-9]])
+
+STEEL = Steel(206e9, 0.3, 7850.0)
+SHAFTS = [
+    Shaft([Section(0.05, 0.03), Section(0.12, 0.04, 0.01), Section(0.03, 0.03)], STEEL, [0.01, 0.08, 0.19]),
+    Shaft([Section(0.09, 0.035), Section(0.11, 0.045)], STEEL, [0.01, 0.05, 0.14, 0.19]),
+]
+DISCS = [(0, 1, 0.9, 4e-4, 7e-4), (1, 1, 1.6, 1.0e-3, 1.9e-3), (1, 2, 0.5, 2e-4, 3.5e-4)]  # shaft, node, mass, I, J
+BEARINGS = [(0, 0), (0, 2), (1, 0), (1, 3)]
+BEARING = np.array([3e8, 2e8, 1e8, 4e4, 6e4])
+ALL = (0, 1, 2, 3, 4, 5)
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +55,62 @@ def test_statics_are_those_of_free_body_and_springs(layout, bodies, pair, index,
         assert relative(have, want) < 1e-8
         assert np.abs(have_force[own] - want_force[own]).max() < 1e-8 * np.abs(want_force).max()
         assert np.abs(np.delete(have_force, own, axis=0)).max() < 1e-12
+
+
+# ---- in space: shafts, seats, bearings with tilt ---------------------------------------------------------------------
+def disc(name, mass, across, polar):
+    """A rigid body: no modes, no residual."""
+    inertia = np.diag([mass, mass, mass, across, across, polar])
+    return GroundPart(name, inertia, np.zeros(0), np.zeros(0), on_axis(0.0), np.zeros((1, 6, 0)), np.zeros((6, 6)))
+
+
+def seat(name, first, second):
+    return Support(name, first, second, ALL, np.zeros((6, 6)), np.zeros(6))
+
+
+def bearing(name, first, stiffness=BEARING):
+    return Support(name, first, None, (0, 1, 2, 3, 4), np.diag(1 / stiffness), np.full(5, 1.0))
+
+
+def train(cut):
+    bodies = [ground_part(reduce_shaft(shaft, cut, None, f"shaft{i}", 0.01)) for i, shaft in enumerate(SHAFTS)]
+    bodies += [disc(f"disc{i}", *numbers) for i, (_, _, *numbers) in enumerate(DISCS)]
+    supports = [seat(f"seat{i}", (2 + i, 0), (s, node)) for i, (s, node, *_) in enumerate(DISCS)]
+    supports += [bearing(f"bearing{i}", end) for i, end in enumerate(BEARINGS)]
+    return Layout(bodies, [(0, 2), (1, 3, 4)], supports, planar=False)
+
+
+@pytest.mark.parametrize(("held", "angle"), [(False, 0.0), (False, 1.1), (True, 4.0)])
+def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair, held, angle):
+    """Statics in space: gear of finite elements, rigid seat, stepped shaft, two bearings with tilt, disc on the same
+    shaft."""
+    body, shape, rolls = bodies[0], pair.gears[0], 12
+    grid, degrees = resampling(body.flank.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
+    gear = ground_part(body, Reading(np.arange(body.modes), degrees, grid))
+    shaft = ground_part(reduce_shaft(SHAFTS[1], 60e3, damping_ratio=0.01))
+    supports = [seat("seat.gear", (1, 0), (0, 1)), seat("seat.disc", (2, 0), (0, 2))]
+    supports += [bearing("b1", (0, 0)), bearing("b2", (0, 3))]
+    layout = Layout([shaft, gear, disc("disc", *DISCS[2][2:])], [(0, 1, 2)], supports, planar=False)
+    if held:
+        layout = Layout(layout.bodies, layout.rotors, [s.hold() for s in supports], planar=False)
+    group, on_gear = mount(layout), OnGear(1, body, shape, IN_SPACE, angle, degrees, rolls)
+    want, want_force = answer(layout, on_gear.free(layout))
+    have, force = group_answer(group, on_gear.read(group))
+    assert relative(have, want) < 1e-8
+    assert np.abs(force - want_force).max() < 1e-8 * np.abs(want_force).max()
+
+
+def test_supports_that_leave_a_motion_free_leave_it_at_zero_frequency():
+    """Bearings without axial stiffness: one free mass a rotor, exactly at rest."""
+    layout = train(60e3)
+    radial = [
+        s if s.second is not None else Support(s.name, s.first, None, (0, 1), np.eye(2) / 3e8, np.zeros(2))
+        for s in layout.supports
+    ]
+    group = mount(Layout(layout.bodies, layout.rotors, radial, planar=False))
+    floating = group.omega == 0
+    assert floating.sum() == 2 and group.omega[2] > 2 * np.pi * 20
+    assert all(a <= b for a, b in pairwise(group.omega))
+    moved = group.rigid(0)[2, floating]
+    mass = sum(layout.bodies[b].mass[2, 2] for b in layout.rotors[0])
+    assert np.abs(moved).max() == pytest.approx(1 / np.sqrt(mass), rel=1e-6)

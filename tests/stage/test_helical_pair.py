@@ -1,4 +1,4 @@
-"""A helical pair in the kernel: axial force, spur gears that may tilt, leads and misaligned axes, tip edges, slices."""
+"""A helical pair in the kernel: axial force, leads and misaligned axes, tip edges."""
 
 from __future__ import annotations
 

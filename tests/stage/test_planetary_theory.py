@@ -1,13 +1,11 @@
 """Planetary sets of rigid bodies against theory: natural frequencies and mode classes of Lin & Parker 1999, what a pure
-torque excites, how planets share the load, mesh phasing, balance of speeds and torques, conservation in a free set.
+torque excites, how planets share the load, mesh phasing, free flight. Speeds, torques, momentum: test_set_scenes.py.
 
-The shipped kernel keeps rows in single precision, which shows as some 1e-8 to 1e-7; where theory is sharper, a kernel
-in double precision is held to it."""
+The kernel keeps rows in single precision, which shows as some 1e-8 to 1e-7."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import lin_parker
@@ -31,10 +29,10 @@ def slow(*values: object, name: str | None = None) -> Any:
     return pytest.param(*values, marks=pytest.mark.full, id=name)
 
 
-def natural(rigid: RigidSet, library: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
+def natural(rigid: RigidSet) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (Hz) and shapes in the plane of the loaded set, from the linearised kernel."""
     model = rigid.model()
-    system = linearised(model, 1.0, ALONE, kernel_of(model, library))
+    system = linearised(model, 1.0, ALONE, kernel_of(model))
     assert len(system.linear.label) == 2 * rigid.planets and np.ptp(system.linear.label[:, 0]) == 2 * rigid.planets - 1
     return Motion(rigid, model).plane_modes(system)
 
@@ -56,20 +54,20 @@ def test_natural_frequencies_are_those_of_lin_and_parker(planets: int) -> None:
     assert np.allclose(pairs[:, 0], pairs[:, 1], rtol=2e-7)
 
 
-def excitation(rigid: RigidSet, library: Path | None = None) -> float:
+def excitation(rigid: RigidSet) -> float:
     """Largest modal force of torques on carrier and sun that hold each other, on modes that are not rotational, over
     the largest on those that are."""
-    _, shapes = natural(rigid, library)
+    _, shapes = natural(rigid)
     force = np.abs(shapes[lin_parker.CARRIER + 2] / rigid.base("carrier")
                    - shapes[lin_parker.SUN + 2] / rigid.base("sun") / rigid.ratio)  # fmt: skip
     rotational = np.array([lin_parker.class_of(shape, rigid.planets) == "rotational" for shape in shapes.T])
     return float(force[~rotational].max() / force[rotational].max())
 
 
-def response(rigid: RigidSet, library: Path | None = None) -> float:
+def response(rigid: RigidSet) -> float:
     """A step of both torques at a standing mesh: what central bodies move across the axis and planets move unlike each
     other, over what planets move."""
-    kernel = kernel_of(rigid.model(), library, h=H, **{"effect.roll_motion": 0.0})
+    kernel = kernel_of(rigid.model(), h=H, **{"effect.roll_motion": 0.0})
     loads = {"carrier.tau": 100.0, "sun.tau": -100.0 / rigid.ratio}
     begun(kernel, loads)
     give(kernel, {name: 1.5 * torque for name, torque in loads.items()})

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from test_trains import STEEL, bearing, disc, train
+from test_groups import STEEL, bearing, disc, train
 
 from gearfmu.body.beam import Section, Shaft, reduce_shaft
 from gearfmu.stage.assembly.ground_part import ground_part, skew_pairs, whirl_rows
