@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from by_hand import Pair
+from scipy.interpolate import BarycentricInterpolator
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import GearGeometry, PairGeometry
@@ -141,56 +142,41 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
 
 
-@dataclass(frozen=True)
-class Turn:
-    """te (m) over a turn of a pinion with eccentric teeth, by the eccentric pair and by true pairs."""
-
-    eccentric: np.ndarray
-    true: np.ndarray
-
-    @classmethod
-    def of(cls, spec: Stage, bodies: list[Body], positions: int, torque: float, e: float) -> Turn:
-        """Where the pinion's teeth lie at C, the pair is the true one at the centre distance |C_B − C|, turned by that
-        line's angle, with the torque about C. True pairs at five distances, and the polynomial between them."""
-        psi, pair = 0.7, spec.written.geometry
-        base, pitch = [gear.r_b for gear in pair.gears], 2 * math.pi / spec.written.gears[1].teeth
-        wheel = -pitch * np.arange(spec.written.gears[0].teeth * positions) / positions
-        eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e, angle=psi)}), bodies)
-        found = cls._te(eccentric, wheel, np.full(wheel.size, torque))
-        offset = e * np.exp(1j * ((found - base[1] * wheel) / base[0] + psi))
-        line = pair.a - offset
-        turned, distance = np.angle(line), np.abs(line)
-        normal = 1j * np.exp(1j * (turned - pair.alpha_wt))
-        about = torque / (1 + (offset.conj() * normal).imag / base[0])
-        nodes = pair.a + e * np.cos(np.pi * (np.arange(5) + 0.5) / 5)
-        curves = []
-        for a in nodes:
-            other = rewritten(spec, pair=spec.written.pair.model_copy(update={"center_distance": a}))
-            shift = pair.wheel_phase - other.written.geometry.wheel_phase
-            curves.append(cls._te(assemble(other, bodies), wheel - turned + shift, about))
-        weights = np.array([[lagrange(nodes, k, a) for k in range(len(nodes))] for a in distance])
-        phases = np.array([replace(pair, a=a).wheel_phase for a in distance]) - pair.wheel_phase
-        way = base[0] * turned + base[1] * (turned + phases)
-        return cls(found, np.sum(weights * np.array(curves).T, axis=1) + way)
-
-    @staticmethod
-    def _te(model: StageModel, wheel: np.ndarray, torque: np.ndarray) -> np.ndarray:
-        kernel = statics_of(model, **{"effect.bearings": 0.0})
-        return np.array([kernel.transmission(*place).te for place in zip(wheel, torque, strict=True)])
+def errors_at(model: StageModel, wheel: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """te (m) at angles (rad) of the wheel under torques (N·m), with axes held."""
+    kernel = statics_of(model, **{"effect.bearings": 0.0})
+    return np.array([kernel.transmission(*place).te for place in zip(wheel, torque, strict=True)])
 
 
-def lagrange(nodes: np.ndarray, k: int, at: float) -> float:
-    """The polynomial that is 1 at node k and 0 at the others."""
-    others = np.delete(nodes, k)
-    return float(np.prod((at - others) / (nodes[k] - others)))
+def turn(spec: Stage, bodies: list[Body], positions: int, torque: float, e: float) -> tuple[np.ndarray, np.ndarray]:
+    """te (m) over a turn of a pinion with eccentric teeth, by the eccentric pair and by true pairs. Where the pinion's
+    teeth lie at C, the pair is the true one at the centre distance |C_B − C|, turned by that line's angle, with the
+    torque about C. True pairs at five distances, and the polynomial between them."""
+    psi, pair = 0.7, spec.written.geometry
+    base, pitch = [gear.r_b for gear in pair.gears], 2 * math.pi / spec.written.gears[1].teeth
+    wheel = -pitch * np.arange(spec.written.gears[0].teeth * positions) / positions
+    eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e, angle=psi)}), bodies)
+    found = errors_at(eccentric, wheel, np.full(wheel.size, torque))
+    offset = e * np.exp(1j * ((found - base[1] * wheel) / base[0] + psi))
+    line = pair.a - offset
+    turned, distance = np.angle(line), np.abs(line)
+    normal = 1j * np.exp(1j * (turned - pair.alpha_wt))
+    about = torque / (1 + (offset.conj() * normal).imag / base[0])
+    nodes, curves = pair.a + e * np.cos(np.pi * (np.arange(5) + 0.5) / 5), []
+    for a in nodes:
+        other = rewritten(spec, pair=spec.written.pair.model_copy(update={"center_distance": a}))
+        shift = pair.wheel_phase - other.written.geometry.wheel_phase
+        curves.append(errors_at(assemble(other, bodies), wheel - turned + shift, about))
+    true = np.diagonal(BarycentricInterpolator(nodes, np.array(curves))(distance))
+    phases = np.array([replace(pair, a=a).wheel_phase for a in distance]) - pair.wheel_phase
+    return found, true + base[0] * turned + base[1] * (turned + phases)
 
 
 def test_side_bands_are_those_of_true_pairs_at_the_centre_distance_of_each_angle(bodies: list[Body]) -> None:
     """Of the shipped pair with relief, within 4 %, or 0.4 nm; the page's numbers to their digits. 16 positions a pitch
     would not do: mesh orders from 8 on are folded into the first ones."""
     spec = load_stage("fzg_c/stage_relief")
-    turn = Turn.of(spec, bodies, 64, 302.0, 20e-6)
-    found, true = orders(turn.eccentric), orders(turn.true)
+    found, true = map(orders, turn(spec, bodies, 64, 302.0, 20e-6))
     page = (Path(__file__).parents[2] / "docs" / "theory" / "02-line-contact.md").read_text(encoding="utf-8")
     said = re.search(r"side bands of (\d+) and (\d+) nm beside mesh order 1, (\d+) and (\d+) nm beside order 2", page)
     assert said is not None and found[16] == pytest.approx(true[16], rel=1e-3)

@@ -1,54 +1,22 @@
-"""Trains in motion and at rest: independent pairs in one model, ratio and torque through the meshes, the same pair
-written in two ways."""
+"""Trains at rest: ratio and torque through the meshes, and what is refused."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from doubled import doubled
 from driven import begun
 
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
+from gearfmu.stage import StageModel, Steady, loaded_te
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import shafts_of
 
-FAST, STEPS, H = 1, 60, 5e-5
+FAST = 1
 TORQUE = 120.0  # N·m on the input
-
-
-def run(model: StageModel, drives: dict[str, Steady]) -> Trace:
-    """drives: of the pairs in a stage, each with a prefix for its names."""
-
-    def inputs(time: float) -> dict[str, float]:
-        return {prefix + name: value for prefix, drive in drives.items() for name, value in drive(time).items()}
-
-    return simulate(model, inputs, STEPS * H, H, {"level": FAST})
-
-
-def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, relieved) -> None:
-    """Pairs that nothing connects do not know of each other, at different loads and speeds: the same bits as each alone
-    at its place."""
-    pair = relief_spec
-    far = doubled(pair, lambda name: f"b_{name}", lambda axis: (axis[0], 1.0))
-    both = assemble(far, [*bodies, *bodies])
-    there = {n: rotor.model_copy(update={"axis": (rotor.axis[0], 1.0)}) for n, rotor in pair.rotors.items()}
-    apart = assemble(pair.model_copy(update={"rotors": there}), bodies)
-    first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
-    together = run(both, {"": first, "b_": second})
-    for prefix, alone in (("", run(relieved, {"": first})), ("b_", run(apart, {"": second}))):
-        for name in alone.channels:
-            if name.startswith(("energy.", "solver.")):
-                continue
-            head, _, rest = name.partition(".")
-            found = together[f"bearing.{prefix}{rest}" if head == "bearing" else prefix + name]
-            assert np.array_equal(found, alone[name]), name
-        assert np.ptp(alone["mesh.force"]) > 10
 
 
 def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
