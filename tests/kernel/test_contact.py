@@ -78,16 +78,6 @@ def test_a_tooth_out_of_its_place_closes_its_own_gap_by_base_radius_times_angle(
     assert {(DRIVE, True, True), (DRIVE, False, False)} <= seen and any(flank == COAST and any(t) for flank, *t in seen)
 
 
-def test_number_of_pairs_in_contact_is_the_contact_ratio_on_average(plain: Inner):
-    count = [
-        sum(p.flank == DRIVE and abs(p.gap) < 1e-12 for p in plain.places(turned(phi)))
-        for phi in np.linspace(0, 2 * np.pi / TEETH[0], 400, endpoint=False)
-    ]
-    length = sum(BASE) * np.tan(WORKING)
-    ratio = (TIP[0] + TIP[1] - length) / (2 * np.pi * BASE[0] / TEETH[0])
-    assert np.mean(count) == pytest.approx(ratio, abs=5e-3)
-
-
 @pytest.mark.parametrize("gears", ["relieved", "misplaced"])
 @pytest.mark.parametrize("dx, dy, lead", [(0, 0, 0), (3e-5, -2e-5, 1e-5), (-1e-4, 5e-5, -2e-5)])
 def test_gradients_are_derivatives_of_the_gaps(
