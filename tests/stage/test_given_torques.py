@@ -44,7 +44,6 @@ def test_a_free_body_moves_by_the_integral_of_the_torque(integrator: float) -> N
         assert kernel.get("left.gear.w") * mass == pytest.approx(pushed, abs=1e-9)
 
 
-# ---- a brake that follows the speed: second order --------------------------------------------------------------------
 # ---- energy ----------------------------------------------------------------------------------------------------------
 
 
