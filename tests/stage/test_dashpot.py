@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_memory import of_few_modes
 
 from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
@@ -37,3 +38,14 @@ def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(relief_spec: 
     have = own_path(assemble(relief_spec, bodies), torque)
     want = by_hand(relief_spec, bodies, 0.5 * torque / relief_spec.written.geometry.gears[0].r_b)
     assert have == pytest.approx(want, rel=0.1)
+
+
+def test_a_longer_path_takes_a_smaller_constant(relief_spec: Stage, bodies: list[Body]) -> None:
+    """Of few modes: c falls with the square of the path."""
+    fewer = [of_few_modes(body) for body in bodies]
+    own, longer = (
+        own_path(assemble(relief_spec, some), 0.5 * relief_spec.written.torque_max) for some in (bodies, fewer)
+    )
+    assert longer > 1.2 * own
+    share = same_loss(relief_spec, bodies, fewer) / relief_spec.written.contact.damping
+    assert share == pytest.approx((own / longer) ** 2, rel=1e-12)

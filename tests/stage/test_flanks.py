@@ -142,6 +142,17 @@ def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
     assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
 
 
+def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: Stage, bodies: list[Body]) -> None:
+    """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
+    e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
+    psi, pair = 0.7, spec.written.geometry
+    model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6, angle=psi)}), bodies)
+    te = revolution(model, 16, 4, 0.01)
+    phi = 2 * math.pi * np.arange(te.size) / te.size
+    expected = -20e-6 * np.sin(phi + psi + pair.alpha_wt)
+    assert np.abs(te - te.mean() - expected).max() < 0.1e-6
+
+
 def errors_at(model: StageModel, wheel: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """te (m) at angles (rad) of the wheel under torques (N·m), with axes held."""
     kernel = statics_of(model, **{"effect.bearings": 0.0})

@@ -7,9 +7,10 @@ import math
 import pytest
 from driven import give
 
+from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.binding import status_words
-from gearfmu.stage import StageModel, Steady, Trace, simulate
+from gearfmu.stage import StageModel, Steady, Trace, loaded_te, simulate
 from gearfmu.stage.run.limits import beyond_limits, largest_speed, largest_torque
 
 FAST = {"level": 1.0}
@@ -53,6 +54,11 @@ def test_limits_in_words_name_both_numbers(relieved: StageModel) -> None:
     torque, speed = beyond_limits(relieved, -1500.0, 20000 * RPM)
     assert "1500 N·m on the pinion is beyond torque_max, 600 N·m" in torque
     assert "20000 rpm of the pinion is beyond speed_max, 6000 rpm" in speed
+
+
+def test_a_torque_without_equilibrium_names_its_limit(relieved: StageModel) -> None:
+    with pytest.raises(SimulationError, match=r"no static equilibrium under 1e\+06 N·m .*torque_max, 600 N·m"):
+        loaded_te(relieved, [1e6], 3)
 
 
 def test_speeds_that_come_after_the_start_are_told(relieved: StageModel) -> None:
