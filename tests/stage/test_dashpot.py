@@ -42,10 +42,8 @@ def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(relief_spec: 
 
 def test_a_longer_path_takes_a_smaller_constant(relief_spec: Stage, bodies: list[Body]) -> None:
     """Of few modes: c falls with the square of the path."""
-    fewer = [of_few_modes(body) for body in bodies]
-    own, longer = (
-        own_path(assemble(relief_spec, some), 0.5 * relief_spec.written.torque_max) for some in (bodies, fewer)
-    )
+    fewer, torque = [of_few_modes(body) for body in bodies], 0.5 * relief_spec.written.torque_max
+    own, longer = (own_path(assemble(relief_spec, some), torque) for some in (bodies, fewer))
     assert longer > 1.2 * own
     share = same_loss(relief_spec, bodies, fewer) / relief_spec.written.contact.damping
     assert share == pytest.approx((own / longer) ** 2, rel=1e-12)
