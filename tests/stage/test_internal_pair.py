@@ -1,5 +1,5 @@
 """A pinion in a ring on fixed axes: unloaded geometry against two involutes, the bodies on paper, and the table
-of an independent finite-element program. Gradients, balance: tests/relations."""
+of an independent finite-element program. Balance: tests/relations."""
 
 from __future__ import annotations
 
@@ -151,6 +151,27 @@ def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
             own = place.curvature - HOLLOW[o] / place.roll[o]
             assert HOLLOW[c] / mesh.gears[c].s_tip - 1e-9 < own < 1 / mesh.gears[c].tip_edge + 1e-9
     assert count >= 3 and worst < 1e-9
+
+
+def test_gradient_of_the_gap_of_flanks_and_tip_edges(mesh: RingMesh, inner: Inner) -> None:
+    """By central differences of the gap, where a pair is on the same pair of curves at both ends."""
+    step, seen = 1e-7, dict.fromkeys([(False, False), (True, False), (False, True)], 0)
+    for phi in np.linspace(0.0, 2 * math.pi / mesh.planet.z, 30):
+        pose = rolling(mesh, phi, lead=1e-5)
+        near = [{(p.flank, p.tooth): p for p in inner.places(pose + moved, 1e-3)} for moved in differences(step)]
+        for place in inner.places(pose, 2e-4):
+            ends = [places[place.flank, place.tooth] for places in near]
+            kinds = {(past(mesh, end, 0), past(mesh, end, 1)) for end in (place, *ends)}
+            if len(kinds) == 1:
+                slopes = (np.array([end.gap for end in ends[6:]]) - [end.gap for end in ends[:6]]) / (2 * step)
+                assert place.gradient == pytest.approx(slopes, abs=1e-7 if kinds == {(False, False)} else 1e-6)
+                seen[kinds.pop()] += 1
+    assert min(seen.values()) > 3, seen
+
+
+def differences(step: float) -> np.ndarray:
+    """(12, 6): steps back, then forward, in every coordinate of a pose."""
+    return step * np.vstack([-np.eye(6), np.eye(6)])
 
 
 def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMesh, bodies, model) -> None:
