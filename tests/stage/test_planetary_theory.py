@@ -105,6 +105,18 @@ def test_planets_of_an_ideal_set_share_alike(planets: int, teeth: tuple[int, int
     assert found.load_factor.max() > 1.005  # neighbours mesh at another phase
 
 
+@pytest.mark.parametrize(
+    "rigid",
+    [
+        pytest.param(RigidSet(5, (18, 18), module=2.5e-3, positions=(0, 14, 29, 43, 58)), id="5"),
+        slow(RigidSet(4, positions=(0, 31, 59, 91)), name="4"),
+    ],
+)
+def test_unequally_spaced_planets_carry_alike_under_little_load(rigid: RigidSet) -> None:
+    """So all teeth stand where they should, to some 10 nm."""
+    assert abs(periods(replace(rigid, contact_ratio=1.4), 20.0).sharing - 1).max() < 0.05
+
+
 @pytest.mark.parametrize("pins", [{1: (5e-6, 12e-6)}, slow({0: (-20e-6, -15e-6)}), slow({2: (0.0, 25e-6)})])
 def test_three_planets_share_alike_whatever_the_error_of_a_pin(pins: dict[int, tuple[float, float]]) -> None:
     """The sun floats to where its three forces are in balance; on a bearing it does not."""

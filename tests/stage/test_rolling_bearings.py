@@ -14,13 +14,14 @@ from gearfmu.bearing.rest import rest
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised
-from gearfmu.stage import StageModel, assemble
+from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.assembly import rolling
 from gearfmu.stage.assembly.assemble import settled
 from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.assembly.rolling import SETTLED, Settled
 from gearfmu.stage.run.limits import beyond_limits
+from gearfmu.stage.run.simulate import simulate
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import OperatingSpec
@@ -206,6 +207,16 @@ def test_bearings_belong_to_the_model() -> None:
     ]
     models = [model(PAIR), *(assemble(other, bodies) for other in others)]
     assert len({own.hash for own in models}) == len({own.guid for own in models}) == 3
+
+
+def test_energy_is_kept_on_coupled_bearings() -> None:
+    """A loaded run with frozen mesh: what the balance leaves is no more than on constant springs, times three."""
+    left = []
+    for own in (model(PAIR), assemble(*loaded("helical_demo"))):
+        trace = simulate(own, Steady(own, 200.0, 100.0), 3e-3, 20e-6, {"level": 1.0, "effect.roll_motion": 0.0})
+        assert not trace.meta["warnings"]
+        left.append(abs(trace["energy.residual"][-1]))
+    assert left[0] <= 3 * left[1] + 1e-7, left
 
 
 def test_a_run_far_from_the_operating_torque_is_told_so() -> None:

@@ -12,7 +12,9 @@ from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.tables.connections import ChainSpec
 
 LOAD = 302.0  # N·m on the pinion
 PITCH = 2 * math.pi / 24  # rad, of the wheel
@@ -58,6 +60,14 @@ def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -
     behind = 1 / soft.stage_stiffness - 1 / soft.mesh_stiffness
     expected = sum(1 / gear.bearing.stiffness for gear in spec.written.gears)
     assert np.median(behind) == pytest.approx(expected, rel=2e-2)
+
+
+def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[Body]) -> None:
+    """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
+    chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
+    ports = {shaft: port.model_copy(update={"chain": chain}) for shaft, port in spec.ports.items()}
+    chained = assemble(with_ports(spec, ports), bodies)
+    assert np.array_equal(loaded_te(chained, [LOAD], 5).te, loaded_te(plain, [LOAD], 5).te)
 
 
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
