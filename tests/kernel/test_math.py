@@ -34,42 +34,34 @@ def beside(joint: float) -> np.ndarray:
     return joint + np.arange(-300, 300) * np.spacing(joint)
 
 
-EXP_POINTS = np.concatenate(
-    [
-        RNG.uniform(-745, 709.7, N),
-        signed(10.0 ** RNG.uniform(-20, 0, N)),
-        np.arange(-708, 709) * np.log(2),
-        beside(np.log(2) / 2),
-        RNG.uniform(-745.13, -708, 500),
-    ]
-)
-LOG_POINTS = np.concatenate(
-    [
-        np.exp(RNG.uniform(-700, 700, N)),
-        RNG.uniform(0.5, 2, N),
-        1 + signed(10.0 ** RNG.uniform(-15.5, -1, N)),
-        10.0 ** RNG.uniform(-323, -308, 500),
-        beside(np.sqrt(0.5)),
-    ]
-)
-CIRCLE_POINTS = np.concatenate(
-    [
-        signed(10.0 ** RNG.uniform(-300, 9, N)),
-        RNG.uniform(-8, 8, N),
-        near_multiples_of_half_pi(N),
-        beside(np.pi / 4),
-        signed(np.array([1e9])),
-    ]
-)
-ACOS_POINTS = np.concatenate(
-    [
-        RNG.uniform(-1, 1, N),
-        1 - 10.0 ** RNG.uniform(-16, 0, N),
-        -1 + 10.0 ** RNG.uniform(-16, 0, N),
-        signed(10.0 ** RNG.uniform(-300, 0, N)),
-        signed(beside(0.5)),
-    ]
-)
+EXP_POINTS = np.r_[
+    RNG.uniform(-745, 709.7, N),
+    signed(10.0 ** RNG.uniform(-20, 0, N)),
+    np.arange(-708, 709) * np.log(2),
+    beside(np.log(2) / 2),
+    RNG.uniform(-745.13, -708, 500),
+]
+LOG_POINTS = np.r_[
+    np.exp(RNG.uniform(-700, 700, N)),
+    RNG.uniform(0.5, 2, N),
+    1 + signed(10.0 ** RNG.uniform(-15.5, -1, N)),
+    10.0 ** RNG.uniform(-323, -308, 500),
+    beside(np.sqrt(0.5)),
+]
+CIRCLE_POINTS = np.r_[
+    signed(10.0 ** RNG.uniform(-300, 9, N)),
+    RNG.uniform(-8, 8, N),
+    near_multiples_of_half_pi(N),
+    beside(np.pi / 4),
+    signed(np.array([1e9])),
+]
+ACOS_POINTS = np.r_[
+    RNG.uniform(-1, 1, N),
+    1 - 10.0 ** RNG.uniform(-16, 0, N),
+    -1 + 10.0 ** RNG.uniform(-16, 0, N),
+    signed(10.0 ** RNG.uniform(-300, 0, N)),
+    signed(beside(0.5)),
+]
 
 
 def ulps(value: np.ndarray, exact: list[mp.mpf]) -> np.ndarray:
