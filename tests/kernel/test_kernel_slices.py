@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_hand import slice_weights
 from driven import begun, stepped
-from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
 from small_model import pair_blob
 
@@ -33,16 +33,9 @@ def bodies(zeta: float) -> tuple[FlatBody, FlatBody]:
     return made[0], made[1]
 
 
-def slice_weights(block: FlatContact) -> np.ndarray:
-    """(slices, A): (2d + 1) times the mean of P_d over each slice."""
-    edges = np.linspace(-1, 1, block.slices + 1)
-    means = [np.diff(Legendre.basis(d).integ()(edges)) / np.diff(edges) for d in block.degrees]
-    return np.stack([(2 * d + 1) * mean for d, mean in zip(block.degrees, means, strict=True)], axis=1)
-
-
 def reference_problem(two: tuple[FlatBody, FlatBody], block: FlatContact) -> Problem:
     """The same contact with every slice's row written out, rigid motion first in each body."""
-    t = slice_weights(block)
+    t = slice_weights(block.slices, max(block.degrees) + 1)[:, block.degrees]
     rows, omega, zeta, compliance = [], [], [], np.zeros((block.slices, block.slices))
     for body, direction in zip(two, (-1, 1), strict=True):
         rows += [np.full((block.slices, 1), direction / np.sqrt(body.mass)), -t @ body.rows]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from by_hand import Pair
 from test_memory import of_few_modes
 
 from evidence.study.dashpot import own_path, same_loss
@@ -14,14 +15,11 @@ from gearfmu.stagefile.forms.general import Stage
 
 
 def by_hand(spec: Stage, bodies: list[Body], force: float) -> float:
-    """Local law (theory, eq. 7) of one tooth pair that carries `force`, and 95 % of what both teeth yield beyond their
+    """Slope of the local law of one tooth pair that carries `force`, and 95 % of what both teeth yield beyond their
     stored modes under 1 N over the width, mean over the roll, m/N."""
-    pair, width = spec.written.geometry, min(gear.face_width for gear in spec.written.gears)
-    local = [2 * (1 - g.material.poisson_ratio**2) / (np.pi * g.material.youngs_modulus) for g in spec.written.gears]
-    curvature = sum(1 / np.sqrt(gear.r**2 - gear.r_b**2) for gear in pair.gears)
-    half_width = np.sqrt(2 * sum(local) * force / width / curvature)
-    strips = [gear.body.strip_half_width for gear in spec.written.gears]
-    law = sum(c * (np.log(4 * w / half_width) - 1.5) for c, w in zip(local, strips, strict=True)) / width
+    pair, gears = Pair(spec, bodies), spec.written.geometry.gears
+    a, c, beta = pair.local_law(tuple(np.sqrt(gear.r**2 - gear.r_b**2) for gear in gears))
+    law = (c - 0.5 * a * (1 + np.log(beta * force / pair.width))) / pair.width
     static = [body.flank.static[0, 0, 0].diagonal(axis1=0, axis2=1)[0, 0] for body in bodies]
     modes = [((body.flank.rows[0, :, 0] / (2 * np.pi * body.frequency)) ** 2).sum(axis=1) for body in bodies]
     return float(law + 0.95 * sum((s - m).mean() for s, m in zip(static, modes, strict=True)))
