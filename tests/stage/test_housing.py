@@ -24,6 +24,7 @@ from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import PlanetarySpec
 from gearfmu.stagefile.stage import load_stage
 
 TORQUE, SPEED, H = 150.0, 150.0, 20e-6
@@ -217,6 +218,18 @@ def feet() -> dict[str, np.ndarray]:
 def set_run(of: StageModel, **parameters: float) -> Trace:
     driven = of.driven_by_springs()
     return simulate(driven, Steady(driven, 85.0, 600.0), 2e-4, 2e-5, {"level": 1.0} | parameters)
+
+
+def test_the_ring_stands_on_two_supports() -> None:
+    housed = load_stage(HOUSED)
+    held = {s.name: s for s in housed.supports if s.body == "ring"}
+    assert held["ring"].to is None and (held["ring"].axial, held["ring"].torsion) == (None, None)
+    assert held["ring_seat"].to == "housing" and held["ring_seat"].radial is None
+    plain = next(s for s in load_stage(SET).supports if s.body == "ring")
+    assert (held["ring"].radial, held["ring"].tilt) == (plain.radial, plain.tilt)
+    assert (held["ring_seat"].axial, held["ring_seat"].torsion) == (plain.axial, plain.torsion)
+    assert isinstance(housed.written, PlanetarySpec) and housed.files[-1] == "housing"
+    assert housed.file_of("planet2") == "planet"
 
 
 @pytest.mark.full
