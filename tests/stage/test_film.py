@@ -16,7 +16,7 @@ from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage import assemble
+from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.meshes import REACH, film_impulse
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
@@ -154,6 +154,15 @@ def test_the_loss_of_films_that_are_squeezed_out_hardly_depends_on_the_step(pair
         energies(kernel, 1e-5, 0.02)
         lost.append(kernel.get("mesh.film_loss"))
     assert lost[0] == pytest.approx(lost[1], rel=0.1)
+
+
+def test_off_reads_nothing_of_the_oil(plain: StageModel) -> None:
+    bits = []
+    for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
+        trace = simulate(plain, Steady(plain, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
+        bits.append(trace["mesh.te"].tobytes() + trace["mesh.force"].tobytes())
+        assert trace["mesh.film_loss"][-1] == 0.0
+    assert bits[0] == bits[1]
 
 
 # ---- what a stage says -----------------------------------------------------------------------------------------------
