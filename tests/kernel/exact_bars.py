@@ -1,11 +1,8 @@
-"""Two coaxial elastic bars in impact: the exact solution by waves,
-and the modal data of a free–free bar in closed form.
+"""Two coaxial elastic bars in impact: exact solution by waves, and modal data of a free–free bar in closed form.
 
-Waves: a bar of impedance Z = ρcA carries d'Alembert waves; a free end reflects velocity unchanged,
-bars in contact share the
-velocity of the touching ends, and they part when the force would become tension (Saint-Venant 1867;
-Graff, Wave Motion in
-Elastic Solids, 1975, §2.4). All lengths here are whole numbers of cells, so the solution is exact on the grid.
+Waves: a bar of impedance Z = ρcA carries d'Alembert waves; a free end reflects velocity unchanged, bars in contact
+share the velocity of the touching ends, and they part when the force would become tension (Saint-Venant 1867; Graff,
+Wave Motion in Elastic Solids, 1975, §2.4). All lengths here are whole numbers of cells: exact on the grid.
 """
 
 from __future__ import annotations
@@ -58,8 +55,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Impact:
-    """force/(ρcAv) while it lasts; times in c t / L1; velocities of the centres of mass over v; e:
-    coefficient of restitution."""
+    """force/(ρcAv) while it lasts; times in c t / L1; velocities of the centres of mass over v; e: of restitution."""
 
     force: float
     force_end: float
@@ -70,12 +66,11 @@ class Impact:
 
 
 def impact(cells1: int, cells2: int) -> Impact:
-    """Bar 1 (`cells1` long) hits bar 2 (`cells2`) of the same section at rest with unit velocity;
-    exact, in units of ρcA = c = 1.
+    """Bar 1 (`cells1` long) hits bar 2 (`cells2`) of the same section at rest with unit velocity; exact, in units of
+    ρcA = c = 1.
 
-    Followed until both bars have shed every wave that could close the gap again.
-    Each bar keeps its waves as velocities f (to the right) and g
-    (to the left) per cell, v = f + g, compressive force = f − g (bar 1 on the left, contact at its right end)."""
+    Followed until both bars have shed every wave that could close the gap again. Each bar keeps its waves as velocities
+    f (to the right) and g (to the left) per cell, v = f + g, compressive force = f − g (bar 1 on the left)."""
     f1, g1 = np.full(cells1, 0.5), np.full(cells1, 0.5)
     f2, g2 = np.zeros(cells2), np.zeros(cells2)
     touching, gap, forces, separation = True, 0.0, [], None

@@ -2,10 +2,8 @@
 `python tests/kernel/minimax.py` prints the C arrays.
 
 Each kernel polynomial p(z) interpolates its function at the Chebyshev points of the argument range with 60 digits
-(within a factor of
-about two of the true minimax polynomial: Powell, Computer J.
-9, 1967) and its coefficients are then rounded to double. `test_math.py`
-checks that the arrays in the C source are these numbers.
+(within a factor of about two of the true minimax polynomial: Powell, Computer J. 9, 1967) and its coefficients are then
+rounded to double. `test_math.py` checks that the arrays in the C source are these numbers.
 """
 
 from __future__ import annotations
@@ -30,13 +28,9 @@ class Kernel:
     terms: int
 
 
-def _series_safe(closed: Callable, series: Callable, threshold: float = 1e-3) -> Callable:
-    """`closed` away from zero, the power series near it (where the closed form cancels)."""
-    return lambda z: closed(z) if abs(z) > threshold else series(z)
-
-
-def _power_series(coefficient: Callable[[int], mp.mpf]) -> Callable:
-    return lambda z: mp.fsum(coefficient(k) * z**k for k in range(40))
+def _near_zero(closed: Callable, coefficient: Callable[[int], mp.mpf], threshold: float = 1e-3) -> Callable:
+    """`closed` away from zero, its power series near it (where the closed form cancels)."""
+    return lambda z: closed(z) if abs(z) > threshold else mp.fsum(coefficient(k) * z**k for k in range(40))
 
 
 def _exp_tail(r: mp.mpf) -> mp.mpf:
@@ -78,27 +72,18 @@ _half_ln2 = mp.log(2) / 2 * (1 + mp.mpf(2) ** -20)
 _s_max = ((mp.sqrt(2) - 1) / (mp.sqrt(2) + 1)) ** 2 * (1 + mp.mpf(2) ** -20)
 
 _zero = mp.mpf(0)
+_exp = _near_zero(_exp_tail, lambda k: 1 / mp.factorial(k + 2))
+_log = _near_zero(_log_tail, lambda k: mp.mpf(2) / (2 * k + 3))
+_sin = _near_zero(_sin_tail, lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))
+_cos = _near_zero(_cos_tail, lambda k: (-1) ** k / mp.factorial(2 * k + 4))
+_atan = _near_zero(_atan_tail, lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))
 KERNELS = (
-    Kernel("EXP", _series_safe(_exp_tail, _power_series(lambda k: 1 / mp.factorial(k + 2))), -_half_ln2, _half_ln2, 11),
-    Kernel("LOG", _series_safe(_log_tail, _power_series(lambda k: mp.mpf(2) / (2 * k + 3))), mp.mpf(0), _s_max, 7),
-    Kernel(
-        "SIN",
-        _series_safe(_sin_tail, _power_series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))),
-        _zero,
-        _quarter,
-        6,
-    ),
-    Kernel(
-        "COS", _series_safe(_cos_tail, _power_series(lambda k: (-1) ** k / mp.factorial(2 * k + 4))), _zero, _quarter, 6
-    ),
-    Kernel(
-        "ATAN",
-        _series_safe(_atan_tail, _power_series(lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))),
-        _zero,
-        _octant,
-        11,
-    ),
-    Kernel("ASIN", _series_safe(_asin_tail, _power_series(_asin_coefficient)), mp.mpf(0), mp.mpf(1) / 4, 13),
+    Kernel("EXP", _exp, -_half_ln2, _half_ln2, 11),
+    Kernel("LOG", _log, _zero, _s_max, 7),
+    Kernel("SIN", _sin, _zero, _quarter, 6),
+    Kernel("COS", _cos, _zero, _quarter, 6),
+    Kernel("ATAN", _atan, _zero, _octant, 11),
+    Kernel("ASIN", _near_zero(_asin_tail, _asin_coefficient), _zero, mp.mpf(1) / 4, 13),
 )
 
 
@@ -134,14 +119,8 @@ def main() -> None:
         print(f"/* largest error {largest_error(kernel):.1e} */")
         print(f"static const double {kernel.name}[] = {{" + ", ".join(c.hex() for c in coefficients(kernel)) + "};")
     print("static const double PIO2[] = {" + ", ".join(p.hex() for p in pio2_parts()) + "};")
-    constants = {
-        "PI/4": mp.pi / 4,
-        "PI/2": mp.pi / 2,
-        "3PI/4": 3 * mp.pi / 4,
-        "PI": mp.pi,
-        "1/LN2": 1 / mp.log(2),
-        "2/PI": 2 / mp.pi,
-    }
+    constants = {"PI/4": mp.pi / 4, "PI/2": mp.pi / 2, "3PI/4": 3 * mp.pi / 4, "PI": mp.pi}
+    constants |= {"1/LN2": 1 / mp.log(2), "2/PI": 2 / mp.pi}
     for name, value in constants.items():
         print(f"{name}: {float(value).hex()} + {float(value - float(value)).hex()}")
     ln2_high = mp.floor(mp.log(2) * 2**33) / 2**33

@@ -35,15 +35,11 @@ def compilers() -> dict[str, tuple[str, ...]]:
     return found
 
 
-def compile_probes(out: Path, command: Sequence[str] = ("cc",), flags: Sequence[str] = ()) -> Path:
-    """Compile the probe library with the project's flags, then `flags`; returns `out`."""
+def compile_probes(out: Path) -> Path:
+    """Compile the probe library with the project's flags; returns `out`, fails with the compiler's messages."""
     files = [source_folder() / name for name in SOURCES] + sorted(HERE.glob("probe_*.c"))
-    return compile_c([*command, *FLAGS, "-fvisibility=default", "-fPIC", "-shared", *flags], files, out)
-
-
-def compile_c(command: Sequence[str], files: Sequence[Path], out: Path) -> Path:
-    """Compile and link C files that may include the kernel's headers; fails with the compiler's messages."""
-    line = [*command, f"-I{source_folder()}", "-o", str(out), *map(str, files), "-lm"]
+    line = ["cc", *FLAGS, "-fvisibility=default", "-fPIC", "-shared", f"-I{source_folder()}", "-o", str(out)]
+    line += [*map(str, files), "-lm"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, " ".join(line) + "\n" + done.stderr
     return out
@@ -70,23 +66,14 @@ class Probes:
     def __init__(self, path: Path) -> None:
         self._library = ctypes.CDLL(str(path))
 
-    def one(self, name: str, x: np.ndarray) -> np.ndarray:
-        """exp, log, sin, cos or acos of every x."""
+    def one(self, name: str, *arguments: np.ndarray) -> np.ndarray:
+        """exp, log, sin, cos or acos of every x; atan2 of every y, x."""
         function = getattr(self._library, f"probe_{name}")
-        function.argtypes, function.restype = [_vector, _vector, ctypes.c_size_t], None
-        x = np.ascontiguousarray(x, dtype=np.float64)
-        y = np.empty_like(x)
-        function(x, y, x.size)
-        return y
-
-    def atan2(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Angle of every (x, y)."""
-        function = self._library.probe_atan2
-        function.argtypes, function.restype = [_vector, _vector, _vector, ctypes.c_size_t], None
-        y, x = np.ascontiguousarray(y, dtype=np.float64), np.ascontiguousarray(x, dtype=np.float64)
-        angle = np.empty_like(y)
-        function(y, x, angle, y.size)
-        return angle
+        function.argtypes, function.restype = [_vector] * (len(arguments) + 1) + [ctypes.c_size_t], None
+        given = [np.ascontiguousarray(values, dtype=np.float64) for values in arguments]
+        found = np.empty_like(given[0])
+        function(*given, found, found.size)
+        return found
 
     def blob_open(self, blob: bytes, shift: int = 0) -> tuple[int, str, str, int]:
         """Outcome, message, hash and number of sections of a blob that lies `shift` bytes behind an address divisible

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from driven import begun, give
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError
@@ -21,24 +22,17 @@ def drive() -> Steady:
     return Steady(assemble(spec, load_bodies(spec)), 209.4, 250.0)
 
 
-def begun(drive: Steady, **parameters: float) -> Kernel:
-    kernel = drive.model.kernel(**parameters)
-    give(kernel, drive, 0.0)
-    kernel.initialize()
+def halfway(drive: Steady, **parameters: float) -> Kernel:
+    kernel = begun(drive.model.kernel(**parameters), drive(0.0))
     run(kernel, drive, 0, BEFORE)
     return kernel
-
-
-def give(kernel: Kernel, drive: Steady, time: float) -> None:
-    for name, value in drive(time).items():
-        kernel.set(name, value)
 
 
 def run(kernel: Kernel, drive: Steady, start: int, end: int) -> np.ndarray:
     """Transmission error after every step."""
     found = []
     for k in range(start, end):
-        give(kernel, drive, k * STEP)
+        give(kernel, drive(k * STEP))
         kernel.step(k * STEP, STEP)
         found.append(kernel.get("mesh.te"))
     return np.array(found)
@@ -47,7 +41,7 @@ def run(kernel: Kernel, drive: Steady, start: int, end: int) -> np.ndarray:
 def taken_over(drive: Steady, old: dict[str, float], new: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     """Transmission errors after the change, and of a run with the new setup from the start, over its alternating
     part."""
-    first, kernel, own = begun(drive, **old), drive.model.kernel(**new), begun(drive, **new)
+    first, kernel, own = halfway(drive, **old), drive.model.kernel(**new), halfway(drive, **new)
     kernel.adopt(first)
     found, wanted = (run(k, drive, BEFORE, BEFORE + AFTER) for k in (kernel, own))
     return found / np.std(wanted), wanted / np.std(wanted)
@@ -61,7 +55,7 @@ def test_what_a_poorer_setup_cannot_keep_is_forgotten(drive: Steady, new: dict[s
 
 
 def test_a_change_leaves_no_debt_of_energy(drive: Steady) -> None:
-    first, kernel = begun(drive, level=1.0, h=5e-6), drive.model.kernel(level=2.0, h=5e-6)
+    first, kernel = halfway(drive, level=1.0, h=5e-6), drive.model.kernel(level=2.0, h=5e-6)
     kernel.adopt(first)
     run(kernel, drive, BEFORE, BEFORE + 20)
     rounds = kernel.get("solver.iterations")
@@ -70,10 +64,8 @@ def test_a_change_leaves_no_debt_of_energy(drive: Steady) -> None:
 
 
 def test_states_that_cannot_be_taken_over_are_refused(drive: Steady) -> None:
-    fresh = drive.model.kernel(level=1.0)
-    give(fresh, drive, 0.0)
-    fresh.initialize()
+    fresh = begun(drive.model.kernel(level=1.0), drive(0.0))
     with pytest.raises(ModelError, match="must have made a step"):
         drive.model.kernel(level=2.0).adopt(fresh)
     with pytest.raises(ModelError, match="effect.bearings"):
-        drive.model.kernel(**{"effect.bearings": 0.0}).adopt(begun(drive, level=1.0))
+        drive.model.kernel(**{"effect.bearings": 0.0}).adopt(halfway(drive, level=1.0))

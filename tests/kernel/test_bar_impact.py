@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven import stepped
 from exact_bars import Bar, impact
 from small_model import bars_blob
 
@@ -27,20 +28,6 @@ def test_wave_solution_has_the_tabulated_facts(case: str) -> None:
     assert (got.v1, got.v2, got.e) == pytest.approx((fact["v1"], fact["v2"], fact["e"]), abs=1e-12)
 
 
-def test_modal_data_of_a_bar() -> None:
-    bar = Bar(0.1)
-    assert bar.speed == pytest.approx(5172.194153034851, rel=1e-14)
-    x = (np.arange(2000) + 0.5) / 2000 * bar.length
-    shapes = np.sqrt(2 / bar.mass) * np.cos(np.outer(np.arange(1, 7), np.pi * x / bar.length))
-    shapes = np.vstack([np.full(len(x), 1 / np.sqrt(bar.mass)), shapes])
-    np.testing.assert_allclose(shapes @ shapes.T * bar.mass / len(x), np.eye(7), atol=1e-12)
-    np.testing.assert_allclose(bar.end_row(6)[1:], np.sqrt(2 / bar.mass))
-    assert bar.residual(0) == pytest.approx(bar.length / (3 * bar.youngs_modulus * bar.area))
-    summed = np.sum(2 / (bar.mass * bar.frequencies(200_000)[20:] ** 2))
-    rest = 2 / (bar.mass * bar.frequencies(1)[0] ** 2) / 200_000  # Σ 1/k² beyond K is 1/K
-    assert bar.residual(20) == pytest.approx(summed + rest, rel=1e-7)
-
-
 @pytest.mark.parametrize("n", [5, 20, 40])
 @pytest.mark.parametrize(("one", "two"), CASES)
 def test_exact_impact(system_library: Path, one: int, two: int, n: int) -> None:
@@ -52,12 +39,9 @@ def test_exact_impact(system_library: Path, one: int, two: int, n: int) -> None:
     parameters = {"left.w_start": 1.0, "h": h, "level": 3, "effect.hertz": 0}
     kernel = Kernel(blob, parameters, system_library)
     kernel.initialize()
-    found = []
-    for i in range(int(6 * max(one, two) / shorter * STEPS_PER_CELL * n)):
-        kernel.step(i * h, h)
-        found.append((kernel.get("mesh.force"), kernel.get("mesh.force_mean")))
+    steps = int(6 * max(one, two) / shorter * STEPS_PER_CELL * n)
+    force, mean = stepped(kernel, steps, h, "mesh.force", "mesh.force_mean").T
     assert kernel.get("solver.retried_steps") == 0
-    force, mean = np.transpose(found)
     impulse = mean.sum() * h
     assert 1 - impulse / bars[0].mass == pytest.approx(exact.v1, abs=0.02)
     assert impulse / bars[1].mass == pytest.approx(exact.v2, abs=0.02)

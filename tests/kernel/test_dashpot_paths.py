@@ -56,6 +56,5 @@ def test_loss_is_that_of_the_contacts_own_path(blob: bytes, backlash: float, sha
     lost, rates = kernel.get("energy.dissipated"), np.diff(forces, axis=0) / STEP
     path = 2 * share * RESIDUAL + secant(BASE[0] * (PSI[0] + WORKING))
     by_hand = DAMPING * WIDTH * path**2 * (rates**2).sum() * STEP
-    print(f"{pairs} pairs, {forces[-1]} N, lost {lost:.4e} J, by hand {by_hand:.4e} J, {lost / by_hand - 1:+.2%}")
     assert pairs == ({1.0} if backlash > 0 else {2.0})
     assert lost == pytest.approx(by_hand, rel=3e-3)

@@ -1,4 +1,5 @@
-"""What a blob says about axes that turn: each rule refused by name, in memory that does not end where the blob does."""
+"""What a blob says about axes that turn and teeth that deviate: each rule refused by name, in memory that does not end
+where the blob does."""
 
 from __future__ import annotations
 
@@ -56,3 +57,28 @@ def test_axes_that_nothing_uses_are_read() -> None:
             for name, value in read_blob(pair_blob()).items() if name.startswith("omega_ground")}  # fmt: skip
     kernel = Kernel(changed(frame=ints(-1, -1), tooth_shift=ints(3), **CARRIED | sets))
     assert "effect.coriolis" in kernel.variables
+
+
+DEPTH = {"flank_size0": ints(1, 1, 4), "flank0": np.zeros((1, 2, 1, 4))}
+
+
+@pytest.mark.parametrize(
+    ("sections", "words"),
+    [
+        (DEPTH | {"flank_size0": ints(3, 1, 4)}, "sizes of the deviations"),
+        (DEPTH | {"flank0": np.zeros(7)}, "flank has the wrong length"),
+        (DEPTH | {"flank_size0": None}, "are not whole|wrong length"),
+        (DEPTH | {"flank0": None}, "are not whole|wrong length"),
+        ({"runout0": np.zeros(3)}, "runout has the wrong length"),
+        ({"index0": np.zeros(31)}, "index has the wrong length"),
+        ({"index0": np.zeros(33)}, "index has the wrong length"),
+        ({"index0": np.full(32, 0.1)}, "index deviations"),
+    ],
+)
+def test_each_rule_of_deviations(sections: dict[str, Any], words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        Kernel(changed(**sections))
+
+
+def test_deviations_of_either_sign_are_read() -> None:
+    assert Kernel(changed(**DEPTH | {"index0": np.full(32, -1e-3), "runout0": np.zeros(4)})).hash

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builds import edited_library
+from driven import begun, stepped
 from small_model import BASE, LENGTH, PSI, TEETH, WORKING, pair_blob
 
 from gearfmu.errors import ModelError, SimulationError
@@ -25,10 +26,7 @@ WIDTH, STRIP, YIELD = 14e-3, 1e-3, 2 * (1 - 0.3**2) / (math.pi * 206e9)  # of th
 def spinning(speed: float, **parameters: float) -> Kernel:
     """Both gears turn freely at the speed (rad/s) of the pinion, and do not touch."""
     kernel = Kernel(pair_blob(("torque", "torque")), parameters)
-    kernel.set("pinion.w_start", speed)
-    kernel.set("wheel.w_start", -speed * TEETH[0] / TEETH[1])
-    kernel.initialize()
-    return kernel
+    return begun(kernel, {"pinion.w_start": speed, "wheel.w_start": -speed * TEETH[0] / TEETH[1]})
 
 
 def status(kernel: Kernel) -> int:
@@ -44,8 +42,7 @@ def test_bit_1_says_that_the_patch_is_wider_than_the_local_law_reaches(hertz: fl
     limit = WIDTH * (STRIP / 1.5) ** 2 / beta
     for force, beyond in ((0.9 * limit, False), (3.5 * limit, True)):  # three pairs share the larger one
         kernel = Kernel(pair_blob(("torque", "fixed")), {"effect.hertz": hertz, "slices": 1})
-        kernel.set("pinion.tau", force * BASE[0])
-        kernel.initialize()
+        begun(kernel, {"pinion.tau": force * BASE[0]})
         kernel.step(0.0, 1e-6)
         assert kernel.get("mesh.force") == pytest.approx(force, rel=0.1) and kernel.get("mesh.pairs") <= 3
         assert status(kernel) == (BEYOND_THE_LAW if beyond and hertz else 0)
@@ -73,13 +70,9 @@ def test_bit_4_says_that_rounds_ran_out() -> None:
 
 def _loaded(library: Path | None, speed: float, torque: float) -> int:
     kernel = Kernel(pair_blob(("torque", "torque")), {"level": 0}, library)
-    kernel.set("pinion.w_start", speed)
-    kernel.set("wheel.w_start", -speed * TEETH[0] / TEETH[1])
-    kernel.set("pinion.tau", torque)
-    kernel.set("wheel.tau", torque * TEETH[1] / TEETH[0])
-    kernel.initialize()
-    for i in range(400):
-        kernel.step(i * STEP, STEP)
+    ratio = TEETH[1] / TEETH[0]
+    speeds = {"pinion.w_start": speed, "wheel.w_start": -speed / ratio}
+    stepped(begun(kernel, speeds | {"pinion.tau": torque, "wheel.tau": torque * ratio}), 400, STEP)
     return status(kernel)
 
 
@@ -88,8 +81,7 @@ def test_a_step_that_would_turn_the_gears_too_far_is_halved_until_it_does_not(tu
     """`turned` quarters of a pitch in one internal step, from the first on. A free gear's motion is exact with any
     step: φ = ωt, and no energy is lost."""
     kernel = spinning(turned * QUARTER / (STEP / 3))
-    for i in range(20):
-        kernel.step(i * STEP, STEP)
+    stepped(kernel, 20, STEP)
     angle = turned * QUARTER * 60
     assert kernel.get("solver.steps") == 60 * halves and kernel.get("solver.retried_steps") == 60 * (halves - 1)
     assert kernel.get("pinion.phi") == pytest.approx(angle, rel=1e-13) and status(kernel) == 0
@@ -107,8 +99,7 @@ def test_energy_guard_stops_a_run_that_gains_or_loses_half_of_all_energy(factor:
     """A state that goes on in gears of other inertia: the balance misses (1 − 1/factor) of the energy that there is.
     The failed run takes no further step, only a restored state."""
     kernel, blob = spinning(200.0), pair_blob(("torque", "torque"))
-    for i in range(5):
-        kernel.step(i * STEP, STEP)
+    stepped(kernel, 5, STEP)
     other = Kernel(heavier(blob, factor))
     other.initialize()
     own = other.save()

@@ -123,7 +123,6 @@ def test_a_kicked_pair_whirls_as_its_linear_system() -> None:
     flight = Flight(h=2e-6)
     flight.go(50)
     with_it, without = flight.error(), flight.error(known=False)
-    print(with_it, without)
     assert max(with_it) < 2e-4 and min(without) > 0.2
 
 
@@ -133,7 +132,6 @@ def test_the_step_is_of_second_order() -> None:
         flight = Flight(h=h)
         flight.go(50)
         errors.append(flight.error()[0])
-    print(errors)
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 
@@ -150,7 +148,6 @@ def test_turns_below_the_last_place_of_a_speed_give_no_energy(speed: float) -> N
         stored[i] = flight.kernel.get("energy.stored")
         assert flight.kernel.get("mesh.contact") == 0
     trend = len(stored) * np.polyfit(np.arange(len(stored)), stored, 1)[0]
-    print(f"{speed} rad/s: {trend / vibrating:.1e}")
     assert abs(trend) < 5e-6 * vibrating
 
 
@@ -158,7 +155,6 @@ def test_turns_below_the_last_place_of_a_speed_give_no_energy(speed: float) -> N
 def test_explicit_integrators_feel_them_too(integrator: float) -> None:
     flight = Flight(integrator=integrator, h=2.5e-7)
     flight.go(25)
-    print(flight.error(), flight.error(known=False))
     assert max(flight.error()) < 1e-3 < 0.03 < min(flight.error(known=False))
 
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import stepped
 from small_model import pair_blob, with_nodes
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
@@ -36,11 +37,7 @@ def run(blob: bytes, h: float, steps: int, names: tuple[str, ...], **parameters:
     """(steps, names) after every step; the left block is thrown against the right one."""
     kernel = Kernel(blob, {"level": PAPER, "contact": NODAL, "left.w_start": SPEED, "h": h} | parameters)
     kernel.initialize()
-    found = np.empty((steps, len(names)))
-    for i in range(steps):
-        kernel.step(i * h, h)
-        found[i] = [kernel.get(name) for name in names]
-    return found
+    return stepped(kernel, steps, h, *names)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
@@ -53,7 +50,6 @@ def test_rigid_blocks_are_a_spring_of_penalty_times_area(share: float, nodes: tu
     time, length = (np.arange(len(found)) + 1) * h, math.pi * math.sqrt(reduced / stiffness)
     peak = SPEED * math.sqrt(reduced * stiffness)
     exact = np.where(time < length, peak * np.sin(math.pi * time / length), 0.0)
-    print(f"force errs by {np.abs(found[:, 0] - exact).max() / peak:.1e} of its peak, {peak:.1f} N")
     assert time[-1] > length and np.abs(found[:, 0] - exact).max() < 1e-5 * peak
     left = SPEED * (MASSES[0] - MASSES[1]) / sum(MASSES)
     assert found[-1, 1] == pytest.approx(left, rel=1e-5)
@@ -71,7 +67,6 @@ def test_elastic_blocks_keep_momentum_and_energy() -> None:
     assert np.abs(momentum / (MASSES[0] * SPEED) - 1).max() < 1e-9
     assert np.abs(found[:, 2] / (0.5 * MASSES[0] * SPEED**2) - 1).max() < 1e-5
     drifts = [np.ptp(run(blob, h, round(4e-3 / h), names, integrator=CENTRAL)[:, 2]) for h in (16e-6, 4e-6)]
-    print(f"central drifts by {drifts} J, order {0.5 * math.log2(drifts[0] / drifts[1]):.2f}")
     assert 0.5 * math.log2(drifts[0] / drifts[1]) > 1.4
 
 
@@ -94,11 +89,7 @@ def test_a_model_with_nodes_that_are_not_asked_for_is_the_same() -> None:
 def _pair_run(blob: bytes, level: int, parameters: dict[str, float]) -> np.ndarray:
     kernel = Kernel(blob, {"level": level, "pinion.w_start": 200.0, "wheel.w_start": -133.0} | parameters)
     kernel.initialize()
-    found = []
-    for i in range(40):
-        kernel.step(i * 5e-6, 5e-6)
-        found.append([kernel.get(name) for name in ("mesh.force", "mesh.te", "energy.stored")])
-    return np.array(found)
+    return stepped(kernel, 40, 5e-6, "mesh.force", "mesh.te", "energy.stored")
 
 
 @pytest.mark.parametrize(

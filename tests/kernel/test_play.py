@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import stepped
 
 from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
@@ -35,11 +36,7 @@ def bounced(h: float, end: float, c: float = 0.0, play: float = PLAY, **paramete
     kernel.set("left.w", SPEED)
     kernel.initialize()
     kernel.set("left.w", 0.0)
-    found = []
-    for i in range(round(end / h)):
-        kernel.step(i * h, h)
-        found.append((kernel.get("left.gear.phi"), kernel.get("left.gear.w")))
-    return np.array(found)
+    return stepped(kernel, round(end / h), h, "left.gear.phi", "left.gear.w")
 
 
 def exact(time: np.ndarray) -> np.ndarray:

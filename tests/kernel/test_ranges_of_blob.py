@@ -129,3 +129,10 @@ def test_every_row_of_the_header_is_tried_and_used() -> None:
     torque = {v.name: v for v in Kernel(pair_blob(("torque", "fixed"))).variables.values()}["pinion.tau"]
     assert (torque.minimum, torque.maximum) == kernel_limits()["TORQUE"]
     assert HEADER.read_text(encoding="utf-8").count("#define GK_LOW_") == len(kernel_limits())
+
+
+@pytest.mark.parametrize(("name", "value"), [("slices", 2.5), ("mesh.force", 0.0), ("no.such", 0.0)])
+def test_what_no_variable_takes_is_refused(name: str, value: float) -> None:
+    kernel = Kernel(BLOB)
+    with pytest.raises(ModelError, match=re.escape(name) if name != "no.such" else "no variable"):
+        kernel.set(name, value)

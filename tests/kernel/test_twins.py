@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from driven import stepped
 from golden_models import golden_model
 
 from gearfmu.kernel import Kernel
@@ -43,8 +44,7 @@ def moved(blob: bytes) -> bytes:
 def state_after_steps(blob: bytes, level: float, friction: float) -> bytes:
     kernel = Kernel(blob, {"level": level, "slices": 1.0, "effect.friction": friction})
     kernel.initialize()
-    for k in range(3):
-        kernel.step(k * STEP, STEP)
+    stepped(kernel, 3, STEP)
     return kernel.save()
 
 

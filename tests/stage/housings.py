@@ -1,8 +1,6 @@
-"""Housings for tests, made of a few numbers: rigid ones, and ones with drawn modes."""
+"""A housing for tests, made of a few numbers: rigid, or with drawn modes."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -45,34 +43,19 @@ def housing_of(stage: Stage, mass: float, modes: int = 0, seed: int = 1, sensors
     if sensors:
         own = rng.standard_normal((3 * len(SENSORS), modes)) / np.sqrt(mass)
         at = np.array(list(SENSORS.values()))
-        felt = Sensors(
-            tuple(SENSORS),
-            at,
-            own,
-            (own / (2 * np.pi * frequency) ** 2) @ rows.T,
-        )
-    return _body(stage.housings[0].name, points, felt, mass=mass, frequency=frequency, rows=rows, static=static)
-
-
-def rigid_block(name: str, mass: float, points: dict[str, tuple[float, float, float]]) -> Body:
-    """A rigid housing of that mass with these points."""
-    size, places = 6 * len(points), {own: np.array(point) for own, point in points.items()}
-    rigid = {"frequency": np.zeros(0), "rows": np.zeros((size, 0)), "static": np.zeros((size, size))}
-    return _body(name, places, None, mass=mass, **rigid)
-
-
-def _body(name: str, points: dict[str, np.ndarray], sensors: Sensors | None, **own: Any) -> Body:
-    centre, mass = np.array([0.1, 0.06, 0.07]), own.pop("mass")
-    fields, spin = np.eye(6), mass * 0.3**2 / 6 * np.eye(3)
+        felt = Sensors(tuple(SENSORS), at, own, (own / (2 * np.pi * frequency) ** 2) @ rows.T)
+    centre, fields, spin = np.array([0.1, 0.06, 0.07]), np.eye(6), mass * 0.3**2 / 6 * np.eye(3)
     fields[:3] = rigid_fields(centre)
     inertia = fields.T @ np.block([[mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), spin]]) @ fields
     return Body(
-        name=name,
+        name=stage.housings[0].name,
         how=How("0" * 64, "drawn"),
         mass=inertia,
         nodes=tuple(Node(at, "rigid", COMPONENTS, p, (p[2] - 0.01, p[2] + 0.01)) for at, p in points.items()),
-        damping_ratio=np.full(len(own["frequency"]), 0.01),
+        frequency=frequency,
+        damping_ratio=np.full(modes, 0.01),
+        rows=rows,
+        static=static,
         error=FrfError.of(np.array([50.0, 1e4]), np.zeros(2), (50.0, 1e4), 0.4, ()),
-        sensors=sensors,
-        **own,
+        sensors=felt,
     )

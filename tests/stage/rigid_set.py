@@ -2,8 +2,7 @@
 
 The spec is that of planetary54 with other teeth, places, springs and planets; what `assemble` reads of a reduced body
 is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard
-that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact. A helical tooth
-in more slices than width functions needs flanks of steel: without local compliance forces are not unique.
+that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,7 +52,7 @@ class Rigid:
 class RigidSet:
     """teeth of sun and planet; contact_ratio of both meshes; mesh (N/m): of one pair of teeth; ring_twist (N/m):
     stiffness against turning of the ring over the square of its base radius; torque (N·m) on the carrier: the static
-    load is small beside what the teeth would need to leave their places; youngs_modulus (Pa): of the flanks."""
+    load is small beside what the teeth would need to leave their places."""
 
     planets: int
     teeth: tuple[int, int] = (26, 34)
@@ -76,7 +74,6 @@ class RigidSet:
     width: float = WIDTH
     slices: int = 1
     functions: int = 1
-    youngs_modulus: float = HARD
 
     @property
     def transverse(self) -> tuple[float, float]:
@@ -112,10 +109,12 @@ class RigidSet:
         return 2 * np.pi * np.asarray(places) / steps
 
     def spec(self) -> Stage:
-        """The set in the terms of a stage file."""
+        """The set in the terms of a stage file: hard gears without relief, sharp tips that give the contact ratio."""
         shipped = load_stage("planetary54")
-        alike = {"normal_module": self.module, "pressure_angle": self.pressure_angle}
-        update = alike | {
+        own, radius = shipped.written, math.sqrt(self.ring_twist / self.ring.bearing) * self.base("ring")
+        update = {
+            "normal_module": self.module,
+            "pressure_angle": self.pressure_angle,
             "planets": self.planets,
             "center_distance": self.distance,
             "backlash": 60e-6,
@@ -123,41 +122,28 @@ class RigidSet:
             "load_sharing": 4.0,
             "helix_angle": self.helix_angle,
         }
-        if self.positions is not None:
-            update["positions"] = self.positions
-        all_mounts = self.ring.bearing
-        radius = math.sqrt(self.ring_twist / all_mounts) * self.base("ring")
-        mounts = shipped.written.ring.mounts.model_copy(
-            update={"points": 1, "stiffness": all_mounts, "damping_ratio": self.damping_ratio}
-        )
-        ring = {"teeth": self.ring_teeth, "rim_diameter": 2 * radius, "mounts": mounts} | self._common(
-            shipped.written.ring
-        )
+        springs = {"points": 1, "stiffness": self.ring.bearing, "damping_ratio": self.damping_ratio}
+        gears = {}
+        for name, teeth in zip(("sun", "planet", "ring"), (*self.teeth, self.ring_teeth), strict=True):
+            gear = getattr(own, name)
+            hard = gear.material.model_copy(update={"youngs_modulus": HARD})
+            of_gear = {"teeth": teeth, "face_width": self.width, "material": hard}
+            of_gear |= {"tip_edge_radius": EDGE, "tip_diameter": self._tip(name)}
+            if name == "ring":
+                of_gear |= {"rim_diameter": 2 * radius, "mounts": own.ring.mounts.model_copy(update=springs)}
+            else:
+                of_gear |= {"tip_relief": None, "bearing": self._bearing(getattr(self, name))}
+            gears[name] = gear.model_copy(update=of_gear)
+        contact = {"slices": self.slices, "damping": self.contact_damping / self.width}
         return rewritten(
             shipped,
             name="rigid_set",
-            set=shipped.written.set.model_copy(update=update),
-            sun=shipped.written.sun.model_copy(
-                update={"teeth": self.teeth[0], "bearing": self._bearing(self.sun)} | self._common(shipped.written.sun)
-            ),
-            planet=shipped.written.planet.model_copy(
-                update={"teeth": self.teeth[1], "bearing": self._bearing(self.planet)}
-                | self._common(shipped.written.planet)
-            ),
-            ring=shipped.written.ring.model_copy(update=ring),
-            carrier=shipped.written.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
+            set=own.set.model_copy(update=update | ({"positions": self.positions} if self.positions else {})),
+            carrier=own.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
             ports={"carrier": TORQUE, "sun": TORQUE} | dict(self.ports),
-            contact=shipped.written.contact.model_copy(
-                update={"slices": self.slices, "damping": self.contact_damping / self.width}
-            ),
+            contact=own.contact.model_copy(update=contact),
+            **gears,
         )
-
-    def _common(self, gear: Any) -> dict[str, Any]:
-        """Hard material, no relief, sharp tips that give the contact ratio."""
-        material = gear.material.model_copy(update={"youngs_modulus": self.youngs_modulus})
-        found: dict[str, Any] = {"material": material, "tip_edge_radius": EDGE, "tip_diameter": self._tip(gear.name)}
-        found["face_width"] = self.width
-        return found | ({} if gear.name == "ring" else {"tip_relief": None})
 
     def _tip(self, name: str) -> float:
         """Tip diameter (m): the flank ends half the length of contact beyond the pitch point."""
@@ -169,12 +155,8 @@ class RigidSet:
 
     def _bearing(self, body: Rigid) -> Any:
         shipped = load_stage("planetary54").written.sun.bearing
-        return shipped.model_copy(
-            update={
-                "stiffness": body.bearing, "axial": OUT_OF_PLANE, "tilt": OUT_OF_PLANE,
-                "damping_ratio": self.damping_ratio,
-            }
-        )  # fmt: skip
+        springs = {"stiffness": body.bearing, "axial": OUT_OF_PLANE, "tilt": OUT_OF_PLANE}
+        return shipped.model_copy(update=springs | {"damping_ratio": self.damping_ratio})
 
     def bodies(self) -> list[Any]:
         """Sun, planet, ring and carrier as `assemble` reads them."""
@@ -189,9 +171,9 @@ class RigidSet:
         return assemble(self.spec(), self.bodies(), rolls=4)
 
 
-def kernel_of(model: StageModel, library: Path | None = None, **parameters: float) -> Kernel:
+def kernel_of(model: StageModel, **parameters: float) -> Kernel:
     """Prepared: nothing but springs of the meshes, one slice."""
-    kernel = Kernel(model.blob, SPRINGS | parameters, library)
+    kernel = Kernel(model.blob, SPRINGS | parameters)
     kernel.prepare()
     return kernel
 

@@ -43,7 +43,6 @@ def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
         want = (flank.turning, flank_rows(group, g)[..., read], flank_supports(group, g), flank.residual)
         have = (found.rows, found.ground, found.supports, found.residual)
         errors = [np.abs(a - b).max() / np.abs(b).max() for a, b in zip(have, want, strict=True)]
-        print(f"gear {g}, mirrored {mirrored}:", " ".join(f"{error:.1e}" for error in errors))
         assert max(errors) < 1e-9
 
 

@@ -54,7 +54,6 @@ def test_at_rest_bearings_and_ports_hold_the_contact_force(
     force = torque / pair.gears[0].r_b
     on_pinion, on_wheel = (bearing(kernel, shaft) for shaft in SHAFTS)
     along = push(pair, drive=torque > 0)
-    print(f"{force:.1f} N: pinion {on_pinion} N, wheel {on_wheel} N, along {along}")
     assert kernel.get("mesh.force") == pytest.approx(force, rel=1e-6)
     assert kernel.get("wheel.tau") == pytest.approx(-torque * 24 / 16, rel=1e-6)
     assert np.allclose(on_pinion, abs(force) * along, rtol=0, atol=5e-5 * abs(force))
@@ -77,5 +76,4 @@ def test_on_average_nothing_is_left_of_contact_and_bearing_forces(relieved: Stag
     for shaft, sign in zip(SHAFTS, (1, -1), strict=True):
         for kind, share in (("_mean", 3e-3), ("", 6e-3)):
             found = [trace[f"bearing.{shaft}.f{axis}{kind}"][settled].mean() for axis in "xy"]
-            print(f"{shaft} {kind or 'end'}: {np.array(found)} N, {sign * wanted} N")
             assert np.allclose(found, sign * wanted, rtol=0, atol=share * force)

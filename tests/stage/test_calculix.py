@@ -74,7 +74,6 @@ def test_pair_stiffness_at_the_pitch_point(plain: StageModel, spec: Stage, pair:
     secant = 1e-9 * LINE_LOAD / state.te
     assert theoretical_stiffness(spec) == pytest.approx(15.78e9, rel=1e-3) and rack_factor(spec) == 0.975
     iso = 1e-9 / (1 / (theoretical_stiffness(spec) * rack_factor(spec)) + disc_torsion(spec, pair))
-    print(f"kernel {secant:.3f}, CalculiX {SECANT['half_width_averaged']:.3f}, ISO {iso:.2f} N/(mm µm)")
     assert secant == pytest.approx(SECANT["half_width_averaged"], rel=0.015)
     assert secant == pytest.approx(iso, rel=0.10)
 
@@ -88,9 +87,6 @@ def beside(ours: TeResult, table: str) -> Iterator[tuple[np.ndarray, np.ndarray]
         here = curve[[round(positions.POSITIONS * float(row["position"])) for row in own]]
         theirs = np.array([float(row["te_um"]) for row in own])
         assert len(own) == positions.POSITIONS
-        print(f"{torque} N·m: mean {here.mean():.3f} / {theirs.mean():.3f} µm, peak to peak {np.ptp(here):.3f} / "
-              f"{np.ptp(theirs):.3f} µm, {100 * (here / theirs - 1).min():+.2f} … "
-              f"{100 * (here / theirs - 1).max():+.2f} %")  # fmt: skip
         yield here, theirs
 
 

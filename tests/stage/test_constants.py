@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from inner import Inner
-from small_model import pair_blob
 
 import gearfmu as gf
 from gearfmu.stage import StageModel, Steady, simulate
-from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob
 
 BENEDICT_KELLEY, ISO_TR_14179 = 1.0, 2.0
 
@@ -84,30 +82,6 @@ def test_a_run_takes_the_speeds_and_the_load_of_its_contact(spur: StageModel) ->
 
 
 # ---- contact ---------------------------------------------------------------------------------------------------------
-
-
-def test_a_flank_yields_by_its_modulus(spur: StageModel) -> None:
-    """2(1 − ν²)/(πE) of steel, 206 GPa and 0.3: 1.82/6.471681e11 = 2.812252e-12 m²/N (Weber and Banaschek 1953)."""
-    sections = read_blob(spur.blob)
-    for g in (0, 1):
-        numbers = dict(zip(GEAR_NUMBERS, sections[f"gear{g}"], strict=True))
-        assert numbers["local"] == pytest.approx(2.812252e-12, rel=1e-6)
-
-
-def test_the_approach_of_hertz_falls_by_half_a_logarithm(inner_library: Path) -> None:
-    """b² = 4 f R/(π E*): where the load is four times as high b is twice as wide, and approach per load falls by
-    Σ 2(1 − ν²)/(πE)·ln 2; as it does where the curvature is a quarter."""
-    blob = pair_blob()
-    sections, slices = read_blob(blob), 3
-    numbers = [dict(zip(GEAR_NUMBERS, sections[f"gear{g}"], strict=True)) for g in (0, 1)]
-    local, width = sum(n["local"] for n in numbers), min(n["face_width"] for n in numbers) / slices
-    inner = Inner(inner_library, blob, {"slices": slices})
-    force, curvature = 300.0, 150.0
-    (light, *_), (heavy, *_) = inner.law(force, curvature), inner.law(4 * force, curvature)
-    flat = inner.law(force, 0.25 * curvature)[0]
-    fall = local * math.log(2.0) / width
-    assert light / force - heavy / (4 * force) == pytest.approx(fall, rel=1e-9)
-    assert (light - flat) / force == pytest.approx(fall, rel=1e-9)
 
 
 def test_helical_flanks_are_curved_in_their_normal_section(inner_library: Path) -> None:

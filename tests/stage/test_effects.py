@@ -18,6 +18,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.scenefile.scene import Effects
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, costs, torque_on_flanks_alone
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
@@ -47,9 +48,7 @@ def free(spec: Stage, bodies: list[Body]) -> StageModel:
 
 
 def state(model: StageModel, position: float, torque: float, **parameters: float):
-    kernel = model.kernel(**{"level": RIGID, **parameters})
-    kernel.prepare()
-    return kernel.transmission(-position * PITCH, torque)
+    return statics_of(model, **parameters).transmission(-position * PITCH, torque)
 
 
 def te(model: StageModel, position: float, torque: float, **parameters: float) -> float:
@@ -73,7 +72,6 @@ def test_elastic(plain: StageModel, hand: Pair) -> None:
     (rolls,) = hand.rolls(SINGLE).values()
     rigid, elastic = hand.te(SINGLE, LOAD), hand.te(SINGLE, LOAD, elastic=hand.compliance(rolls, 5))
     off, on = te(plain, SINGLE, LOAD, **HELD | STIFF), te(plain, SINGLE, LOAD, **HELD)
-    print(f"off {1e6 * off:.3f} µm (by hand {1e6 * rigid:.3f}), on {1e6 * on:.3f} µm (by hand {1e6 * elastic:.3f})")
     assert off == pytest.approx(rigid, rel=1e-4) and on == pytest.approx(elastic, rel=2e-3)
     assert on > 3 * off
 
@@ -110,9 +108,6 @@ def elastic_angle_error(trace: Trace, body: Body, cut: float, damped: bool) -> f
     by_hand = TORQUE * bore_angle(body, time, cut, damped)[acting]
     largest = (by_hand - TORQUE * 0.5 * time[acting] ** 2 / body.inertia[2, 2]).max()
     error = float(np.abs(angle[acting] - by_hand).max() / largest)
-    print(
-        f"{trace.meta['n_dyn']} modes, damped {damped}: elastic up to {1e6 * largest:.2f} µrad, error {error:.1e} of it"
-    )
     return error
 
 
@@ -122,7 +117,6 @@ def test_residual(plain: StageModel, hand: Pair) -> None:
     for level, modes_only in ((PAPER, True), (FULL, False)):
         by_hand = hand.te(SINGLE, LOAD, elastic=hand.compliance(rolls, 5, modes_only))
         found = te(plain, SINGLE, LOAD, level=level, **HELD)
-        print(f"modes only {modes_only}: {1e6 * found:.3f} µm, by hand {1e6 * by_hand:.3f} µm")
         assert found == pytest.approx(by_hand, rel=6e-3 if modes_only else 2e-3)  # bores are held with all they yield
     with pytest.raises(ModelError, match=r"effect\.residual"):
         te(plain, SINGLE, LOAD, **{"effect.residual": 0.0})
@@ -149,7 +143,6 @@ def test_slices(plain: StageModel, hand: Pair, slices: int) -> None:
     found = state(plain, SINGLE, LOAD, slices=slices, **HELD)
     ((_, forces),) = ((key, f) for key, f in found.forces.items() if sum(f) > 0)
     shares = np.array(forces) / sum(forces)
-    print(f"{slices} slices: te {1e6 * found.te:.3f} µm, ends carry {slices * shares[0]:.4f} of the mean")
     assert found.te == pytest.approx(te_by_hand, rel=2e-3)
     assert np.allclose(slices * shares, slices * shares_by_hand, atol=5e-3)
     rigid = state(plain, SINGLE, LOAD, slices=slices, **HELD, **STIFF)
@@ -193,11 +186,10 @@ def test_contact_damping(free: StageModel, hand: Pair, damping: float) -> None:
     ring = decay * (np.cos(phase) + zeta / math.sqrt(1 - zeta**2) * np.sin(phase))
     by_hand = force[1] / stiffness - step * ring
     error = np.abs(y - by_hand)[2:].max() / step
-    print(f"{omega / 2 / math.pi:.0f} Hz, ζ = {zeta:.4f}, decays to {decay[-1]:.3f}; error {error:.1e} of the step")
     assert error < 0.02 and trace["mesh.contact"].min() == 1
 
 
-def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: Stage, pair: PairGeometry) -> None:
+def test_tip_relief(relieved: StageModel, relief_spec: Stage, pair: PairGeometry) -> None:
     """Unloaded: te is the smallest depth of relief, both gears together, among the pairs on their flanks. Off: none."""
     flanks = {"effect.tip_contact": 0.0}
     off = loaded_te(relieved, [0.0], 24, **flanks, **{"effect.tip_relief": 0.0})
@@ -205,7 +197,6 @@ def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: Stage,
     by_hand = [
         min(depth(relief_spec, pair, rolls) for rolls in Pair(relief_spec, ()).rolls(p).values()) for p in on.position
     ]
-    print(f"unloaded te up to {1e6 * on.te.max():.3f} µm, by hand {1e6 * max(by_hand):.3f} µm")
     assert np.abs(off.te).max() < 5e-9 and max(by_hand) > 0.5e-6
     assert np.allclose(on.te[0], by_hand, atol=1e-8)
 
@@ -227,7 +218,6 @@ def test_tip_contact(plain: StageModel, hand: Pair, beyond: float) -> None:
     gap = hand.corner(position, 0)[0]
     (rolls,) = hand.rolls(position).values()
     touching = hand.touch_torque(rolls, gap)
-    print(f"gap {1e6 * gap:.3f} µm, closed at {touching:.2f} N·m")
     for torque, closed in ((0.97 * touching, False), (1.03 * touching, True), (3 * touching, True)):
         on, off = (state(plain, position, torque, **HELD | STIFF, **{"effect.tip_contact": f}) for f in (1.0, 0.0))
         assert off.te == pytest.approx(hand.te(position, torque), rel=1e-3)
@@ -247,7 +237,6 @@ def test_a_tip_corner_yields_by_the_law_with_the_curvature_of_its_edge(
     gap, roll = hand.corner(position, 0, found.te)
     load = sum(found.forces[DRIVE, 0]) / hand.width
     by_hand = hand.corner_approach(beyond + found.te, roll, load)
-    print(f"{load * hand.width:.0f} N: {-1e6 * gap:.4f} µm closer, by hand {1e6 * by_hand:.4f} µm")
     assert load > 1e3 and -gap == pytest.approx(by_hand, rel=1e-4)
 
 
@@ -255,7 +244,6 @@ def test_tip_contact_off_is_exact_until_a_loaded_flank_ends(relieved: StageModel
     """Below the torque at which corners begin to carry: nothing changes. Above: a loaded pair vanishes, and bit 16 of
     the status says so."""
     limit = torque_on_flanks_alone(relieved)
-    print(f"flanks carry alone up to {limit:.1f} N·m")
     for torque, ended in ((0.8 * limit, 0), (2 * limit, 16)):
         inputs = Steady(relieved, 200.0, torque)
         on, off = (simulate(relieved, inputs, 4e-3, 5e-5, {"level": 1, "effect.tip_contact": f}) for f in (1, 0))
@@ -273,7 +261,6 @@ def test_bearings(plain: StageModel, hand: Pair) -> None:
     springs = sum(1 / gear.bearing.stiffness for gear in hand.spec.written.gears)
     force = LOAD / hand.geometry.gears[0].r_b
     off, on = (te(plain, SINGLE, LOAD, **STIFF, **{"effect.bearings": flag}) for flag in (0.0, 1.0))
-    print(f"bearings add {1e6 * (on - off):.3f} µm, by hand {1e6 * force * springs:.3f} µm")
     assert off == pytest.approx(hand.te(SINGLE, LOAD), rel=1e-4)
     assert on - off == pytest.approx(force * springs, rel=2.5e-2)  # the bore yields in series with its bearing
 
@@ -288,7 +275,6 @@ def test_roll_motion(plain: StageModel, hand: Pair) -> None:
         by_hand = [hand.te(0.0, force * hand.geometry.gears[0].r_b) for force in trace["mesh.force"]]
         assert (trace["mesh.pairs"].max() == 2) == bool(on)
         off_by = np.abs(trace["mesh.te"] / by_hand - 1).max()
-        print(f"on {on}: te off by {off_by:.1e}")
         assert off_by > 0.2 if on else off_by < 2e-3
 
 

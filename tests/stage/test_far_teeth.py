@@ -56,5 +56,4 @@ def test_engagements_feel_each_other_as_at_level_full(name: str, level: float) -
     exact = compliance(linear(blob, FULL))
     without = write_blob({name: part for name, part in read_blob(blob).items() if not name.startswith("far_")})
     found, bare = error(blob, level, exact), error(without, level, exact)
-    print(f"level {level:g}: error {found:.1e} of own compliance, {bare:.1e} without far teeth")
     assert found < LIMITS[level] < bare

@@ -78,7 +78,6 @@ def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: in
         kernel, count = falling(h, integrator, ON), round(end / h)
         (d,) = fall(kernel, count, h)
         worst.append(np.abs(d - exact(h * np.arange(1, count + 1))[0]).max())  # type: ignore[operator]
-    print(worst, d[-1])
     assert d[-1] < 5e-6 and kernel.get("solver.retried_steps") == 0
     assert worst[-1] < 3e-9 if order else worst[-1] < 1e-10
     if order:
@@ -92,7 +91,6 @@ def test_momentum_and_thickness_are_the_closed_form() -> None:
     d, left, right = fall(falling(h, DG4, ON), 400, h, "left.gear.w", "right.gear.w")
     momentum = MASS * (SPEED - left + right) + LOAD * h * np.arange(1, 401)
     expected = np.array([film_impulse(REACH, **OIL) - film_impulse(min(at, REACH), **OIL) for at in d])
-    print(np.abs(momentum - expected).max(), momentum[-1])
     assert momentum == pytest.approx(expected, abs=2e-5 * momentum[-1])
     factor = 3 * math.sqrt(2) * math.pi * OIL["viscosity"]
     endless = factor * 2 * ((d + OIL["roughness"]) ** -0.5 - (REACH + OIL["roughness"]) ** -0.5)
@@ -111,7 +109,6 @@ def test_force_is_continuous_where_flanks_touch() -> None:
         touch = int(np.flatnonzero(pairs)[0])
         assert force[touch - 1] > 0 and force.min() >= 0.0
         largest.append(np.abs(np.diff(force[touch - 5 : touch + 5])).max())
-    print(largest)
     assert largest[1] < 0.65 * largest[0]
 
 
@@ -140,7 +137,6 @@ def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, dam
                     "effect.contact_damping": damped, "effect.modal_damping": damped}  # fmt: skip
         kernel = started(pair_free, start, settings)
         found = energies(kernel, 1e-5, 0.02)
-        print(viscosity, f"drift {found.drift:.1e}, growth {found.growth:.1e}, retried_steps {found.retried_steps}")
         assert found.drift < 5e-6 and found.growth < grown  # single: 5e-7 without a film, 1.4e-6 with one
         assert found.retried_steps <= unsolved
         assert np.diff(found.dissipated).min() > -back * found.kinetic

@@ -46,8 +46,6 @@ def test_an_eccentric_planet_at_one_angle_is_a_pin_out_of_its_place(spec: Stage,
     eccentric = in_set(spec, planet_eccentricity={1: Eccentricity(amount=e, angle=bolt + direction - phase)})
     pinned = in_set(spec, pin_errors={1: (e * math.cos(direction), e * math.sin(direction))})
     plain, found, expected = (loaded_te(assemble(s, parts), [TORQUE], 1) for s in (spec, eccentric, pinned))
-    shares = found.sharing[0, 0, :, 1], expected.sharing[0, 0, :, 1], plain.sharing[0, 0, :, 1]
-    print(f"shares of planet 2 at sun and ring {shares[0]}, by its pin {shares[1]}, in place {shares[2]}")
     change = np.abs(expected.sharing - plain.sharing).max()
     assert change > 0.02 and np.abs(found.sharing - expected.sharing).max() < 0.01 * change
     assert found.te == pytest.approx(expected.te, abs=0.01 * np.abs(expected.te - plain.te).max())
@@ -82,5 +80,4 @@ def test_relief_of_a_ring_opens_its_mesh(spec: Stage, parts: list[Any]) -> None:
         assert (f"flank{number}" in sections) is (kind == "linear")
         errors.append(loaded_te(model, [TORQUE], 2).te[0] - loaded_te(plain, [TORQUE], 2).te[0])
     linear, parabolic = np.abs(errors)
-    print(f"te by relief {1e6 * linear} µm, parabolic {1e6 * parabolic} µm")
     assert 0.1e-6 < parabolic.max() < linear.max() < 20e-6

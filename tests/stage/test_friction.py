@@ -1,11 +1,12 @@
 """Friction of the flanks: exact solutions of a block on a spring, force across the line of action, energy, losses,
-coefficients, and what a stage file says of it. Gears are rigid where nothing else is said: statics by hand then."""
+coefficients, what a stage file says of it, and the steps at which its γ is lowered. Gears are rigid where nothing else
+is said: statics by hand then."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from evidence.energy.free import CONSERVING, FreePair, Rattle, energies, started
 from gearfmu.body import Body, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.kernel.binding import status_words
+from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob
 from gearfmu.stage.run.efficiency import loss_factor, mesh_efficiency
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
@@ -88,24 +90,6 @@ def swinging(spec: Stage, bodies: Sequence[Any], port: PortSpec) -> bytes:
     return pair.place(Rattle(position=0.62, load=1.0))
 
 
-@dataclass(frozen=True)
-class Swings:
-    """Turning points by the exact solution and by the kernel, rad; rest: mean angle of the last swings of the elastic
-    contact about where it stays; slipped: energy that friction took in that time over what it took at all."""
-
-    expected: list[float]
-    turns: list[float]
-    rest: float
-    slipped: float
-
-    @property
-    def error(self) -> float:
-        """Largest error of all points over the first swing."""
-        swing = abs(self.expected[1] - self.expected[0])
-        found = [*self.turns[: len(self.expected) - 2], self.rest]
-        return float(np.max(np.abs(np.array(found) - self.expected[1:]))) / swing
-
-
 MU = 0.3
 WEIGHT, TIMES, FALL_STEP = 0.175, 60.0, 1e-5  # of the pendulum: N m, turns of its arm per turn of the pinion, s
 FROZEN = {**CONSERVING, **RIGID, "effect.bearings": 0.0, "effect.hertz": 0.0, "effect.tip_relief": 0.0}
@@ -134,8 +118,10 @@ def swing(
     act: Callable[[], None],
     potential: Callable[[float], float],
     steps: int,
-) -> Swings:
-    """A started kernel against the exact solution. `act`: what is done before each step; of `potential` (J)."""
+) -> tuple[float, float]:
+    """A started kernel against the exact solution: largest error of turning points and of the place where it stays (the
+    mean over the last swings of the elastic contact), over the first swing; energy that friction took in those swings
+    over what it took at all. `act`: what is done before each step; of `potential` (J)."""
     h, torque = kernel.get("h"), kernel.get("wheel.tau")
     geometry = spec.written.geometry
     s_a, s_b = rolls(blob, kernel, geometry.alpha_wt)
@@ -149,9 +135,10 @@ def swing(
         seen.append([kernel.get(name) for name in ("pinion.gear.phi", "mesh.friction_loss")])
     phi, lost = np.array(seen).T
     assert kernel.get("mesh.pairs") == 1 and len(expected) > 10 and kernel.get("solver.retried_steps") == 0
-    turns = extremes(phi, 0.005 * abs(expected[1] - expected[0]))
-    late = -steps // 10
-    return Swings(expected, turns, float(phi[late:].mean()), float((lost[-1] - lost[late]) / lost[-1]))
+    first, late = abs(expected[1] - expected[0]), -steps // 10
+    found = [*extremes(phi, 0.005 * first)[: len(expected) - 2], phi[late:].mean()]
+    error = np.max(np.abs(np.array(found) - expected[1:])) / first
+    return float(error), float((lost[-1] - lost[late]) / lost[-1])
 
 
 @pytest.mark.parametrize("integrator", [0.0, EM])
@@ -170,9 +157,8 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
         kernel.set("pinion.phi", outer)
         kernel.set("pinion.w", 0.0)
 
-    found = swing(spec, blob, kernel, turn, lambda angle: 0.5 * stiffness * (angle - outer) ** 2, 10000)
-    print(f"error {found.error:.1e} of the first swing, {found}")
-    assert found.error < 5e-3 and abs(found.slipped) < 1e-5
+    error, slipped = swing(spec, blob, kernel, turn, lambda angle: 0.5 * stiffness * (angle - outer) ** 2, 10000)
+    assert error < 5e-3 and abs(slipped) < 1e-5
 
 
 def pendulum(
@@ -199,9 +185,8 @@ def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: Stage, bodies:
     """The same with a weight on an arm that turns 60 times as far as the pinion instead of the spring, swinging by 30°
     about where the wheel lifts it to: its torque is set before each step for the angle in its middle."""
     blob, kernel, fall, hangs = pendulum(spec, bodies, 7.5)
-    found = swing(spec, blob, kernel, fall, lambda angle: -WEIGHT * math.cos(TIMES * (angle - hangs)), 30000)
-    print(f"error {found.error:.1e} of the first swing, {found}")
-    assert found.error < 5e-3 and abs(found.slipped) < 1e-5
+    error, slipped = swing(spec, blob, kernel, fall, lambda angle: -WEIGHT * math.cos(TIMES * (angle - hangs)), 30000)
+    assert error < 5e-3 and abs(slipped) < 1e-5
 
 
 @pytest.mark.parametrize("more", [0, 4, 5, 13, 14, 21, 28])
@@ -241,7 +226,6 @@ def test_below_the_limit_of_friction_nothing_moves(spec: Stage, bodies: list[Bod
         kernel.step(i * 1e-3, 1e-3)
         slid.append(s_a * kernel.get("pinion.gear.phi") + s_b * kernel.get("wheel.gear.phi"))
     free, lost = 0.1e-3 * s_a, kernel.get("mesh.friction_loss")
-    print(f"slid {np.ptp(slid):.1e} m in 0.1 s, of {free:.1e} m without friction; lost {lost:.1e} J")
     drift = abs(np.mean(slid[50:]) - np.mean(slid[:50]))
     assert abs(lost) < 1e-12 and drift < 2e-4 * free  # it yields and rings, undamped
     assert np.ptp(slid) < 3e-3 * free  # 2.4e-3 at 1 ms, what shorter steps converge to: 2.3e-3 … 2.4e-3
@@ -261,9 +245,6 @@ def test_friction_takes_what_the_energy_loses(pair_free: FreePair, start: Rattle
     """Mesh damping off, frozen position: stored energy and what friction took are constant; it never grows."""
     kernel = started(pair_free, start, {**RIGID, "h": h, "friction_coefficient": 0.1})
     found = energies(kernel, h, 0.02)
-    print(
-        f"drift {found.drift:.1e}, growth {found.growth:.1e}, lost {found.dissipated[-1]:.2e} of {found.kinetic:.2e} J"
-    )
     highest = np.max(found.total - np.minimum.accumulate(found.total)) / found.kinetic
     assert found.drift < 1e-5 and highest < 5e-5 * found.stored[0] / found.kinetic + 1e-6
     assert found.dissipated[-1] > 1e-4 * found.kinetic
@@ -286,7 +267,6 @@ def test_force_across_the_line_of_action_jumps_at_the_pitch_point(spec: Stage, b
         np.polyval(np.polyfit(after, across[after], 1), at) - np.polyval(np.polyfit(before, across[before], 1), at)
     )
     force = 2 * mu * trace["mesh.force"][at - 360 : at + 360].mean()
-    print(f"{rpm} rpm: {jump:.2f} N, 2 µ F {force:.2f} N")
     assert jump == pytest.approx(force, rel=0.01)
 
 
@@ -309,7 +289,6 @@ def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: Stage, bodies: 
     """A spur pair with a constant coefficient: teeth that yield share the load more gently than evenly, so that the
     run loses less, but not by a tenth."""
     found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
-    print(found.columns())
     assert found.meshes["mesh"].coefficient == pytest.approx(0.05, rel=0.02) and found.retried_steps == 0
     assert found.lost == pytest.approx(found.closed, rel=0.1)
     assert 0.98 < found.efficiency < 1.0
@@ -363,3 +342,38 @@ def test_bodies_that_do_not_know_their_profile_are_refused(spec: Stage, bodies: 
 def test_other_integrators_refuse_friction(helical: StageModel, integrator: float) -> None:
     with pytest.raises(ModelError, match="integrator dg4 or em"):
         helical.kernel(**{"effect.friction": 1.0, "integrator": integrator}).prepare()
+
+
+# ---- steps at which friction used to make forces alternate: γ is lowered there, and there alone ----------------------
+def rubbing(h: float, on: bool = True) -> dict[str, float]:
+    return {"level": 1.0, "h": h, "effect.friction": float(on), "friction_coefficient": 0.1}
+
+
+def rolling(model: StageModel, h: float, on: bool = True) -> Trace:
+    """4 ms, every internal step recorded."""
+    return simulate(model, Steady(model, 2000 * math.pi / 30, 600.0), 4e-3, h, rubbing(h, on))
+
+
+@pytest.mark.parametrize("h", [3.4e-6, 3.57e-6, 3.7e-6])
+def test_forces_do_not_alternate_from_step_to_step(relieved: StageModel, h: float) -> None:
+    """With the limit of frictionless contact the second difference of the force was 0.8 to 1.5 of its mean."""
+    trace = rolling(relieved, h)
+    force = trace["mesh.force"]
+    assert np.std(np.diff(force, 2)) < 0.03 * np.mean(force)
+    assert trace["solver.retried_steps"][-1] == 0
+
+
+@pytest.mark.parametrize("h", [3.2e-6, 3.73e-6, 3.9e-6])
+def test_contacts_that_stick_are_stable_at_rest(relieved: StageModel, h: float) -> None:
+    """Friction that follows the gaps takes from their compliance: by the limits of free and sliding contacts these runs
+    ended within 22 ms, half of their steps unsolved."""
+    trace = simulate(relieved, Steady(relieved, 0.0, 302.0), 0.03, 1e-3, rubbing(h))
+    late = trace["mesh.force"][-5:]
+    assert trace["solver.retried_steps"][-1] == 0
+    assert np.ptp(late) < 1e-3 * np.mean(late)
+
+
+@pytest.mark.parametrize(("h", "on", "lowered"), [(5e-6, True, False), (3.57e-6, False, False), (3.57e-6, True, True)])
+def test_gamma_is_lowered_by_friction_alone(relieved: StageModel, h: float, on: bool, lowered: bool) -> None:
+    status = int(rolling(relieved, h, on)["solver.status"][-1])
+    assert any("gamma" in word for word in status_words(status)) is lowered, status_words(status)

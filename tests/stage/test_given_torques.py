@@ -1,9 +1,7 @@
-"""A torque given to a port acts from the start of the communication step, not half a step later: exact motion, second
-order of stages whose torque follows their speed, energy under torques that jump."""
+"""A torque given to a port acts from the start of the communication step, not half a step later: exact motion, energy
+under torques that jump. Order where a torque follows a speed: tests/cosim/test_wiring.py."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
@@ -20,21 +18,12 @@ from gearfmu.stagefile.tables.connections import PortSpec
 DG4, EM, RK45, CENTRAL = 0.0, 1.0, 2.0, 3.0
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 GIVEN = PortSpec(kind="torque")
-GRID, END = 40e-6, 4e-3  # s
-STEEP = 10.0  # of a brake: relative change of torque per relative change of speed
-TORQUE, SPEED, RATIO = 302.0, 200.0, 24 / 16  # of the pair: N·m and rad/s of the pinion
+TORQUE, RATIO = 302.0, 24 / 16  # of the pair: N·m of the pinion
 
 
 @pytest.fixture(scope="module")
 def pair(relief_spec: Stage, bodies: list[Body]) -> StageModel:
     return assemble(with_ports(relief_spec, {"pinion": GIVEN, "wheel": GIVEN}), bodies)
-
-
-def turning(pair: StageModel, h: float, speed: float = SPEED, **parameters: float) -> Kernel:
-    """The pair in equilibrium under its torques, then at this speed (rad/s) of the pinion."""
-    loads = {"pinion.tau": TORQUE, "wheel.tau": TORQUE * RATIO}
-    kernel = pair.kernel(**{"level": 1.0, "h": h, **parameters})
-    return begun(kernel, loads | {"pinion.w_start": speed, "wheel.w_start": -speed / RATIO})
 
 
 # ---- a free body: exact ----------------------------------------------------------------------------------------------
@@ -55,30 +44,6 @@ def test_a_free_body_moves_by_the_integral_of_the_torque(integrator: float) -> N
         assert kernel.get("left.gear.w") * mass == pytest.approx(pushed, abs=1e-9)
 
 
-# ---- a brake that follows the speed: second order --------------------------------------------------------------------
-def braked(pair: StageModel, h: float) -> np.ndarray:
-    """Transmission error at every point of GRID. The torque of a step is set for the speed in its middle."""
-    kernel, found = turning(pair, h), []
-    last = kernel.get("wheel.gear.w")
-    for i in range(round(END / h)):
-        now = kernel.get("wheel.gear.w")
-        speed, last = 1.5 * now - 0.5 * last, now
-        kernel.set("wheel.tau", TORQUE * RATIO * (1.0 - STEEP * (speed * RATIO / SPEED + 1.0)))
-        kernel.step(i * h, h)
-        if (i + 1) % round(GRID / h) == 0:
-            found.append(kernel.get("mesh.te"))
-    return np.array(found)
-
-
-def test_a_pair_braked_by_its_speed_is_of_second_order(pair: StageModel) -> None:
-    """Between runs at 10 and 2.5 µs, against one at 0.625 µs. With half a step of delay it is 1.3."""
-    exact = braked(pair, 0.625e-6)
-    errors = [np.sqrt(np.mean((braked(pair, h) - exact) ** 2)) for h in (10e-6, 2.5e-6)]
-    order = math.log(errors[0] / errors[1], 4)
-    print(f"errors {np.array(errors) / exact.std()} of the ripple, order {order:.2f}")
-    assert order > 1.7
-
-
 # ---- energy ----------------------------------------------------------------------------------------------------------
 
 
@@ -86,7 +51,8 @@ def test_a_pair_braked_by_its_speed_is_of_second_order(pair: StageModel) -> None
 def test_energy_is_kept_under_torques_that_jump(pair: StageModel, level: float) -> None:
     """Undamped, at a frozen position: stored energy changes by the work of the ports and nothing else."""
     h = 5e-6
-    kernel = turning(pair, h, 0.0, level=level, **CONSERVING)
+    loads = {"pinion.tau": TORQUE, "wheel.tau": TORQUE * RATIO}
+    kernel = begun(pair.kernel(level=level, h=h, **CONSERVING), loads)
     left, stored = [], []
     for i, factor in enumerate(np.random.default_rng(3).uniform(0.5, 1.5, 1000)):
         kernel.set("pinion.tau", TORQUE * factor)
@@ -94,5 +60,4 @@ def test_energy_is_kept_under_torques_that_jump(pair: StageModel, level: float) 
         kernel.step(i * h, h)
         left.append(kernel.get("energy.residual"))
         stored.append(kernel.get("energy.stored"))
-    print(f"residual {np.ptp(left):.1e} J of {max(stored):.3f} J")
     assert np.ptp(left) < 1e-6 * max(stored) and kernel.get("solver.retried_steps") == 0

@@ -1,4 +1,4 @@
-"""The ground group of the pair: statics and frequencies against the same bodies put together another way."""
+"""Ground groups against the same bodies put together another way: the pair, and an elastic gear on an elastic shaft."""
 
 from __future__ import annotations
 
@@ -7,23 +7,29 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from flank_rows import flank_rows, flank_supports
-from scipy.optimize import brentq
+from dense import OnGear, answer, group_answer, relative
+from handmade import on_axis
 
-from gearfmu.stage.assembly.ground_part import read_tables
-from gearfmu.stage.assembly.groups import SPIN, mount
+from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.stage.assembly.ground_part import GroundPart, Reading, ground_part
+from gearfmu.stage.assembly.groups import Layout, Support, mount
 from gearfmu.stage.assembly.layout import stage_layout
-from gearfmu.stage.assembly.teeth import OFFSETS, blend, resampling
+from gearfmu.stage.assembly.teeth import ROLLS, resampling
 
-LOADS = [
-    (0, 0, 5, 0),
-    (0, 0, 30, 1),
-    (1, 0, 40, 0),
-    (-1, 0, 11, 2),
-    (2, 1, 20, 0),
-    (0, 1, 5, 0),
-]  # tooth, flank, roll, function
+# tooth, flank, roll, function
+LOADS = [(0, 0, 5, 0), (0, 0, 30, 1), (1, 0, 40, 0), (-1, 0, 11, 2), (2, 1, 20, 0), (0, 1, 5, 0)]
+IN_SPACE = [(0, 0, 3, 0), (0, 0, 8, 1), (1, 0, 9, 0), (-1, 1, 2, 2), (2, 1, 5, 1)]
 ANISOTROPIC = np.array([[4.0e-9, 1.5e-9], [1.5e-9, 2.5e-9]])
+
+STEEL = Steel(206e9, 0.3, 7850.0)
+SHAFTS = [
+    Shaft([Section(0.05, 0.03), Section(0.12, 0.04, 0.01), Section(0.03, 0.03)], STEEL, [0.01, 0.08, 0.19]),
+    Shaft([Section(0.09, 0.035), Section(0.11, 0.045)], STEEL, [0.01, 0.05, 0.14, 0.19]),
+]
+DISCS = [(0, 1, 0.9, 4e-4, 7e-4), (1, 1, 1.6, 1.0e-3, 1.9e-3), (1, 2, 0.5, 2e-4, 3.5e-4)]  # shaft, node, mass, I, J
+BEARINGS = [(0, 0), (0, 2), (1, 0), (1, 3)]
+BEARING = np.array([3e8, 2e8, 1e8, 4e4, 6e4])
+ALL = (0, 1, 2, 3, 4, 5)
 
 
 @pytest.fixture(scope="module")
@@ -35,128 +41,76 @@ def with_compliance(layout, compliance):
     return replace(layout, supports=[replace(s, compliance=compliance) for s in layout.supports])
 
 
-def turn(angle):
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def relative(difference, answer):
-    """Largest difference, every entry in units of the answers at its two loads: flanks and bore angle differ by powers
-    of ten."""
-    scale = np.sqrt(np.abs(np.diag(answer)))
-    return np.abs(difference / np.outer(scale, scale)).max()
-
-
-def normal(shape, load, tooth_angle):
-    """Outward normal (2,) of a loaded flank point of the tooth at `tooth_angle`, from the involute (docs/theory.md eq.
-    4)."""
-    _, flank, roll, _ = load
-    sign = (1, -1)[flank]
-    s = np.linspace(shape.s_form, shape.s_tip, 48)[roll]
-    t = tooth_angle + sign * (shape.psi_b - s / shape.r_b)
-    return sign * np.array([-np.sin(t), np.cos(t)])
-
-
-class Direct:
-    """A free body as it is stored, in its own axes, rotated by `angle`: loads on flanks, a moment on the bore, springs
-    explicit.
-
-    No group, no elimination: rigid translation and support force are unknowns of one system."""
-
-    def __init__(self, body, shape, loads, angle, compliance):
-        self.angle = angle
-        degrees = np.arange(0, 5, 2)
-        grid = resampling(body.flank.roll, shape.s_form, shape.s_tip)
-        step = 2 * np.pi / body.flank.teeth
-        static = blend(grid, blend(grid, body.flank.static[..., degrees, :][..., degrees], 3), 4)
-        bore = blend(grid, body.flank.node[:, :, degrees], 1)
-        n = len(loads)
-        self.c = np.zeros((n + 3, n + 3))  # flanks, moment, bore x, y
-        for i, (j, f, p, a) in enumerate(loads):
-            for k, (m, g, q, b) in enumerate(loads):
-                self.c[i, k] = static[f, g, (m - j) % static.shape[2], p, q, a, b]
-            x, y, about = bore[f, p, a][[0, 1, SPIN]]
-            self.c[i, n] = self.c[n, i] = about
-            self.c[i, n + 1 :] = self.c[n + 1 :, i] = turn(j * step) @ [x, y]
-        self.c[n:, n:] = body.static[np.ix_([SPIN, 0, 1], [SPIN, 0, 1])]
-        normals = [normal(shape, load, load[0] * step) * (load[3] == 0) for load in loads]
-        self.rigid = np.vstack([*normals, np.zeros((1, 2)), np.eye(2)])
-        self.spring = turn(-angle) @ compliance @ turn(angle)
-
-    def answer(self):
-        """Displacement (n + 1, n + 1) of flanks and bore angle per unit load, and support force (2, n + 1) in ground
-        axes."""
-        c, n = self.c, len(self.c) - 2
-        # unknowns: translation, force on the body at its bore
-        system = np.block([[np.zeros((2, 2)), -np.eye(2)], [np.eye(2), c[n:, n:] + self.spring]])
-        load = np.vstack([self.rigid[:n].T, -c[n:, :n]])
-        found = np.linalg.solve(system, load)
-        answer = self.rigid[:n] @ found[:2] + c[:n, :n] + c[:n, n:] @ found[2:]
-        return answer, -turn(self.angle) @ found[2:]
-
-
-class Grouped:
-    """The same answer from the sections of a gear and a set."""
-
-    def __init__(self, body, shape, group, index, loads, angle):
-        step, flank = 2 * np.pi / body.flank.teeth, group.layout.bodies[index].flank
-        rows, supports = flank_rows(group, index), flank_supports(group, index)
-        node, n = flank.node[0], len(loads)
-        self.w, c_s, c_p = [], [], []
-        for j, f, p, a in loads:
-            psi = angle + j * step
-            e = read_tables(rows[:, f, p, a], psi)
-            centre = normal(shape, (j, f, p, a), psi) * (a == 0) @ group.rigid(index)[:2]
-            self.w.append(centre + e)
-            c_s.append(read_tables(supports[:, f, p, a], psi))
-            c_p.append(node[f, p, a, SPIN])
-        self.w = np.array([*self.w, group.node_rows(index, 0, SPIN)])
-        self.c_s = np.array([*c_s, group.node_supports(index, 0, SPIN)])
-        self.group = group
-        self.c = np.zeros((n + 1, n + 1))
-        for i, (j, f, p, a) in enumerate(loads):
-            for k, (m, g, q, b) in enumerate(loads):
-                self.c[i, k] = flank.residual[f, g, OFFSETS.index(m - j), p, q, a, b]
-        self.c[:n, n] = self.c[n, :n] = c_p
-        self.c[n, n] = group.layout.bodies[index].residual[SPIN, SPIN]
-
-    def answer(self):
-        group, kappa = self.group, self.group.kappa
-        q = self.w.T / group.omega[:, None] ** 2
-        force = kappa @ (group.support_rows @ q + self.c_s.T)
-        return self.c - self.c_s @ kappa @ self.c_s.T + self.w @ q, force
-
-
 @pytest.mark.parametrize("index", [0, 1])
 @pytest.mark.parametrize(
     "compliance", [np.eye(2) / 3e8, ANISOTROPIC, np.zeros((2, 2))], ids=["isotropic", "anisotropic", "held"]
 )
 def test_statics_are_those_of_free_body_and_springs(layout, bodies, pair, index, compliance):
-    group = mount(with_compliance(layout, compliance))
+    springs = with_compliance(layout, compliance)
+    group, own = mount(springs), slice(2 * index, 2 * index + 2)
     for angle in (0.0, 0.77, 3.9):
-        want, want_force = Direct(bodies[index], pair.gears[index], LOADS, angle, compliance).answer()
-        have, have_force = Grouped(bodies[index], pair.gears[index], group, index, LOADS, angle).answer()
-        error = relative(have - want, want)
-        force_error = np.abs(have_force[2 * index : 2 * index + 2] - want_force).max() / np.abs(want_force).max()
-        print(f"statics: gear {index}, angle {angle}: displacement {error:.1e}, support force {force_error:.1e}")
-        assert error < 1e-8 and force_error < 1e-8
-        assert np.abs(np.delete(have_force, [2 * index, 2 * index + 1], axis=0)).max() < 1e-12
+        gear = OnGear(index, bodies[index], pair.gears[index], LOADS, angle, np.arange(0, 5, 2), ROLLS)
+        want, want_force = answer(springs, gear.free(springs))
+        have, have_force = group_answer(group, gear.read(group))
+        assert relative(have, want) < 1e-8
+        assert np.abs(have_force[own] - want_force[own]).max() < 1e-8 * np.abs(want_force).max()
+        assert np.abs(np.delete(have_force, own, axis=0)).max() < 1e-12
 
 
-def test_held_frequencies_are_zeros_of_the_free_body_s_compliance_at_the_bore(layout, bodies):
-    """A held hub lets the frequencies stand at which the free gear does not move there."""
-    group, body, free = mount(with_compliance(layout, np.zeros((2, 2)))), bodies[0], layout.bodies[0]
-    place = np.array([0.0, 1.0, 0, 0, 0, 0])
-    row, static = place @ free.rows[0], place @ free.residual @ place
+# ---- in space: shafts, seats, bearings with tilt ---------------------------------------------------------------------
+def disc(name, mass, across, polar):
+    """A rigid body: no modes, no residual."""
+    inertia = np.diag([mass, mass, mass, across, across, polar])
+    return GroundPart(name, inertia, np.zeros(0), np.zeros(0), on_axis(0.0), np.zeros((1, 6, 0)), np.zeros((6, 6)))
 
-    def compliance(x):
-        return static - 1 / (body.total_mass * x**2) + (row**2 / (free.omega**2 - x**2)).sum()
 
-    poles = np.unique(np.round(np.concatenate([[1e3], free.omega[np.abs(row) > 1e-3]]), 3))
-    zeros = [
-        brentq(compliance, low + 1e-2, high - 1e-2, xtol=1e-9, rtol=1e-14)
-        for low, high in pairwise(poles)
-        if compliance(low + 1e-2) * compliance(high - 1e-2) < 0
+def seat(name, first, second):
+    return Support(name, first, second, ALL, np.zeros((6, 6)), np.zeros(6))
+
+
+def bearing(name, first, stiffness=BEARING):
+    return Support(name, first, None, (0, 1, 2, 3, 4), np.diag(1 / stiffness), np.full(5, 1.0))
+
+
+def train(cut):
+    bodies = [ground_part(reduce_shaft(shaft, cut, None, f"shaft{i}", 0.01)) for i, shaft in enumerate(SHAFTS)]
+    bodies += [disc(f"disc{i}", *numbers) for i, (_, _, *numbers) in enumerate(DISCS)]
+    supports = [seat(f"seat{i}", (2 + i, 0), (s, node)) for i, (s, node, *_) in enumerate(DISCS)]
+    supports += [bearing(f"bearing{i}", end) for i, end in enumerate(BEARINGS)]
+    return Layout(bodies, [(0, 2), (1, 3, 4)], supports, planar=False)
+
+
+@pytest.mark.parametrize(("held", "angle"), [(False, 0.0), (False, 1.1), (True, 4.0)])
+def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair, held, angle):
+    """Statics in space: gear of finite elements, rigid seat, stepped shaft, two bearings with tilt, disc on the same
+    shaft."""
+    body, shape, rolls = bodies[0], pair.gears[0], 12
+    grid, degrees = resampling(body.flank.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
+    gear = ground_part(body, Reading(np.arange(body.modes), degrees, grid))
+    shaft = ground_part(reduce_shaft(SHAFTS[1], 60e3, damping_ratio=0.01))
+    supports = [seat("seat.gear", (1, 0), (0, 1)), seat("seat.disc", (2, 0), (0, 2))]
+    supports += [bearing("b1", (0, 0)), bearing("b2", (0, 3))]
+    layout = Layout([shaft, gear, disc("disc", *DISCS[2][2:])], [(0, 1, 2)], supports, planar=False)
+    if held:
+        layout = Layout(layout.bodies, layout.rotors, [s.hold() for s in supports], planar=False)
+    group, on_gear = mount(layout), OnGear(1, body, shape, IN_SPACE, angle, degrees, rolls)
+    want, want_force = answer(layout, on_gear.free(layout))
+    have, force = group_answer(group, on_gear.read(group))
+    assert relative(have, want) < 1e-8
+    assert np.abs(force - want_force).max() < 1e-8 * np.abs(want_force).max()
+
+
+def test_supports_that_leave_a_motion_free_leave_it_at_zero_frequency():
+    """Bearings without axial stiffness: one free mass a rotor, exactly at rest."""
+    layout = train(60e3)
+    radial = [
+        s if s.second is not None else Support(s.name, s.first, None, (0, 1), np.eye(2) / 3e8, np.zeros(2))
+        for s in layout.supports
     ]
-    error = max(np.abs(group.omega / zero - 1).min() for zero in zeros)
-    print(f"held frequencies: {len(zeros)} zeros, largest difference {error:.1e}")
-    assert len(zeros) >= 8 and error < 1e-9
+    group = mount(Layout(layout.bodies, layout.rotors, radial, planar=False))
+    floating = group.omega == 0
+    assert floating.sum() == 2 and group.omega[2] > 2 * np.pi * 20
+    assert all(a <= b for a, b in pairwise(group.omega))
+    moved = group.rigid(0)[2, floating]
+    mass = sum(layout.bodies[b].mass[2, 2] for b in layout.rotors[0])
+    assert np.abs(moved).max() == pytest.approx(1 / np.sqrt(mass), rel=1e-6)

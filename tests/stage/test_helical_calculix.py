@@ -39,7 +39,6 @@ def test_te_within_2_5_percent_peak_to_peak_10_and_layer_loads_6(
             continue
         ours, theirs = helical.ours(case, bodies), helical.shares(row)
         te, off = float(row["te_um"]), np.abs(ours.share - theirs).max() / theirs.max()
-        print(f"{case.name}: te {te:.3f} and {1e6 * ours.te:.3f} µm, largest difference of a layer {off:.1%}")
         assert 1e6 * ours.te == pytest.approx(te, rel=0.025) and off < 0.06
         loads.setdefault((case.axes, case.torque), []).append((te, 1e6 * ours.te))
     assert {axes for axes, _ in loads} == {"parallel", "tilted"}
@@ -50,5 +49,4 @@ def test_te_within_2_5_percent_peak_to_peak_10_and_layer_loads_6(
         wanted = np.ptp([te for te, _ in loads[axes, torque]])
         for slices in (5, 7):
             mine = 1e6 * np.ptp([error(case, bodies, slices) for case in cases])
-            print(f"{axes}, {torque:g} N·m, {slices} slices: peak to peak {wanted:.3f} and {mine:.3f} µm")
             assert mine == pytest.approx(wanted, rel=0.15)

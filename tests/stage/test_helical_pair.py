@@ -1,4 +1,4 @@
-"""A helical pair in the kernel: axial force, spur gears that may tilt, leads and misaligned axes, tip edges, slices."""
+"""A helical pair in the kernel: axial force, leads and misaligned axes, tip edges."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from driven import begun, stepped
+from driven import begun
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stagefile.forms.expand import rewritten, with_ports
+from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.bodies import LeadSpec, Misalignment
@@ -60,7 +61,6 @@ def test_axial_force_is_the_tangential_one_times_tan_beta(
     tangential = torque / (gear.m_t * gear.z / 2)
     (pinion, _), (wheel, _) = (support(kernel, shaft) for shaft in SHAFTS)
     normal = abs(torque) / (gear.r_b * math.cos(gear.beta_b))
-    print(f"F_t {tangential:.3f} N, axial {pinion[2]:.4f} N, F_t tan β {tangential * math.tan(gear.beta):.4f} N")
     assert abs(kernel.get("mesh.force")) == pytest.approx(normal, rel=1e-6)
     assert pinion[2] == pytest.approx(tangential * math.tan(gear.beta), rel=1e-6)
     assert wheel[2] == pytest.approx(-pinion[2], rel=1e-6)
@@ -73,22 +73,9 @@ def with_bearings(spec: Stage) -> Stage:
     return rewritten(spec, gears=gears, ports=HELD)
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0])
-def test_spur_gears_that_may_tilt_are_those_that_may_not(relief_spec: Stage, bodies: list[Body], level: float) -> None:
-    """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give."""
-    planar = assemble(with_ports(relief_spec, HELD), bodies)
-    spatial = assemble(with_bearings(relief_spec), bodies)
-    names = ("mesh.te", "mesh.force", "bearing.pinion.fx", "bearing.wheel.fy")
-    kernels = (begun(model.kernel(level=level), {"pinion.tau": TORQUE}) for model in (planar, spatial))
-    results = [stepped(kernel, 40, 2e-5, *names)[-1] for kernel in kernels]
-    print(results)
-    assert results[1] == pytest.approx(results[0], rel=1e-6)
-
-
 def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.ndarray:
     """Force of every slice, all tooth pairs together, N."""
-    kernel = model.kernel(**{"level": 0.0, "slices": slices, "effect.tip_contact": 0.0})
-    kernel.prepare()
+    kernel = statics_of(model, **{"slices": slices, "effect.tip_contact": 0.0})
     forces = kernel.transmission(0.0, torque).forces
     return np.sum([of_pair for (flank, _), of_pair in forces.items() if flank == 0], axis=0)
 
@@ -116,7 +103,6 @@ def test_lead_and_misalignment_load_one_end(relief_spec: Stage, bodies: list[Bod
     assert np.allclose(slices_at_rest(assemble(slope(-f), bodies), TORQUE), turned[::-1], rtol=1e-6)
     for change, share in (("out_of_plane", math.cos(alpha)), ("in_plane", math.sin(alpha))):
         found = [slices_at_rest(assemble(misaligned(**{change: sign * f / share}), bodies), TORQUE) for sign in (1, -1)]
-        print(np.round(turned), np.round(found[0]), np.round(found[1]))
         assert min(np.abs(f - turned).max() for f in found) < 2e-3 * even.sum(), change
 
 
@@ -128,25 +114,8 @@ def test_a_slice_past_the_end_of_its_flank_carries_by_its_tip_edge(demo: SimpleN
     turn = roll / gear.r_b - gear.psi_b - pair.alpha_wt
     carried = []
     for edges in (1.0, 0.0):
-        kernel = involute.kernel(
-            **{"level": 0.0, "slices": slices, "effect.tip_contact": edges, "effect.bearings": 0.0}
-        )
-        kernel.prepare()
+        kernel = statics_of(involute, **{"slices": slices, "effect.tip_contact": edges, "effect.bearings": 0.0})
         forces = kernel.transmission(-turn * gear.r_b / pair.gears[1].r_b, TORQUE).forces
         pair_forces = next(np.array(f) for f in forces.values() if f[4] > 0 and f[9] == 0 and f[0] > 0)
-        print(edges, np.round(pair_forces))
         carried.append(pair_forces[5] / pair_forces[4])
     assert carried[0] > 0.1 and carried[1] == 0
-
-
-def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: StageModel) -> None:
-    """At rest they are the slices that `te` finds; in motion they add up to the mesh force."""
-    slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.written.contact.slices)]
-    kernel = begun(involute.kernel(level=1.0, **{"effect.tip_contact": 0.0}), {"pinion.tau": TORQUE})
-    assert f"mesh.slice_{len(slices) + 1}" not in kernel.variables
-    shares = np.array([kernel.get(name) for name in slices])
-    assert shares == pytest.approx(slices_at_rest(involute, TORQUE, len(slices)), rel=1e-3)
-    kernel.set("pinion.tau", 0.9 * TORQUE)
-    *parts, force = stepped(kernel, 40, 2e-5, *slices, "mesh.force").T
-    assert sum(parts) == pytest.approx(force, rel=1e-9) and np.ptp(force) > 0.05 * force.mean()
-    assert np.ptp(shares) > 0.2 * shares.mean()

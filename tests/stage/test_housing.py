@@ -8,22 +8,23 @@ from functools import cache
 
 import numpy as np
 import pytest
+from dense import answer, at_nodes, group_answer, read_nodes, relative
 from housings import housing_of
 
+import gearfmu as gf
 from gearfmu.body import load_bodies
-from gearfmu.body.body import Body, Node, rigid_rows
+from gearfmu.body.body import Body, rigid_rows
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.modes.housing import placed_housing
-from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.assembly.assemble import mount_sets
-from gearfmu.stage.assembly.ground_part import GroundPart
-from gearfmu.stage.assembly.groups import Group, Layout, Support, mount, node_directions
+from gearfmu.stage.assembly.groups import Layout, mount
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.run.housing import HousingAlone
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import PlanetarySpec
 from gearfmu.stagefile.stage import load_stage
 
 TORQUE, SPEED, H = 150.0, 150.0, 20e-6
@@ -73,125 +74,22 @@ def with_feet(chosen: Stage, **springs: float) -> Stage:
     return chosen.model_copy(update={"supports": tuple(feet)})
 
 
-def block(name: str, mass: float) -> GroundPart:
-    """A rigid body with one node at its origin."""
-    return GroundPart(
-        name=name,
-        mass=np.diag([mass] * 3 + [mass * 1e-2] * 3),
-        omega=np.zeros(0),
-        zeta=np.zeros(0),
-        nodes=(Node("node", "rigid", COMPONENTS, np.zeros(3)),),
-        rows=np.zeros((1, 6, 0)),
-        residual=np.zeros((6, 6)),
-    )
-
-
-def spring(name: str, first: int, second: int | None, stiffness: float) -> Support:
-    ends = (first, 0), None if second is None else (second, 0)
-    return Support(name, *ends, tuple(range(6)), np.eye(6) / stiffness, np.zeros(6))
-
-
-def test_two_masses_on_springs_by_hand() -> None:
-    """A rotor of 2 kg on 30 N/µm in a housing of 10 kg on 80 N/µm: ω² of k₁/m₁, (k₁ + k₂)/m₂, k₁²/(m₁ m₂)."""
-    m1, m2, k1, k2 = 2.0, 10.0, 30e6, 80e6
-    layout = Layout(
-        [block("rotor", m1), block("housing", m2)],
-        [(0,)],
-        [spring("bearing", 0, 1, k1), spring("mount", 1, None, k2)],
-        planar=False,
-    )
-    assert layout.freedoms(1) == (0, 1, 2, 3, 4, 5)  # it belongs to no rotor: nothing of it is a spin
-    a, b, c = k1 / m1, (k1 + k2) / m2, k1 * k1 / (m1 * m2)
-    root = np.sqrt(((a - b) / 2) ** 2 + c)
-    omega = mount(layout).omega
-    for wanted in (np.sqrt((a + b) / 2 - root), np.sqrt((a + b) / 2 + root)):
-        assert np.sum(np.abs(omega / wanted - 1) < 1e-12) >= 3  # along x, y and z
-
-
 def drawn_layout(body: Body, chosen: Stage | None = None) -> Layout:
     return stage_layout(chosen or stage(), gears(), {"housing": body})
 
 
-def dense_response(layout: Layout, hit: tuple[int, int], seen: list[tuple[int, int, int]], omega: float) -> np.ndarray:
-    """Displacements of nodes (body, node, direction) under a unit force along x on a node, undamped: all bodies with
-    their own coordinates, supports by their forces, one saddle-point system."""
-    sizes = [6 + body.omega.size for body in layout.bodies]
-    at = np.concatenate([[0], np.cumsum(sizes)])
-    mass, stiffness = np.eye(at[-1]), np.zeros(at[-1])
-    supports = len(layout.support_names())
-    rows, give = np.zeros((supports, at[-1])), np.zeros((supports, supports))
-    start = 0
-    for support in layout.supports:
-        own = slice(start, start + len(support.directions))
-        give[own, own] = support.compliance
-        start = own.stop
-    for b, body in enumerate(layout.bodies):
-        mass[at[b] : at[b] + 6, at[b] : at[b] + 6] = body.mass
-        stiffness[at[b] + 6 : at[b + 1]] = body.omega**2
-        sides = node_directions(layout, b)
-        rows[:, at[b] : at[b + 1]] = sides @ nodes_of(body)
-        give += sides @ body.residual @ sides.T
-    body, node = hit
-    push = np.zeros(at[-1])
-    push[at[body] : at[body + 1]] = nodes_of(layout.bodies[body])[6 * node]
-    moved = node_directions(layout, body) @ layout.bodies[body].residual[6 * node]
-    spins = [at[own[0]] + 5 for own in layout.rotors]  # their rigid rotation: held, as in the group it is no unknown
-    held = np.zeros((len(spins), at[-1]))
-    for k, own in enumerate(layout.rotors):
-        turn = np.zeros(at[-1])
-        for b in own:
-            turn[at[b] + 5] = 1.0
-        held[k] = mass @ turn
-    dynamic = np.diag(stiffness) - omega**2 * mass
-    zero = np.zeros((supports, len(spins)))
-    system = np.block(
-        [
-            [dynamic, rows.T, held.T],
-            [rows, -give, zero],
-            [held, zero.T, np.zeros((len(spins), len(spins)))],
-        ]
-    )
-    scale = 1 / np.sqrt(np.abs(system).max(axis=1))
-    right = np.concatenate([push, -moved, np.zeros(len(spins))])
-    found = scale * np.linalg.solve(system * np.outer(scale, scale), scale * right)
-    x, force = found[: at[-1]], found[at[-1] : at[-1] + supports]
-    result = []
-    for own, where, direction in seen:
-        free, row = layout.bodies[own], 6 * where + direction
-        direct = free.residual[row, 6 * node] if own == body else 0.0
-        to_supports = node_directions(layout, own) @ free.residual[row]
-        result.append(nodes_of(free)[row] @ x[at[own] : at[own + 1]] - to_supports @ force + direct)
-    return np.array(result)
-
-
-def nodes_of(body: GroundPart) -> np.ndarray:
-    """(6K, 6 + n): motion of all nodes."""
-    return np.vstack([np.hstack([node.rigid_rows, rows]) for node, rows in zip(body.nodes, body.rows, strict=True)])
-
-
-def group_response(group: Group, hit: tuple[int, int], seen: list[tuple[int, int, int]], omega: float) -> np.ndarray:
-    body, node = hit
-    pushed, pressed = group.node_rows(body, node, 0), group.node_supports(body, node, 0)
-    result = []
-    for own, where, direction in seen:
-        direct = group.layout.bodies[own].residual[6 * where + direction, 6 * node] if own == body else 0.0
-        direct -= group.node_supports(own, where, direction) @ group.kappa @ pressed
-        result.append(group.node_rows(own, where, direction) @ (pushed / (group.omega**2 - omega**2)) + direct)
-    return np.array(result)
-
-
 def test_the_housed_group_is_the_dense_system() -> None:
-    """Force on the bore of a pinion → itself, a seat, sensors. Margin: differences are 1e-9 of the largest."""
+    """The bore of a pinion, a seat, sensors, among themselves. Margin: differences are 1e-9 of the largest."""
     layout = drawn_layout(drawn())
     last = len(layout.bodies) - 1
     sensors = len(layout.bodies[last].nodes) - 2
-    seen = [(0, 0, 0), (last, 0, 1), *((last, sensors + k, d) for k in range(2) for d in range(3))]
+    places = [(0, 0, 0), (last, 0, 1), *((last, sensors + k, d) for k in range(2) for d in range(3))]
     group = mount(layout)
-    for frequency in (35.0, 1730.0):
-        wanted = dense_response(layout, (0, 0), seen, 2 * np.pi * frequency)
-        found = group_response(group, (0, 0), seen, 2 * np.pi * frequency)
-        assert np.abs(found - wanted).max() <= 1e-6 * np.abs(wanted).max()
-        assert np.abs(found[2:] - wanted[2:]).max() <= 1e-6 * np.abs(wanted[2:]).max()  # sensors among themselves
+    for omega in (2 * np.pi * 35.0, 2 * np.pi * 1730.0):
+        wanted, _ = answer(layout, at_nodes(layout, places, omega), omega)
+        found, _ = group_answer(group, read_nodes(group, places), omega)
+        assert relative(found[:2, :2], wanted[:2, :2]) < 1e-6
+        assert np.abs(found - wanted)[2:, 0].max() <= 1e-6 * np.abs(wanted)[2:, 0].max()  # nothing presses sensors
 
 
 def test_a_bearing_beside_the_middle_of_its_seat_acts_with_a_rigid_arm() -> None:
@@ -305,3 +203,61 @@ def test_bearing_forces_give_the_sensors_back() -> None:
     found, told = np.diff(speed, axis=0) / 1e-5, np.stack([trace[name][1:] for name in names], axis=1)
     assert np.abs(found - told).max() <= 0.05 * np.abs(told).max()
     assert np.std(found - told) <= 0.045 * np.std(told)
+
+
+# ---- of a set: its ring stands in the housing ------------------------------------------------------------------------
+SET, HOUSED = "planetary54", "planetary54/stage_housed"
+
+
+def feet() -> dict[str, np.ndarray]:
+    """Where the feet of the shipped housing are."""
+    names = load_stage(HOUSED).housings[0].made_of.feet
+    return {node.name: node.point for node in load_bodies(load_stage(HOUSED))[-1].nodes if node.name in names}
+
+
+def set_run(of: StageModel, **parameters: float) -> Trace:
+    driven = of.driven_by_springs()
+    return simulate(driven, Steady(driven, 85.0, 600.0), 2e-4, 2e-5, {"level": 1.0} | parameters)
+
+
+def test_the_ring_stands_on_two_supports() -> None:
+    housed = load_stage(HOUSED)
+    held = {s.name: s for s in housed.supports if s.body == "ring"}
+    assert held["ring"].to is None and (held["ring"].axial, held["ring"].torsion) == (None, None)
+    assert held["ring_seat"].to == "housing" and held["ring_seat"].radial is None
+    plain = next(s for s in load_stage(SET).supports if s.body == "ring")
+    assert (held["ring"].radial, held["ring"].tilt) == (plain.radial, plain.tilt)
+    assert (held["ring_seat"].axial, held["ring_seat"].torsion) == (plain.axial, plain.torsion)
+    assert isinstance(housed.written, PlanetarySpec) and housed.files[-1] == "housing"
+    assert housed.file_of("planet2") == "planet"
+
+
+@pytest.mark.full
+def test_the_feet_carry_the_torque_of_the_ring() -> None:
+    """At the start: what carrier and sun leave, 600 · 54/72 N·m, by moments about the axis; and the ring's on its seat.
+    Without the effect it is the set on rigid ground."""
+    housed = load_stage(HOUSED)
+    of = assemble(housed, load_bodies(housed))
+    trace = set_run(of)
+    start = {name: channel.values[0] for name, channel in trace.channels.items()}
+    about = sum(x * start[f"mount.{name}.fy"] - y * start[f"mount.{name}.fx"] for name, (x, y, _) in feet().items())
+    assert abs(about) == pytest.approx(abs(start["bearing.ring_seat.mz"]), rel=1e-4)
+    assert abs(about) == pytest.approx(600.0 * 54 / 72, rel=2e-3)
+    assert np.ptp(trace["mount.left_front.fy"]) > 0.0
+    ground, own = housed.on_rigid_ground(), load_stage(SET).by_name(load_bodies(load_stage(SET)))
+    plain = assemble(ground, [own[name] for name in ground.files])
+    off, bare = set_run(of, **{"effect.housing": 0.0, "h": 1e-5}), set_run(plain, h=1e-5)
+    most = np.abs(bare["sun_planet1.force"]).max()
+    for name in sorted(bare.channels.keys() & off.channels.keys()):
+        if name.endswith((".fx", ".fy", ".fz", ".force")):
+            assert np.abs(bare[name] - off[name]).max() <= 1e-4 * most, name
+
+
+@pytest.mark.full
+def test_only_harmonics_that_the_planets_share_are_heard() -> None:
+    """54 teeth and four planets: harmonic k of the mesh, 54 · 85/2π = 730.6 Hz, turns the ring where 54 k/4 is whole.
+    Found: 82 dB between the second and the first, 62 between the second and the third."""
+    trace = gf.simulate(HOUSED, "600 N*m", "85 rad/s", level="fast", duration="0.1 s", step="25 us")
+    heard = gf.sound_power(trace, start="30 ms")
+    power = dict(zip(np.round(heard.bands), np.ravel(heard.third_octaves()), strict=True))
+    assert max(power[794], power[1995]) < 1e-4 * min(power[1585], power[3162])

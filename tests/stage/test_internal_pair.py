@@ -1,5 +1,5 @@
-"""A pinion in a ring on fixed axes: unloaded geometry against two involutes, balance of forces, the bodies on
-paper, and the table of an independent finite-element program."""
+"""A pinion in a ring on fixed axes: unloaded geometry against two involutes, the bodies on paper, and the table
+of an independent finite-element program. Balance: tests/relations."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from by_hand import BORE, _at, slice_weights
-from driven import begun
 from inner import Inner
 from scipy.optimize import minimize, minimize_scalar
 
 from gearfmu.body import Body
 from gearfmu.errors import SpecError
-from gearfmu.geometry import involute
 from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.assembly.meshes import tooth_phases
@@ -107,7 +105,6 @@ def test_gap_is_the_distance_of_two_involutes(stage: Stage, mesh: RingMesh, inne
             worst, count = max(worst, abs(distance - (place.gap - allowance))), count + 1
             assert near.x[0] == pytest.approx(place.roll[0], abs=2e-6)
             assert place.curvature == pytest.approx(1 / place.roll[0] - 1 / place.roll[1], rel=1e-9)
-    print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 6 and worst < 1e-10
 
 
@@ -153,7 +150,6 @@ def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
             assert near.x == pytest.approx(place.roll[o], abs=2e-6)
             own = place.curvature - HOLLOW[o] / place.roll[o]
             assert HOLLOW[c] / mesh.gears[c].s_tip - 1e-9 < own < 1 / mesh.gears[c].tip_edge + 1e-9
-    print(f"{count} places, largest difference {worst:.2e} m")
     assert count >= 3 and worst < 1e-9
 
 
@@ -178,56 +174,6 @@ def differences(step: float) -> np.ndarray:
     return step * np.vstack([-np.eye(6), np.eye(6)])
 
 
-def test_no_interference_over_a_pitch(mesh: RingMesh) -> None:
-    """Flanks and tip circle of the pinion's teeth stay in the ring's spaces while drive flanks touch."""
-    pinion, ring = mesh.gears
-    rolls = np.linspace(max(pinion.s_form, 0.0), pinion.s_a, 200)
-    tip = np.linspace(-pinion.tip_half_angle, pinion.tip_half_angle, 40)
-    tooth = np.concatenate(
-        [
-            pinion.flank_point(rolls, 1),
-            pinion.flank_point(rolls, -1),
-            pinion.r_a * np.stack([np.cos(tip), np.sin(tip)], 1),
-        ]
-    )
-    deepest = 0.0
-    for turn in np.linspace(0, 2 * math.pi / pinion.z, 9):
-        phase = mesh.ring_phase(turn, 0.0)
-        for k in range(-5, 6):
-            angle = turn + 2 * math.pi * k / pinion.z
-            c, s = math.cos(angle), math.sin(angle)
-            points = tooth @ np.array([[c, s], [-s, c]]) + [mesh.a, 0.0]
-            radius = np.hypot(*points.T)
-            there = np.arctan2(points[:, 1], points[:, 0]) - phase
-            off = np.abs(there - 2 * math.pi / ring.z * np.round(there * ring.z / (2 * math.pi)))
-            form = float(involute.radius_at_roll(ring.s_form, ring.r_b))
-            inside = (radius > ring.r_a + ring.tip_edge) & (radius < form)
-            over = (off[inside] - ring.thickness_angle(radius[inside])) * radius[inside]
-            deepest = max(deepest, float(over.max(initial=-1.0)))
-            assert radius.max() < ring.r_f
-    print(f"deepest {deepest:.2e} m")
-    assert deepest < 1e-9
-
-
-@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
-def test_forces_and_torques_are_in_balance_and_along_the_line_of_action(mesh: RingMesh, model, torque: float) -> None:
-    """The ring's axis is the stage's origin, the pinion stands on +x."""
-    kernel = begun(model.kernel(level=2.0), {"pinion.tau": torque})
-    normal = torque / mesh.planet.r_b
-    assert kernel.get("mesh.force") == pytest.approx(normal, rel=1e-9)
-    pinion, ring = (np.array([kernel.get(f"bearing.{name}.f{axis}") for axis in "xy"]) for name in ("pinion", "ring"))
-    side = math.copysign(1.0, torque)
-    along = np.array([side * math.sin(mesh.alpha_wt), math.cos(mesh.alpha_wt)]) * normal
-    print(pinion, ring, along, kernel.get("ring.tau"))
-    assert np.allclose(pinion, -ring, atol=1e-9 * abs(normal))
-    assert np.allclose(ring, along, atol=1e-3 * abs(normal))
-    moved = [np.array([kernel.get(f"{name}.gear.{axis}") for axis in "xy"]) for name in ("pinion", "ring")]
-    arm = np.array([mesh.a, 0.0]) + moved[0] - moved[1]
-    about = torque + arm[0] * -pinion[1] + arm[1] * pinion[0]  # of the pinion about the ring's axis
-    assert kernel.get("ring.tau") == pytest.approx(3 * torque, rel=1e-9)
-    assert about == pytest.approx(3 * torque, rel=1e-6)
-
-
 def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMesh, bodies, model) -> None:
     """Both bodies' static tables with bore and rim held, and the local law with the relative curvature 1/s − 1/s'."""
     result = loaded_te(model, [TORQUE], 8, **{"effect.bearings": 0.0})
@@ -245,7 +191,6 @@ def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMe
     load = force / width
     beta = 2 * a / (1 / roll - 1 / (roll + mesh.length))
     local = load * (a * (math.log(4 * COARSE.strip_half_width) - 1) - 0.5 * a * math.log(beta * load))
-    print(f"te {1e6 * result.te[0, alone]:.3f} µm, on paper {1e6 * (force * total + local):.3f} µm")
     assert result.te[0, alone] == pytest.approx(force * total + local, rel=4e-3)  # slices share unevenly
 
 
@@ -283,5 +228,4 @@ def test_loaded_te_against_an_independent_program(tmp_path: Path) -> None:
         theirs = {float(row["position"]): float(row["te_um"]) for row in rows if float(row["torque_Nm"]) == torque}
         places = [round(benchmark.POSITIONS * position) for position in theirs]
         means = np.mean(list(theirs.values())), 1e6 * np.mean(ours.te[k, places])
-        print(f"{torque} N·m, {len(theirs)} positions: {means[0]:.3f} and {means[1]:.3f} µm")
         assert len(theirs) >= 4 and means[1] == pytest.approx(means[0], rel=0.03)

@@ -61,7 +61,6 @@ def test_rigid_flanks_are_an_elastic_foundation(spec: Stage, bodies: list[Body])
     """f = 4/3 b k √(2R) δ^(3/2): the error falls with the distance of the nodes, of one gear or of both."""
     errors = {along: rigid_error(spec, bodies, along) for along in (41, 513)}
     one_sided = rigid_error(spec, bodies, 513, "a")
-    print(f"errors by nodes along {errors}, of A's nodes alone {one_sided:.4f}")
     assert errors[513] < 0.01 < errors[41] and one_sided < 0.015
 
 
@@ -73,7 +72,6 @@ def test_energy_through_impacts_on_both_flanks(spec: Stage, bodies: list[Body], 
     settings = {"level": PAPER, "effect.elastic": elastic, "effect.roll_motion": 1.0}
     kernel = started(free, Rattle(position=0.5, speed=0.2), settings)
     run = energies(kernel, 4e-6, 1.2e-3)
-    print(f"drift {run.drift:.1e} over {run.changes} changes of contact")
     assert run.changes >= 3 and run.drift < 5e-4
 
 
@@ -92,7 +90,6 @@ def test_mean_transmission_is_that_of_line_contact(relief_spec: Stage, bodies: l
     of the mean transmission error, 0.1 % of the mean force."""
     model = assemble(with_nodes(relief_spec, along=81), bodies)
     line, nodal = mean_te(model, TORQUE, contact=LINE), mean_te(model, TORQUE)
-    print(f"te {1e6 * line[0]:.3f}, {1e6 * nodal[0]:.3f} µm; force {line[1]:.1f}, {nodal[1]:.1f} N")
     assert nodal == pytest.approx(line, rel=5e-3) and nodal != line
 
 
@@ -102,7 +99,6 @@ def test_helical_gears_and_their_axial_force(helical: StageModel) -> None:
     for law in (LINE, NODAL):
         trace = simulate(helical, Steady(helical, SPEED, 150.0), 4e-4, 2e-6, {"level": PAPER, "contact": law})
         runs.append([trace[name][100:].mean() for name in ("mesh.te", "mesh.force", "bearing.pinion.fz")])
-    print(f"te, force, axial force: {runs}")
     assert runs[1] == pytest.approx(runs[0], rel=0.02)
 
 
@@ -114,7 +110,6 @@ def test_the_papers_planetary_set(planetary: StageModel) -> None:
     assert "nodal" in kernel.warning and kernel.get("solver.n_dyn") > 2500
     meshes = [f"{central}_planet{k}.force" for central in ("sun", "ring") for k in (1, 2, 3, 4)]
     force = stepped(kernel, 3, 1e-5, *meshes)
-    print(np.round(force[-1]))
     assert np.all(force[:, :4] < -1000) and np.all(force[:, 4:] > 1000)
     for mesh in (0, 1, 4, 5):
         assert np.allclose(force[:, mesh], force[:, mesh + 2], rtol=0.02)

@@ -14,8 +14,6 @@ from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import gearfmu as gf
@@ -142,27 +140,16 @@ def test_a_number_without_a_range_is_found() -> None:
 
 @pytest.mark.parametrize("number", NUMBERS, ids=str)
 def test_the_limits_themselves_are_taken_and_nothing_beyond(number: Number) -> None:
-    own = number.range
+    """Refused once, with file, field, range and remedy."""
+    own, names = number.range, {"import": "imported", "class": "tolerance_class"}
     for limit, outwards in ((own.low, -1), (own.high, 1)):
         said = [p for p in number.problems(limit) if "out of range" in p.remedy]
         assert not said, said
-        off = 1 if isinstance(number.annotation, Whole) else 1e-6 * (abs(limit) or own.high)
-        assert any("out of range" in p.remedy for p in number.problems(limit + outwards * off))
-
-
-@settings(max_examples=400)
-@given(st.sampled_from(NUMBERS), st.booleans(), st.floats(1e-6, 1e6))
-def test_a_number_beyond_its_range_is_refused_by_name(number: Number, above: bool, factor: float) -> None:
-    own = number.range
-    off = factor * (max(abs(own.low), abs(own.high)) if above else abs(own.low) or own.high)
-    value = own.high + off if above else own.low - off
-    if isinstance(number.annotation, Whole):
-        value = math.ceil(value) if above else math.floor(value)
-    (problem,) = number.problems(value)
-    assert problem.file == FILE and number.field in problem.field.replace("import", "imported").replace(
-        "class", "tolerance_class"
-    )
-    assert f"must be from {own.shown(own.low)} to {own.shown(own.high)}; {own.remedy}" in problem.remedy
+        for off in (1e-6, 1e6):
+            beyond = math.ceil(off) if isinstance(number.annotation, Whole) else off * (abs(limit) or own.high)
+            (problem,) = number.problems(limit + outwards * beyond)
+            assert problem.file == FILE and names.get(problem.field, problem.field).startswith(number.field)
+            assert f"must be from {own.shown(own.low)} to {own.shown(own.high)}; {own.remedy}" in problem.remedy
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -205,7 +192,7 @@ def test_what_numbers_come_to_together_is_refused_with_the_file(tmp_path: Path) 
     assert start.remedy.startswith("too near the end of the flank: at least 0.006")
 
 
-def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file(tmp_path: Path) -> None:
+def test_more_meshes_than_the_kernel_holds_are_refused_with_the_file() -> None:
     from gearfmu.stagefile.checks.stage import stage_problems
 
     stage = gf.load("two_stage")

@@ -118,5 +118,4 @@ def test_gears_lose_the_integral_over_the_path(case: Case) -> None:
     model = gf.assemble(case.name)
     for mesh, power in zip(case.engagements, in_motion(model, case), strict=True):
         path = by_the_path(model, case, mesh)
-        print(f"{case.name} {mesh}: {1e3 * power:.4f} W/kN, by the path {1e3 * path:.4f} ({power / path - 1:+.2%})")
         assert power == pytest.approx(path, rel=0.005)

@@ -9,9 +9,7 @@ from driven import begun, stepped
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.connections import PortSpec
 
 H, STEP = 5e-6, 2e-5
 
@@ -33,24 +31,6 @@ def test_pins_hold_the_planets_against_their_centrifugal_load(planetary: StageMo
         assert outward == pytest.approx([on * load] * 3, rel=1e-9, abs=1e-9)
         across = [kernel.get("pin.planet1.fy"), kernel.get("pin.planet2.fx")]
         assert across == pytest.approx([0.0, 0.0], abs=1e-6 * load)
-
-
-def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(planetary: StageModel) -> None:
-    """The same stiffness against turning, as a spin with a port or as an oscillator: the same statics. What a gear's
-    bore yields beyond all modes reaches the engagement that has the port's row alone: 6e-5 of the carrier's angle."""
-    spec = load_stage("planetary54")
-    mounts = spec.written.ring.mounts
-    k = mounts.points * mounts.stiffness * (spec.written.ring.rim_diameter / 2) ** 2
-    ports = spec.ports | {"ring": PortSpec(kind="spring", k=k, c=0.0)}
-    on_port = assemble(with_ports(spec, ports), load_bodies(spec))
-    found = []
-    for one in (planetary, on_port):
-        assert one.shafts.ratio == 0.25
-        kernel = one.kernel(level=0.0)
-        kernel.prepare()
-        state = kernel.transmission(0.0, 600.0, 4)
-        found.append([state.phi, sum(map(sum, state.forces.values()))])
-    assert found[0] == pytest.approx(found[1], rel=7e-5)
 
 
 def test_two_integrators_see_the_same_set(planetary: StageModel) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from pathlib import Path
@@ -18,7 +17,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.run.place import place_of
-from gearfmu.stage.run.te import TeResult, loaded_te, statics_of
+from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.stagefile.stage import load_stage
 
 TORQUE = 600.0  # N·m on the carrier, driving
@@ -91,31 +90,6 @@ def test_mean_mesh_force_holds_the_torque_and_shares_average_to_one(ideal: TeRes
     assert np.all(ideal.load_factor > 1.005) and np.all(ideal.load_factor < 1.02)
 
 
-def test_the_next_mesh_period_is_the_same(planetary: StageModel, ideal: TeResult) -> None:
-    kernel, pitch = statics_of(planetary), abs(place_of(planetary, "sun_planet1").pitch)
-    for periods in (1, 8, -9):  # 9: sixty degrees of the carrier
-        at = (periods + 3 / POSITIONS) * pitch
-        error = R_SUN * (at - 4 * kernel.transmission(at, TORQUE).phi)
-        assert error == pytest.approx(ideal.te[0, 3], abs=1e-11)
-
-
-def test_progress_is_the_part_done_and_the_torque(planetary: StageModel) -> None:
-    told: list[tuple[float, str]] = []
-    loaded_te(planetary, [60.0, TORQUE], 1, progress=lambda part, text: told.append((part, text)))
-    assert told == [(0.0, "60 N·m"), (0.5, f"{TORQUE:g} N·m")]
-
-
-@pytest.mark.full
-def test_unloaded_error_is_the_backlash_of_both_meshes(planetary: StageModel) -> None:
-    """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
-    with the torque."""
-    result, form = loaded_te(planetary, [0.0, 60.0, TORQUE], 2), planetary.stage.written.set
-    assert np.allclose(result.te[0], -form.backlash * math.cos(form.pressure_angle), atol=0.15e-6)
-    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
-    other = loaded_te(planetary, [-TORQUE], 2)
-    assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
-
-
 def test_a_pin_carries_what_the_meshes_press_on_its_planet(at_rest: Kernel) -> None:
     """Across the axis both mesh forces push a planet along its tangent: 2 F cos α and nothing along its radius, but for
     their difference."""
@@ -125,22 +99,6 @@ def test_a_pin_carries_what_the_meshes_press_on_its_planet(at_rest: Kernel) -> N
         pin = complex(*(at_rest.get(f"pin.planet{k + 1}.f{axis}") for axis in "xy")) * (-1j) ** k
         assert abs(pin.imag) == pytest.approx((at_sun + at_ring) * along, rel=2e-3)
         assert abs(pin.real) == pytest.approx(abs(at_sun - at_ring) * across, abs=2e-3 * at_sun)
-
-
-@pytest.mark.full
-def test_the_verb_writes_a_tidy_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "te.csv"
-    arguments = ["te", "planetary54", "--torque", "600 N*m", "--positions", "4", "--out", str(out)]
-    assert cli.outcome(arguments) == 0
-    said = capsys.readouterr().out
-    assert "sun: K_gamma 1.0" in said and "ring: K_gamma 1.0" in said
-    with open(out, newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 4 and out.with_suffix(".png").exists()
-    for row in rows:
-        for gear in ("sun", "ring"):
-            assert sum(float(row[f"{gear}_share_{k + 1}"]) for k in range(4)) == pytest.approx(4)
-            assert float(row[f"{gear}_force_N"]) == pytest.approx(MEAN, rel=1e-3)
 
 
 def test_the_verb_refuses_held_bearings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

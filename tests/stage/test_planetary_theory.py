@@ -1,15 +1,11 @@
 """Planetary sets of rigid bodies against theory: natural frequencies and mode classes of Lin & Parker 1999, what a pure
-torque excites, how planets share the load, mesh phasing, balance of speeds and torques, conservation in a free set.
+torque excites, how planets share the load, mesh phasing, free flight. Speeds, torques, momentum: test_set_scenes.py.
 
-The shipped kernel keeps rows in single precision, which shows as some 1e-8 to 1e-7; where theory is sharper, a kernel
-in double precision is held to it."""
+The kernel keeps rows in single precision, which shows as some 1e-8 to 1e-7."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import lin_parker
@@ -17,13 +13,10 @@ import numpy as np
 import pytest
 from driven import begun, give, stepped
 from rigid_set import SPRINGS, TORQUE, Motion, Rigid, RigidSet, kernel_of
-from scipy.integrate import cumulative_trapezoid
 
-from gearfmu.kernel import Kernel
 from gearfmu.modes.linear import linearised
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
-from gearfmu.stagefile.tables.connections import PortSpec
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02
@@ -36,10 +29,10 @@ def slow(*values: object, name: str | None = None) -> Any:
     return pytest.param(*values, marks=pytest.mark.full, id=name)
 
 
-def natural(rigid: RigidSet, library: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
+def natural(rigid: RigidSet) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (Hz) and shapes in the plane of the loaded set, from the linearised kernel."""
     model = rigid.model()
-    system = linearised(model, 1.0, ALONE, kernel_of(model, library))
+    system = linearised(model, 1.0, ALONE, kernel_of(model))
     assert len(system.linear.label) == 2 * rigid.planets and np.ptp(system.linear.label[:, 0]) == 2 * rigid.planets - 1
     return Motion(rigid, model).plane_modes(system)
 
@@ -51,9 +44,6 @@ def test_natural_frequencies_are_those_of_lin_and_parker(planets: int) -> None:
     printed = np.sort(lin_parker.published()["published"][str(planets)])
     on_paper, paper_shapes = lin_parker.modes(*lin_parker.matrices(KNOWN, rigid.angles()))
     assert found.size == printed.size and found[0] < 0.01
-    print(
-        f"{np.abs(found[1:] / printed[1:] - 1).max():.1e} from print, {np.abs(found[1:] / on_paper[1:] - 1).max():.1e}"
-    )
     assert np.allclose(found[1:], printed[1:], rtol=5e-4)
     assert np.allclose(found[1:], on_paper[1:], rtol=2e-7)
     classes = [lin_parker.class_of(shape, planets) for shape in shapes.T]
@@ -64,20 +54,20 @@ def test_natural_frequencies_are_those_of_lin_and_parker(planets: int) -> None:
     assert np.allclose(pairs[:, 0], pairs[:, 1], rtol=2e-7)
 
 
-def excitation(rigid: RigidSet, library: Path | None = None) -> float:
+def excitation(rigid: RigidSet) -> float:
     """Largest modal force of torques on carrier and sun that hold each other, on modes that are not rotational, over
     the largest on those that are."""
-    _, shapes = natural(rigid, library)
+    _, shapes = natural(rigid)
     force = np.abs(shapes[lin_parker.CARRIER + 2] / rigid.base("carrier")
                    - shapes[lin_parker.SUN + 2] / rigid.base("sun") / rigid.ratio)  # fmt: skip
     rotational = np.array([lin_parker.class_of(shape, rigid.planets) == "rotational" for shape in shapes.T])
     return float(force[~rotational].max() / force[rotational].max())
 
 
-def response(rigid: RigidSet, library: Path | None = None) -> float:
+def response(rigid: RigidSet) -> float:
     """A step of both torques at a standing mesh: what central bodies move across the axis and planets move unlike each
     other, over what planets move."""
-    kernel = kernel_of(rigid.model(), library, h=H, **{"effect.roll_motion": 0.0})
+    kernel = kernel_of(rigid.model(), h=H, **{"effect.roll_motion": 0.0})
     loads = {"carrier.tau": 100.0, "sun.tau": -100.0 / rigid.ratio}
     begun(kernel, loads)
     give(kernel, {name: 1.5 * torque for name, torque in loads.items()})
@@ -98,13 +88,6 @@ def test_a_pure_torque_excites_rotational_modes_only(planets: int, teeth: tuple[
     assert excitation(rigid) < 1e-7 and response(rigid) < 2e-7
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(("planets", "teeth"), [(3, (26, 34)), (4, (24, 36)), (5, (26, 34))])
-def test_to_the_last_digits_of_double_precision(double_library: Path, planets: int, teeth: tuple[int, int]) -> None:
-    rigid = RigidSet(planets, teeth)
-    assert excitation(rigid, double_library) < 1e-9 and response(rigid, double_library) < 1e-9
-
-
 def test_a_pin_error_excites_other_modes_too() -> None:
     """What the test above measures is not zero by itself."""
     assert response(RigidSet(3, pins={1: (0.0, 1e-5)})) > 1e-2
@@ -120,6 +103,18 @@ def test_planets_of_an_ideal_set_share_alike(planets: int, teeth: tuple[int, int
     found = periods(RigidSet(planets, teeth, contact_ratio=1.6), 20.0)
     assert found.sharing.mean(axis=1).max() == pytest.approx(1.0, abs=1e-6)
     assert found.load_factor.max() > 1.005  # neighbours mesh at another phase
+
+
+@pytest.mark.parametrize(
+    "rigid",
+    [
+        pytest.param(RigidSet(5, (18, 18), module=2.5e-3, positions=(0, 14, 29, 43, 58)), id="5"),
+        slow(RigidSet(4, positions=(0, 31, 59, 91)), name="4"),
+    ],
+)
+def test_unequally_spaced_planets_carry_alike_under_little_load(rigid: RigidSet) -> None:
+    """So all teeth stand where they should, to some 10 nm."""
+    assert abs(periods(replace(rigid, contact_ratio=1.4), 20.0).sharing - 1).max() < 0.05
 
 
 @pytest.mark.parametrize("pins", [{1: (5e-6, 12e-6)}, slow({0: (-20e-6, -15e-6)}), slow({2: (0.0, 25e-6)})])
@@ -152,17 +147,6 @@ def test_shares_with_pin_errors_are_those_of_the_paper_model(
     assert np.ptp(paper) > 0.02 and np.allclose(kernel, paper, atol=1e-4)
 
 
-@pytest.mark.parametrize("stiffness", [slow(1e5), 1e4])
-def test_a_set_with_pin_errors_rests_without_load_however_softly_its_sun_floats(stiffness: float) -> None:
-    """Flanks that overlapped push the sun aside, planets turn loosely in their backlash: what is left is the weight of
-    the sun's bearing on the teeth, less than stiffness times backlash."""
-    rigid = RigidSet(4, pins={1: (5e-6, 12e-6)}, sun=Rigid(0.4, 0.39, stiffness))
-    model = rigid.model()
-    state = kernel_of(model).transmission(-ALONE * place_of(model, "sun_planet1").pitch, 0.0)
-    assert abs(state.te) < 1e-7
-    assert max(abs(force) for slices in state.forces.values() for force in slices) < stiffness * 60e-6
-
-
 @pytest.mark.parametrize(
     ("planets", "teeth"),
     [
@@ -193,74 +177,7 @@ def test_mesh_phasing_suppresses_harmonics(planets: int, teeth: tuple[int, int])
     assert turns.all() == (np.ptp(force, axis=1).max() < 1e-5 * force.mean())
 
 
-def turned(rigid: RigidSet, inputs: dict[str, float], steps: int, *names: str) -> tuple[Kernel, np.ndarray]:
-    """(steps + 1, names), before and after communication steps of ten internal ones."""
-    kernel = begun(kernel_of(rigid.model(), h=H), inputs)
-    start = [kernel.get(name) for name in names]
-    return kernel, np.vstack([start, stepped(kernel, steps, 10 * H, *names)])
-
-
 DAMPED = RigidSet(4, contact_ratio=1.6, damping_ratio=0.05, contact_damping=2e3)
-FIXED = PortSpec(kind="fixed")
-SPEEDS = {  # ports, speeds of carrier, sun, ring per rad/s of the one that drives
-    "ring stands": ({}, lambda s, r: (1.0, 1 + r / s, 0.0)),
-    "ring held": ({"ring": FIXED}, lambda s, r: (1.0, 1 + r / s, 0.0)),
-    "sun held": ({"sun": FIXED, "ring": TORQUE}, lambda s, r: (1.0, 0.0, 1 + s / r)),
-    "carrier held": ({"carrier": FIXED, "ring": TORQUE}, lambda s, r: (0.0, 1.0, -s / r)),
-    "all turn": ({"ring": TORQUE}, lambda s, r: (1.0, (1 + r / s) - 0.5 * r / s, 0.5)),
-}
-
-
-SLOW = {"ring stands", "ring held", "carrier held"}
-
-
-@pytest.mark.parametrize("case", [slow(case) if case in SLOW else case for case in SPEEDS])
-def test_mean_speeds_are_those_of_willis(case: str) -> None:
-    """z_s (ω_s − ω_c) + z_r (ω_r − ω_c) = 0, whichever member is held: the drift over 16 ms at 300 rad/s."""
-    ports, speeds = SPEEDS[case]
-    rigid = replace(DAMPED, ports=ports)
-    members, ring_teeth = ("carrier", "sun", "ring"), rigid.ring_teeth
-    start = dict(zip(members, speeds(rigid.teeth[0], ring_teeth), strict=True))
-    torque = {"carrier": 1000.0, "sun": -1000.0 / rigid.ratio}
-    torque["ring"] = -sum(torque.values())
-    kinds = {"carrier": TORQUE, "sun": TORQUE} | ports
-    inputs = {f"{name}.tau": torque[name] for name, port in kinds.items() if port.kind == "torque"}
-    inputs |= {f"{name}.w_start": 300.0 * start[name] for name, port in kinds.items() if port.kind == "torque"}
-    _, found = turned(rigid, inputs, 1000, *(f"{name}.gear.phi" for name in members))
-    carrier, sun, ring = found[200:].T
-    slip = rigid.teeth[0] * (sun - carrier) + ring_teeth * (ring - carrier)
-    drift = np.polyfit(10 * H * np.arange(slip.size), slip, 1)[0]
-    assert abs(drift) < 1e-6 * ring_teeth * 300.0
-
-
-def test_mean_torques_balance() -> None:
-    """Torque on the carrier, what holds the sun's outer end at a given speed, what the ring's mounts carry: their mean
-    over 25 mesh periods, and the ratio of the first two."""
-    rigid = replace(DAMPED, damping_ratio=0.2, ports={"sun": PortSpec(kind="spring", k=2e4, c=10.0)})
-    torque, step = 1000.0, 10 * H
-    speed = 2 * math.pi / (rigid.ring_teeth * 40 * step)  # 40 communication steps a mesh period
-    kernel = kernel_of(rigid.model(), h=H)
-    begun(kernel, {"carrier.tau": torque, "carrier.w_start": speed, "sun.w": speed * rigid.ratio})
-    found = np.empty((1600, 2))
-    for i in range(len(found)):
-        kernel.set("sun.phi", speed * rigid.ratio * step * (i + 1))
-        kernel.step(step * i, step)
-        found[i] = kernel.get("sun.tau_mean"), kernel.get("bearing.ring.mz_mean")
-    sun, mounts = found[-1000:].mean(axis=0)
-    print(sun, mounts, sun + mounts - torque, sun - torque / rigid.ratio)
-    assert sun + mounts == pytest.approx(torque, rel=1e-6)
-    assert sun == pytest.approx(torque / rigid.ratio, rel=1e-6)
-
-
-def own_inertia(rigid: RigidSet, name: str) -> float:
-    """kg·m² of a body about its axis."""
-    body: Rigid = getattr(rigid, name)
-    return body.inertia * rigid.base(name) ** 2
-
-
-def carried_inertia(rigid: RigidSet) -> float:
-    """kg·m² of the carrier with the planets' masses on its bolts."""
-    return own_inertia(rigid, "carrier") + rigid.planets * rigid.planet.mass * rigid.distance**2
 
 
 SOFT = 1e4  # N/m: a bearing that does next to nothing within some ms
@@ -268,97 +185,6 @@ FREE = RigidSet(
     4, contact_ratio=1.6, positions=(0, 31, 59, 91), ports={"ring": TORQUE},
     **{name: replace(getattr(DAMPED, name), bearing=SOFT) for name in ("sun", "ring", "carrier")},
 )  # fmt: skip
-
-
-def released(rigid: RigidSet, start: Sequence[float], steps: int, **parameters: float) -> tuple[Kernel, np.ndarray]:
-    """Without load, carrier, sun and ring at their speeds (rad/s). (steps, 6 + 2N + N + 3): x, y of sun, ring and
-    carrier, elongation of the pins, speeds of carrier, sun, ring and planets; then angle of the carrier, energy and
-    what its balance lacks."""
-    planets = range(1, rigid.planets + 1)
-    speeds = dict(zip(("carrier", "sun", "ring"), start, strict=True))
-    undamped = {"effect.contact_damping": 0.0, **{f"{name}.w_start": speed for name, speed in speeds.items()}}
-    kernel = kernel_of(rigid.model(), h=H, **undamped, **parameters)
-    kernel.initialize()
-    moved = [f"{name}.{d}" for name in ("sun.gear", "ring.gear", "bearing.carrier") for d in "xy"]
-    moved += [f"pin.planet{k}.{d}" for k in planets for d in "xy"]
-    turning = [f"{name}.gear.w" for name in (*speeds, *(f"planet{k}" for k in planets))]
-    names = [*moved, *turning, "carrier.gear.phi", "energy.stored", "energy.residual"]
-    return kernel, stepped(kernel, steps, 2 * H, *names)
-
-
-def spin_momentum(rigid: RigidSet, found: np.ndarray) -> np.ndarray:
-    """(steps,) kg·m²/s about the axis of the set."""
-    first, planets = 6 + 2 * rigid.planets, rigid.planets
-    inertia = [carried_inertia(rigid), *(own_inertia(rigid, name) for name in ("sun", "ring"))]
-    inertia += [own_inertia(rigid, "planet")] * planets
-    return found[:, first : first + 3 + planets] @ inertia
-
-
-def impacts(kernel: Kernel, planets: int) -> float:
-    return sum(kernel.get(f"{gear}_planet{k + 1}.impacts") for gear in ("sun", "ring") for k in range(planets))
-
-
-def test_a_free_set_keeps_energy_momentum_and_angular_momentum() -> None:
-    """Rattle in standing axes, planets unequally spaced, nothing damped. What is left on the set is the pull of three
-    soft bearings: the centre of mass moves as that says, to single precision."""
-    still = {"effect.roll_motion": 0.0, "effect.coriolis": 0.0, "effect.centrifugal": 0.0}
-    kernel, found = released(FREE, (0.5, -1.0, 0.2), 1000, **still)
-    assert impacts(kernel, 4) > 10 and kernel.get("solver.retried_steps") == 0
-    assert np.abs(found[:, -1]).max() < 2e-8 * found[0, -2]  # 1.4e-8: passes end at 3e-7 of a gap
-    spin = spin_momentum(FREE, found)
-    assert np.allclose(spin, spin[0], rtol=1e-12)
-    turn = np.exp(-1j * found[:, -3])[:, None] * (found[:, :6:2] + 1j * found[:, 1:6:2])  # ground to carrier axes
-    central = np.stack([turn.real, turn.imag], axis=2)
-    tangent = FREE.distance * np.stack([-np.sin(FREE.angles()), np.cos(FREE.angles())], axis=1)
-    planets = central[:, 2:] + found[:, 6:14].reshape(-1, 4, 2) + found[:, -3, None, None] * tangent
-    masses = np.array([FREE.sun.mass, FREE.ring.mass, FREE.carrier.mass])
-    moment = np.einsum("b,tbx->tx", masses, central) + FREE.planet.mass * planets.sum(axis=1)
-    pull = SOFT * central.sum(axis=1)
-    twice = cumulative_trapezoid(cumulative_trapezoid(pull, axis=0, initial=0), axis=0, initial=0)
-    uniform = moment + twice * (2 * H) ** 2
-    time = 2 * H * np.arange(1, len(found) + 1)
-    left = uniform - np.stack([np.polyval(np.polyfit(time, one, 1), time) for one in uniform.T], axis=1)
-    size = FREE.sun.mass * np.abs(central[:, 0]).max()
-    print(np.abs(left).max() / size, np.abs(moment - uniform).max() / size)
-    assert np.abs(left).max() < 1e-5 * size
-
-
-def test_a_turning_free_set_keeps_its_angular_momentum() -> None:
-    """At 85 rad/s of the carrier with rattle, in turning axes with their Coriolis forces; energy to what the moving
-    mesh works (docs/theory.md, 6)."""
-    rigid = FREE
-    kernel, found = released(rigid, (85.0, 85.0 * rigid.ratio + 2.0, 0.0), 1000)
-    assert impacts(kernel, 4) > 4 and kernel.get("solver.retried_steps") == 0
-    spin = spin_momentum(rigid, found)
-    assert np.allclose(spin, spin[0], rtol=1e-12)
-    print(np.abs(found[:, -1]).max() / found[0, -2])
-    assert np.abs(found[:, -1]).max() < 1e-5 * found[0, -2]
-
-
-@pytest.mark.parametrize(
-    "rigid",
-    [
-        slow(RigidSet(3), name="3"),
-        slow(RigidSet(5), name="5"),
-        pytest.param(RigidSet(6, (36, 24)), id="6"),
-        slow(RigidSet(4, positions=(0, 31, 59, 91)), name="4 unequal"),
-        pytest.param(RigidSet(5, (18, 18), module=2.5e-3, positions=(0, 14, 29, 43, 58)), id="5 unequal"),
-    ],
-)
-def test_sets_of_three_to_six_planets_run(rigid: RigidSet) -> None:
-    """All planets carry 20 N·m within a fraction, so all teeth stand where they should to some 10 nm; then at 85 rad/s
-    under load."""
-    rigid = replace(rigid, contact_ratio=1.4, damping_ratio=0.05, contact_damping=2e3)
-    assert abs(periods(rigid, 20.0).sharing - 1).max() < 0.05
-    names = ["carrier.gear.w", "sun.gear.w", *(f"planet{k + 1}.gear.w" for k in range(rigid.planets))]
-    inputs = {"carrier.tau": 1000.0, "sun.tau": -1000.0 / rigid.ratio}
-    inputs |= {"carrier.w_start": 85.0, "sun.w_start": 85.0 * rigid.ratio}
-    kernel, found = turned(rigid, inputs, 200, *names)
-    speeds = found[100:].mean(axis=0) / 85.0
-    planet = 1 - rigid.ring_teeth / rigid.teeth[1]
-    assert speeds == pytest.approx([1.0, rigid.ratio, *[planet] * rigid.planets], rel=5e-3)
-    assert all(abs(kernel.get(f"sun_planet{k + 1}.force")) > 100 for k in range(rigid.planets))
-    assert kernel.get("solver.retried_steps") == 0
 
 
 @pytest.mark.parametrize("coriolis", [1.0, 0.0])
@@ -379,6 +205,5 @@ def test_a_sun_in_free_flight_moves_straight_on(coriolis: float) -> None:
     bent = np.diff(place, 2)[flies] / step**2 + (stiffness / rigid.sun.mass + speed**2) * here
     off = 2j * speed * velocity + 2 * speed**2 * here
     size = np.abs(off).max()
-    print(flies.sum(), np.abs(bent).max() / size, np.abs(bent - off).max() / size)
     assert flies.sum() > 200
     assert np.abs(bent - (0.0 if coriolis else off)).max() < 0.01 * size

@@ -16,19 +16,15 @@ from gearfmu.errors import ModelError
 from gearfmu.modes.linear import Linearised
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.assembly import rolling
-from gearfmu.stage.assembly.assemble import settled, tangents_of
+from gearfmu.stage.assembly.assemble import settled
 from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.assembly.layout import stage_layout
 from gearfmu.stage.assembly.rolling import SETTLED, Settled
-from gearfmu.stage.run.bearings import stage_bearings
 from gearfmu.stage.run.limits import beyond_limits
 from gearfmu.stage.run.simulate import simulate
-from gearfmu.stage.run.te import loaded_te
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import OperatingSpec
-
-HELD = {"effect.bearings": 0.0}  # axes
 
 TRAIN, PAIR = "two_stage/stage_bearings", "helical_demo/stage_bearings"
 
@@ -126,12 +122,6 @@ def test_an_axial_load_on_the_open_side_is_refused(monkeypatch: pytest.MonkeyPat
     assert facing("+z").rests["input_left"].load[2] > 0.0
 
 
-def test_stages_without_rolling_bearings_have_none() -> None:
-    with pytest.raises(ModelError, match="has no rolling bearings"):
-        settled(*loaded("helical_demo"))
-    assert tangents_of(*loaded("helical_demo")) == {}
-
-
 # ---- the linear model -----------------------------------------------------------------------------------------------
 def test_springs_given_as_tangents_are_the_springs() -> None:
     """A bearing whose tangent is diagonal makes the support that a file with these stiffnesses makes."""
@@ -219,12 +209,6 @@ def test_bearings_belong_to_the_model() -> None:
     assert len({own.hash for own in models}) == len({own.guid for own in models}) == 3
 
 
-def test_held_bearings_are_held_whatever_they_are() -> None:
-    """Without effect.bearings the stage is that on constant springs, bit for bit."""
-    one, two = (loaded_te(own, [80.0], 4, **HELD) for own in (model(PAIR), assemble(*loaded("helical_demo"))))
-    assert np.array_equal(one.te, two.te)
-
-
 def test_energy_is_kept_on_coupled_bearings() -> None:
     """A loaded run with frozen mesh: what the balance leaves is no more than on constant springs, times three."""
     left = []
@@ -239,18 +223,3 @@ def test_a_run_far_from_the_operating_torque_is_told_so() -> None:
     for torque, said in ((100.0, False), (60.0, False), (199.0, False), (45.0, True), (-100.0, True)):
         assert any("linearised at 100 N·m" in text for text in beyond_limits(model(PAIR), torque)) == said
     assert not beyond_limits(assemble(*loaded("helical_demo")), 30.0)
-
-
-# ---- the table ------------------------------------------------------------------------------------------------------
-def test_the_table_says_what_was_proposed() -> None:
-    table = stage_bearings(*loaded(TRAIN))
-    ball, roller = table["input_left"], table["input_right"]
-    assert set(ball.proposed) == set(ball.numbers) and "balls" in ball.numbers
-    assert "rollers" in roller.numbers and "width" not in roller.numbers
-    assert roller.stiffness[2].tolist() == [0.0] * 5
-    assert 0 < ball.loaded <= ball.elements and ball.pressure > 5e8
-    assert ball.orders[0] + ball.orders[1] == pytest.approx(ball.elements)
-    columns = table.columns()
-    assert {len(column) for column in columns.values()} == {6}
-    assert columns["load_x"][0] == pytest.approx(ball.load[0])
-    assert "6 rolling bearings of two_stage_bearings at 100 N·m" in str(table)

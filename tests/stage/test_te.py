@@ -9,9 +9,9 @@ import pytest
 from driven import begun
 
 from gearfmu.body import Body
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import ChainSpec
@@ -19,12 +19,6 @@ from gearfmu.stagefile.tables.connections import ChainSpec
 LOAD = 302.0  # N·m on the pinion
 PITCH = 2 * math.pi / 24  # rad, of the wheel
 POSITIONS = np.arange(16) / 16
-
-
-def ready(model: StageModel, **parameters: float) -> Kernel:
-    kernel = model.kernel(**{"level": 0.0, **parameters})
-    kernel.prepare()
-    return kernel
 
 
 def te(kernel: Kernel, torque: float, positions: np.ndarray = POSITIONS) -> np.ndarray:
@@ -38,20 +32,10 @@ def above(values: np.ndarray, harmonic: int) -> float:
     return float(np.sqrt(np.mean(np.fft.irfft(lines, values.size) ** 2)))
 
 
-def test_vanishes_with_the_load_and_grows_with_it(plain: StageModel) -> None:
-    """The unmodified rigid pair just touches at zero: what is left is compliance × force, positive under load."""
-    kernel = ready(plain)
-    torques = [1e-6, 1e-3, 1.0, 10.0, 80.0, LOAD, 600.0]
-    values = np.array([te(kernel, torque) for torque in torques])
-    assert np.all(values > 0) and np.all(np.diff(values, axis=0) > 0)
-    assert values[0].max() < 1e-12
-    assert np.allclose(values[1] / values[0], 1e3, rtol=1e-2)  # the local law is linear at vanishing force
-
-
 def test_overload_finds_its_equilibrium_everywhere(plain: StageModel, relieved: StageModel) -> None:
     """Fifteen times the largest torque: rows in single precision leave 1e-7 of the deflection undecided, no more."""
     for model in (plain, relieved):
-        kernel = ready(model)
+        kernel = statics_of(model)
         torques = [1500.0, 3000.0, 6000.0, 9000.0]
         values = np.array([te(kernel, torque, np.arange(41) / 41) for torque in torques])
         assert np.all(np.diff(values, axis=0) > 0)
@@ -67,21 +51,6 @@ def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageMode
     assert np.all(result.stage_stiffness[0] > 0.4 * result.stage_stiffness[1])
 
 
-def test_repeats_after_one_pitch_and_after_a_turn(plain: StageModel) -> None:
-    kernel = ready(plain)
-    once = te(kernel, LOAD)
-    for pitches in (1, -1, 24, 240):
-        assert np.allclose(te(kernel, LOAD, POSITIONS + pitches), once, rtol=1e-9, atol=0)
-
-
-def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair: PairGeometry) -> None:
-    result = loaded_te(plain, [LOAD * 0.99, LOAD, LOAD * 1.01], 16)
-    slope = 0.02 * LOAD / pair.gears[0].r_b / (result.te[2] - result.te[0])
-    same_pairs = np.all((result.shares[0] > 0) == (result.shares[2] > 0), axis=1)
-    assert same_pairs.sum() > 8
-    assert np.allclose(result.stage_stiffness[1][same_pairs], slope[same_pairs], rtol=1e-3)
-
-
 def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -> None:
     """1/k of the stage = 1/k of the mesh + Σ 1/k of the bearings, where both have the same pairs in contact; the mesh
     stiffness is that of held axes."""
@@ -93,15 +62,6 @@ def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: Stage) -
     assert np.median(behind) == pytest.approx(expected, rel=2e-2)
 
 
-def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
-    """What is dynamic at level full is residual at level rigid: the same static compliance, but where a tip corner
-    carries: its rows have a kink between two nodes of the tables."""
-    rigid = te(ready(plain, level=0.0), LOAD)
-    for level in (1.0, 2.0, 3.0):
-        found = te(ready(plain, level=level), LOAD) / rigid - 1
-        assert np.abs(found).max() < 2e-5 and np.median(np.abs(found)) < 2e-6
-
-
 def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodies: list[Body]) -> None:
     """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
     chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
@@ -110,28 +70,13 @@ def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: Stage, bodie
     assert np.array_equal(loaded_te(chained, [LOAD], 5).te, loaded_te(plain, [LOAD], 5).te)
 
 
-def test_direction_of_approach_does_not_matter(relieved: StageModel) -> None:
-    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from
-    scratch."""
-    kernel, fresh = ready(relieved), te(ready(relieved), LOAD)
-    kernel.transmission(0.0, 600.0)
-    forwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS]
-    kernel.transmission(0.0, 1.0)
-    backwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS[::-1]][::-1]
-    assert np.allclose(forwards, fresh, rtol=0, atol=1e-10) and np.allclose(backwards, fresh, rtol=0, atol=1e-10)
-
-
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
 def test_smooth_over_the_pitch(name: str, torque: float, spec: Stage, relief_spec: Stage, bodies: list[Body]) -> None:
     """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the
     tip corners have real harmonics, and the grid of rolls must not add to them."""
     chosen = {"relieved": relief_spec, "plain": spec}[name]
     grids = [assemble(chosen, bodies), assemble(chosen, bodies, rolls=64)]
-    once, twice = (te(ready(model), torque, np.arange(1024) / 1024) for model in grids)
-    print(
-        f"{name} {torque:g} N·m: above 12th harmonic {1e6 * above(once, 12):.4f} µm rms, "
-        f"grid {1e6 * above(once - twice, 12):.4f} µm rms"
-    )
+    once, twice = (te(statics_of(model), torque, np.arange(1024) / 1024) for model in grids)
     assert above(once - twice, 12) < 0.02e-6 and np.std(once - twice) < 0.05e-6
     if name == "relieved":
         assert above(once, 12) < 0.05e-6
@@ -142,7 +87,7 @@ def test_rest_under_torques_on_both_ports_is_the_transmission_there(relieved: St
     pinion's angle. With the angles of `rest` and its wound shafts the stage begins under the torques it was asked for.
     Both but for the slope of the transmission error, by which torques at one instant are not quite in the ratio of the
     teeth (0.4 % here)."""
-    kernel, torques = ready(relieved), {"pinion": LOAD, "wheel": LOAD * 24 / 16}
+    kernel, torques = statics_of(relieved), {"pinion": LOAD, "wheel": LOAD * 24 / 16}
     assert kernel.ports == ["pinion", "wheel"]
     phi = kernel.rest(torques)
     assert phi["pinion"] == pytest.approx(kernel.transmission(phi["wheel"], LOAD).phi, rel=4e-3)

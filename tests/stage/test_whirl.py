@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from test_trains import STEEL, bearing, disc, train
+from test_groups import STEEL, bearing, disc, train
 
 from gearfmu.body.beam import Section, Shaft, reduce_shaft
 from gearfmu.stage.assembly.ground_part import ground_part, skew_pairs, whirl_rows
@@ -43,7 +43,6 @@ def test_a_hinged_shaft_whirls_as_a_spinning_timoshenko_beam() -> None:
     for n in (1, 2, 3):
         exact = hinged_whirl(n * math.pi / LENGTH, speed)
         nearest = np.array([found[np.abs(found - w).argmin()] for w in exact])
-        print(n, exact / (2 * math.pi), nearest / exact - 1, np.diff(exact) / exact.mean())
         assert nearest == pytest.approx(exact, rel=2e-5)
         assert np.diff(exact) > 0.005 * exact.mean()
 
