@@ -2,7 +2,8 @@
 
 The spec is that of planetary54 with other teeth, places, springs and planets; what `assemble` reads of a reduced body
 is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard
-that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
+that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact. A helical tooth
+in more slices than width functions needs flanks of steel: without local compliance forces are not unique.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class Rigid:
 class RigidSet:
     """teeth of sun and planet; contact_ratio of both meshes; mesh (N/m): of one pair of teeth; ring_twist (N/m):
     stiffness against turning of the ring over the square of its base radius; torque (N·m) on the carrier: the static
-    load is small beside what the teeth would need to leave their places."""
+    load is small beside what the teeth would need to leave their places; youngs_modulus (Pa): of the flanks."""
 
     planets: int
     teeth: tuple[int, int] = (26, 34)
@@ -74,6 +75,7 @@ class RigidSet:
     width: float = WIDTH
     slices: int = 1
     functions: int = 1
+    youngs_modulus: float = HARD
 
     @property
     def transverse(self) -> tuple[float, float]:
@@ -126,7 +128,7 @@ class RigidSet:
         gears = {}
         for name, teeth in zip(("sun", "planet", "ring"), (*self.teeth, self.ring_teeth), strict=True):
             gear = getattr(own, name)
-            hard = gear.material.model_copy(update={"youngs_modulus": HARD})
+            hard = gear.material.model_copy(update={"youngs_modulus": self.youngs_modulus})
             of_gear = {"teeth": teeth, "face_width": self.width, "material": hard}
             of_gear |= {"tip_edge_radius": EDGE, "tip_diameter": self._tip(name)}
             if name == "ring":

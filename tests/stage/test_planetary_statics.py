@@ -107,3 +107,14 @@ def test_the_verb_refuses_held_bearings(tmp_path: Path, capsys: pytest.CaptureFi
     assert "load of a planetary set is shared by the compliance of its bearings" in " ".join(
         capsys.readouterr().err.replace("│", " ").split()
     )
+
+
+@pytest.mark.full
+def test_unloaded_error_is_the_backlash_of_both_meshes(planetary: StageModel) -> None:
+    """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
+    with the torque."""
+    result, form = loaded_te(planetary, [0.0, 60.0, TORQUE], 2), planetary.stage.written.set
+    assert np.allclose(result.te[0], -form.backlash * math.cos(form.pressure_angle), atol=0.15e-6)
+    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
+    other = loaded_te(planetary, [-TORQUE], 2)
+    assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh

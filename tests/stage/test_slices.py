@@ -4,10 +4,12 @@ lines that end at a tip edge inside the face width."""
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,9 +29,10 @@ from gearfmu.stage.assembly.compact import DISTANCES, between_functions
 from gearfmu.stage.assembly.layout import width_degrees
 from gearfmu.stage.run import refinement
 from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, Change, left_of_slices, twice
-from gearfmu.stage.run.te import place_of, statics_of
+from gearfmu.stage.run.te import mesh_harmonics, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.bodies import Misalignment
 
 HELD = {"effect.bearings": 0.0}  # axes
 
@@ -39,11 +42,33 @@ SLICES = 10
 
 
 @cache
-def involute() -> StageModel:
-    """`helical_demo` without modifications, so that lines of contact end at full load."""
+def involute(tilt: float = 0.0) -> StageModel:
+    """`helical_demo` without modifications, so that lines of contact end at full load; its axes crossed by `tilt` (m)
+    over WIDTH."""
+    return tilted({"tip_relief": None, "lead": None}, tilt)
+
+
+@cache
+def crowned(tilt: float = 0.0) -> StageModel:
+    """`helical_demo` with thrice the crowning, 12 µm: lines of contact end at part load."""
+    lead = load_stage("helical_demo").written.gears[0].lead
+    return tilted({"lead": lead.model_copy(update={"crowning": 12e-6})}, tilt)
+
+
+def tilted(changes: Mapping[str, Any], tilt: float) -> StageModel:
+    """`helical_demo` with changes of its pinion, of both gears where they take something away."""
     demo = load_stage("helical_demo")
-    gears = tuple(gear.model_copy(update={"tip_relief": None, "lead": None}) for gear in demo.written.gears)
-    return assemble(rewritten(demo, gears=gears), load_bodies(demo))
+    gears = [gear.model_copy(update=changes if gear.lead else {k: v for k, v in changes.items() if v is None})
+             for gear in demo.written.gears]  # fmt: skip
+    error = Misalignment(in_plane=0.0, out_of_plane=-tilt, span=WIDTH) if tilt else None
+    pair = demo.written.pair.model_copy(update={"misalignment": error})
+    return assemble(rewritten(demo, gears=tuple(gears), pair=pair), load_bodies(demo))
+
+
+def errors(model: StageModel, torque: float, slices: int) -> np.ndarray:
+    """(64,) m, static transmission error with bores held."""
+    kernel, pitch = statics_of(model, **{"effect.bearings": 0.0, "slices": float(slices)}), place_of(model, None).pitch
+    return np.array([kernel.transmission(-i / 64 * pitch, torque).te for i in range(64)])
 
 
 def patches(apart: float, half: float) -> float:
@@ -211,3 +236,17 @@ def test_plans_measure_against_twice_the_slices_of_helical_stages(name: str, tim
     found = space(scene, stage_model(scene))
     own = scene.stage.slices
     assert found.full.slices == times * own == max(found.slices) and own in found.slices
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("slices", "least"), [(7, 7e-9), (10, 6e-9)])
+@pytest.mark.parametrize("torque", [45.0, 200.0])
+@pytest.mark.parametrize(("flanks", "tilt"), [(crowned, 0.0), (crowned, 20e-6), (involute, 20e-6), (involute, 50e-6)])
+def test_twice_the_parts_of_crowned_and_tilted_flanks(
+    flanks: Callable[[float], StageModel], tilt: float, torque: float, slices: int, least: float
+) -> None:
+    """Orders 1 to 8 by 1 dB or 7 nm from seven parts on, 6 nm from ten on. Least margin: 6.6 and 5.3 nm in the second
+    order of the crowned pair at part load; 3.4 nm elsewhere with ten."""
+    own, twice = (mesh_harmonics(errors(flanks(tilt), torque, n)[None], 8)[0] for n in (slices, 2 * slices))
+    heard = np.abs(20 * np.log10(own / twice)) > 1.0
+    assert np.abs(own - twice)[heard].max(initial=0.0) < least, (own, twice)

@@ -94,3 +94,14 @@ def test_rest_under_torques_on_both_ports_is_the_transmission_there(relieved: St
     ends = {f"{name}.phi": phi[name] + torque / relieved.stage.ports[name].k for name, torque in torques.items()}
     wound = begun(relieved.kernel(level=0.0), ends)
     assert [wound.get(f"{name}.tau") for name in torques] == pytest.approx([-t for t in torques.values()], rel=4e-3)
+
+
+def test_direction_of_approach_does_not_matter(relieved: StageModel) -> None:
+    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from
+    scratch."""
+    kernel, fresh = statics_of(relieved), te(statics_of(relieved), LOAD)
+    kernel.transmission(0.0, 600.0)
+    forwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS]
+    kernel.transmission(0.0, 1.0)
+    backwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS[::-1]][::-1]
+    assert np.allclose(forwards, fresh, rtol=0, atol=1e-10) and np.allclose(backwards, fresh, rtol=0, atol=1e-10)

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from driven import begun
 
+from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.stage import StageModel, Steady, loaded_te
+from gearfmu.stage import StageModel, Steady, assemble, loaded_te
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import shafts_of
+from gearfmu.stagefile.reading.base import read_toml
+from gearfmu.stagefile.reading.files import find_stage
+from gearfmu.stagefile.stage import load_stage
 
 FAST = 1
 TORQUE = 120.0  # N·m on the input
@@ -61,3 +68,70 @@ def test_a_stage_without_input_and_output_is_refused(two_stage) -> None:
     apart = stage.model_copy(update={"engagements": stage.engagements[:1]})
     with pytest.raises(SpecError, match="no meshes lead from the first port to the second"):
         shafts_of(apart)
+
+
+def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
+    """Two gears of one hand, one driven and one driving: each pushes with F_t tan β, tangential at the reference
+    circle, and the locating bearing carries the difference. At a moderate load the status bits are clear."""
+    found = at_rest(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
+    pushed = {}
+    for mesh, gear, index, torque in (("stage1", "wheel1", 1, TORQUE), ("stage2", "pinion2", 0, TORQUE * 61 / 25)):
+        shape = mesh_shape(two_stage.stage, next(m for m in two_stage.stage.engagements if m.name == mesh))
+        first = shape.gears[0]
+        pushed[gear] = torque / (first.m_t * first.z / 2) * math.tan(abs(first.beta))
+        assert abs(found[f"seat.{gear}.fz"]) == pytest.approx(pushed[gear], rel=5e-3), gear
+        assert shape.gears[index].beta < 0  # left-handed
+    assert found["seat.wheel1.fz"] * found["seat.pinion2.fz"] < 0
+    carried = found["bearing.intermediate_left.fz"]
+    assert carried == pytest.approx(found["seat.wheel1.fz"] + found["seat.pinion2.fz"], rel=1e-4)
+    assert abs(carried) < 0.6 * max(pushed.values())
+    assert found["solver.status"] == 0 == at_rest(two_stage)["solver.status"]
+
+
+def test_a_pair_written_as_a_general_stage_is_the_same_model(tmp_path: Path, bodies, plain) -> None:
+    """Same gears, same bodies, same blob: a pair file is the short form."""
+    tables = as_general_file(read_toml(find_stage("fzg_c")))
+    path = tmp_path / "stage.toml"
+    path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in tables.items()), encoding="utf-8")
+    spec = load_stage(path)
+    assert isinstance(spec, Stage)
+    assert load_bodies(spec, find_stage("fzg_c").parent)[0].how.hash == bodies[0].how.hash
+    assert assemble(spec, bodies).hash == plain.hash
+
+
+def as_general_file(pair: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a pair file as those of a general stage."""
+    rack = {key: pair["pair"][key] for key in ("normal_module", "pressure_angle")}
+    names = list(pair["gears"])
+    distance = pair["pair"]["center_distance"]
+    bearings = {name: gear.pop("bearing") for name, gear in pair["gears"].items()}
+    return {
+        "name": pair["name"],
+        "kind": "general",
+        "slices": pair["contact"]["slices"],
+        "bodies": {name: gear | rack for name, gear in pair["gears"].items()},
+        "rotors": {
+            name: {"axis": [x, "0 mm"], "bodies": {name: "0 mm"}}
+            for name, x in zip(names, ("0 mm", distance), strict=True)
+        },
+        "engagements": [
+            {"name": "mesh", "gears": names, "backlash": pair["pair"]["backlash"]}
+            | {"damping": pair["contact"]["damping"]}
+            | {key: pair[key] for key in ("torque_max", "speed_max")}
+        ],
+        "supports": [
+            {"name": name, "body": name, "radial": b["stiffness"], "damping_ratio": b["damping_ratio"]}
+            for name, b in bearings.items()
+        ],
+        "ports": {name: port | {"body": name} for name, port in pair["ports"].items()},
+        "levels": pair.get("levels", {}),
+    }
+
+
+def toml(value: Any) -> str:
+    """A value as inline TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f'"{key}" = {toml(item)}' for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return f'"{value}"' if isinstance(value, str) else str(value)
