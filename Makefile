@@ -6,7 +6,7 @@ PIP     = $(RUN) -m pip install --quiet
 BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20" "plotly>=6"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-PRICES  ?= phases steps fmu_overhead harness effects_cost levels
+PRICES  ?= phases steps effects_cost levels
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
 EVIDENCE = $(RUN) -m evidence.ledger
@@ -42,7 +42,7 @@ stability: $(STAMP)
 
 ## make study       what accuracy costs: tables and charts of docs/study.md in evidence/study (bodies alone: make study-bodies)
 study: $(STAMP)
-	$(EVIDENCE) make --again study study_sets study_cuts study_limits levels cost
+	$(EVIDENCE) make --again study study_sets levels cost
 
 ## make study-bodies  how far the shipped bodies are from refined ones (reduces six gears: up to an hour)
 study-bodies: $(STAMP)

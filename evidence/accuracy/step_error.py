@@ -8,8 +8,7 @@ window, in per cent: transmission error, mesh forces, forces of bearings and pin
 of all its samples. Samples of it at the instants of the steps alone fold what lies above 1/2h into the band (aliases):
 `aliases` is what these err by in the mesh forces, `sampled` the error of the run against them.
 
-Without arguments the rows of TABLE, written to step_error.csv beside this file. Instructions of a step:
-evidence/price/step_cost.py.
+Without arguments the rows of TABLE, written to step_error.csv beside this file.
 """
 
 from __future__ import annotations

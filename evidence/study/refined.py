@@ -53,7 +53,7 @@ class BodyRow:
 @dataclass(frozen=True)
 class Variant:
     """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls. Reduced
-    anew, the contact's dashpots take the constant with which they lose the same (`step_benches.dashpot`)."""
+    anew, the contact's dashpots take the constant with which they lose the same (dashpot.py)."""
 
     name: str
     gears: tuple[Any, ...] | None

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flat import FlatBody, FlatContact, flat_blob
 from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
 
 H, STEPS, SPEED = 5e-6, 600, 0.2

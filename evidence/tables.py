@@ -1,4 +1,4 @@
-"""Tables of this folder: rows of texts, and columns of numbers."""
+"""Tables of evidence as CSV files: rows of texts, and columns of numbers."""
 
 from __future__ import annotations
 
@@ -15,17 +15,27 @@ def read_rows(path: Path) -> list[dict[str, str]]:
     """The rows of a table, none when there is no file."""
     if not path.exists():
         return []
-    with path.open(encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
-def write_rows(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    """Rows with the same keys; numbers with four digits."""
+def write_rows(path: Path, rows: Sequence[Mapping[str, object]], digits: int = 4) -> None:
+    """Rows with the same keys; numbers with so many digits, nothing for None."""
     with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         for row in rows:
-            writer.writerow({key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()})
+            writer.writerow({name: shown(value, digits) for name, value in row.items()})
+
+
+def shown(value: object, digits: int = 4) -> object:
+    """A float with so many digits, all else as it is."""
+    return f"{value:.{digits}g}" if isinstance(value, float) else value
+
+
+def told(row: Mapping[str, object]) -> None:
+    """Print a row as soon as it is there."""
+    print("  ".join(f"{name} {shown(value)}" for name, value in row.items()), flush=True)
 
 
 def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> None:
