@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +38,22 @@ def shown(value: object, digits: int = 4) -> object:
 def told(row: Mapping[str, object]) -> None:
     """Print a row as soon as it is there."""
     print("  ".join(f"{name} {shown(value)}" for name, value in row.items()), flush=True)
+
+
+def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
+    """A table for the terminal: one row a line, numbers with three digits, columns aligned."""
+    if not rows:
+        return "(no rows)"
+    names = list(columns or asdict(rows[0]))
+    cells = [names] + [[_cell(getattr(row, name)) for name in names] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells)
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dashpot import own_path, same_loss
 from few_modes import with_modes
 
-from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stagefile.forms.expand import rewritten
