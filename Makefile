@@ -6,7 +6,7 @@ PIP     = $(RUN) -m pip install --quiet
 BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20" "plotly>=6"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-PRICES  ?= phases steps fmu_overhead harness effects_cost levels
+PRICES  ?= phases steps effects_cost levels
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
 EVIDENCE = $(RUN) -m evidence.ledger
@@ -40,13 +40,9 @@ bench: $(STAMP)
 stability: $(STAMP)
 	$(EVIDENCE) make --again stability
 
-## make study       what accuracy costs: tables and charts of docs/study.md in evidence/study (bodies alone: make study-bodies)
+## make study       what accuracy costs: tables and charts of docs/study.md in evidence/study
 study: $(STAMP)
-	$(EVIDENCE) make --again study study_sets study_cuts study_limits levels cost
-
-## make study-bodies  how far the shipped bodies are from refined ones (reduces six gears: up to an hour)
-study-bodies: $(STAMP)
-	$(EVIDENCE) make --again study_bodies
+	$(EVIDENCE) make --again study study_sets levels cost
 
 ## make evidence    stale tables, pictures and pages of README and study; TIER=2: of validation too; TARGETS="phases study"
 evidence: $(STAMP)
@@ -95,4 +91,4 @@ $(STAMP): $(VENV)/.base
 	$(PIP) --no-build-isolation -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench study study-bodies stability evidence evidence-check wheel models docs site lint
+.PHONY: help demo test test-full bench study stability evidence evidence-check wheel models docs site lint

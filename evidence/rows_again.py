@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import random
 from pathlib import Path
+
+from evidence.tables import read_rows
 
 COUNT = 3
 SAME = 1e-6  # relative difference of numbers that agree: tables hold four digits and more
@@ -12,13 +13,13 @@ SAME = 1e-6  # relative difference of numbers that agree: tables hold four digit
 
 def drawn(table: Path, seed: str) -> list[dict[str, str]]:
     """COUNT rows of a CSV file, or all where it has fewer, by the seed."""
-    rows = rows_of(table)
+    rows = read_rows(table)
     return random.Random(seed).sample(rows, min(COUNT, len(rows)))
 
 
 def agree(rows: list[dict[str, str]], made: Path, but: list[str]) -> list[str]:
     """What is wrong: rows that have no equal in the CSV file `made`, columns `but` left out."""
-    again = rows_of(made)
+    again = read_rows(made)
     return [f"not made again: {row}" for row in rows if not any(equal(row, other, but) for other in again)]
 
 
@@ -34,9 +35,3 @@ def same(text: str, other: str) -> bool:
     except ValueError:
         return text == other
     return text == other or abs(a - b) <= SAME * max(abs(a), abs(b))
-
-
-def rows_of(table: Path) -> list[dict[str, str]]:
-    """The rows of a CSV file."""
-    with table.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))

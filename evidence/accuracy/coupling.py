@@ -9,13 +9,12 @@ Errors: rms of the difference over the whole scene, over the rms of the AC part 
 average: ringing and tooth mesh alone) and over the standard deviation of the torque. predicted_over_true: Richardson's
 estimate from H and H/2 (`gearfmu run --verify`) over the true error. lock_shift_s: of the communication point at which
 the clutch is seen locked. All runs of a group have the same internal step h.
-Prints the table, writes evidence/accuracy/coupling.csv, docs/pictures/coupling.svg and the table of docs/coupling.md;
-with the argument `page` the last two from the committed table.
+Prints the table, writes evidence/accuracy/coupling.csv and docs/pictures/coupling.svg; with the argument `chart` only
+the latter, from the committed table.
 """
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,20 +23,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evidence.tables import read_rows, told, write_rows
 from gearfmu.cosim.accuracy import Window, alternating, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.errors import CouplingError
-from gearfmu.files import write_text, written_whole
+from gearfmu.files import written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.run.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE, PICTURE = Path(__file__).with_suffix(".csv"), ROOT / "docs" / "pictures" / "coupling.svg"
-PAGE, BEGIN, END = ROOT / "docs" / "coupling.md", "<!-- begin: evidence/accuracy/coupling.py -->\n", "<!-- end -->"
 STEPS = (25e-6, 50e-6, 100e-6, 200e-6, 250e-6, 500e-6, 1e-3)
 WHOLE = Window(0.0, steady=False)
 
@@ -160,7 +159,7 @@ def row(group: Group, line: Line, results: dict[float, Result], step: float, ref
         "outcome": result.outcome,
     }
     if result.outcome != OK:
-        return found
+        return found | dict.fromkeys(NUMBERS)
     true = distance(result.trace, reference, name, WHOLE)
     half = next((r for h, r in results.items() if abs(2 * h - step) < 1e-12 and r.outcome == OK), None)
     estimate = coupling_errors(result.trace, half.trace, result.order, WHOLE)[name].rms if half else None
@@ -174,17 +173,9 @@ def row(group: Group, line: Line, results: dict[float, Result], step: float, ref
     }
 
 
-COLUMNS = (
-    *("level", "h_s", "clutch", "master", "held", "unconnected", "H_s", "outcome"),
-    *("error_over_ac", "error_over_std", "error_Nm", "predicted_over_true", "lock_shift_s", "energy_residual"),
-)
-
-
-def shown(value: object) -> str:
-    """A number with four digits, text as it is."""
-    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
-
-
+NUMBERS = (
+    "error_over_ac", "error_over_std", "error_Nm", "predicted_over_true", "lock_shift_s", "energy_residual",
+)  # fmt: skip
 NAMED = {
     ("inside", "gs_mean", "", ""): "gs_mean",
     ("inside", "jacobi", "tau_next", ""): "jacobi, tau_next held",
@@ -193,7 +184,6 @@ NAMED = {
     ("outside", "gs_mean", "", ""): "gs_mean, cut at stiff shafts",
     ("outside", "jacobi", "tau", ""): "jacobi, cut at stiff shafts",
 }
-Table = list[dict[str, str]]
 
 
 def line_of(row: dict[str, str]) -> tuple[str, ...]:
@@ -201,7 +191,7 @@ def line_of(row: dict[str, str]) -> tuple[str, ...]:
     return tuple(row[key] for key in ("clutch", "master", "held", "unconnected"))
 
 
-def draw(table: Table) -> None:
+def draw(table: list[dict[str, str]]) -> None:
     """Error over H of the lines that have a name."""
     with styled():
         figure, (axes,) = panels((3.2,))
@@ -223,52 +213,16 @@ def draw(table: Table) -> None:
             figure.savefig(temporary, format="svg")
 
 
-def page(table: Table) -> str:
-    """The table of docs/coupling.md: errors at 100 µs and 1 ms, line by line."""
-    steps = ("0.0001", "0.001")
-    head = "| clutch | master | torque held | not connected | 100 µs: std | AC | 1 ms: std | AC |\n"
-    lines = [head, "|---|---|---|---|---|---|---|---|\n"]
-    fast = [row for row in table if row["level"] == "fast"]
-    for line in dict.fromkeys(map(line_of, fast)):
-        rows = {row["H_s"]: row for row in fast if line_of(row) == line}
-        errors = [percent(rows[step], key) for step in steps for key in ("error_over_std", "error_over_ac")]
-        lines.append("| " + " | ".join([*(f"`{part}`" if part else "" for part in line), *errors]) + " |\n")
-    return "".join(lines).replace("`inside`", "inside").replace("`outside`", "outside")
-
-
-def percent(row: dict[str, str], key: str) -> str:
-    """An error in %, two digits, or how the run ended."""
-    if row["outcome"] != OK:
-        return "stopped"
-    value = 100 * float(row[key])
-    return f"{value:.2g} %" if value < 10 else f"{value:.0f} %"
-
-
-def measured() -> Table:
-    """All lines, printed as they come, written at the end."""
-    table = []
-    for group, lines, steps in PLAN:
-        for line in rows(group, lines, steps):
-            table.append({column: shown(line.get(column)) for column in COLUMNS})
-            print("  ".join(table[-1].values()), flush=True)
-    with written_whole(FILE) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        writer.writerows(table)
-    return table
-
-
 def main() -> None:
-    """Measure (or read), print, write."""
-    if sys.argv[1:] == ["page"]:
-        with open(FILE, newline="", encoding="utf-8") as file:
-            table = list(csv.DictReader(file))
-    else:
-        table = measured()
-    draw(table)
-    text = PAGE.read_text(encoding="utf-8")
-    start, end = text.index(BEGIN) + len(BEGIN), text.index(END)
-    write_text(PAGE, text[:start] + page(table) + text[end:])
+    """Measure, print and write, or read; draw."""
+    if sys.argv[1:] != ["chart"]:
+        table = []
+        for group, lines, steps in PLAN:
+            for line in rows(group, lines, steps):
+                told(line)
+                table.append(line)
+        write_rows(FILE, table)
+    draw(read_rows(FILE))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from evidence.study.tidy import tidy
+from evidence.tables import tidy
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.kernel.build import fingerprint

@@ -8,14 +8,12 @@ window, in per cent: transmission error, mesh forces, forces of bearings and pin
 of all its samples. Samples of it at the instants of the steps alone fold what lies above 1/2h into the band (aliases):
 `aliases` is what these err by in the mesh forces, `sampled` the error of the run against them.
 
-Without arguments the rows of TABLE, written to step_error.csv beside this file. Instructions of a step:
-evidence/price/step_cost.py.
+Without arguments the rows of TABLE, written to step_error.csv beside this file.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from evidence.tables import told, write_rows
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.instance import Recording
@@ -129,8 +128,6 @@ def error(reference: np.ndarray, found: np.ndarray) -> float:
     return float(100 * np.linalg.norm(found - reference) / np.linalg.norm(reference))
 
 
-COLUMNS = ("scene", "level", "effect", "h_us", "te", "force", "support", "sampled", "aliases", "gamma", "unsolved")
-FILE = Path(__file__).with_suffix(".csv")
 TABLE = (  # scene, level, effects other than by default, steps in µs
     ("pair", "fast", (), (5.0, 10.0, 15.0)),
     ("relieved", "fast", (), (5.0, 10.0, 15.0)),
@@ -152,8 +149,8 @@ TABLE = (  # scene, level, effects other than by default, steps in µs
 )
 
 
-def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) -> Iterator[list[str]]:
-    """A row of COLUMNS a step (µs)."""
+def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) -> Iterator[dict[str, str]]:
+    """A row of the table for every step (µs)."""
     scene = SCENES[name]
     model = scene.model()
     parameters = {"level": LEVELS[level]} | {key: value for effect in effects for key, value in EFFECTS[effect].items()}
@@ -162,12 +159,19 @@ def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) 
         found, said, unsolved = run(model, scene, parameters, 1e-6 * h)
         every = round(1e-6 * h / REFERENCE)
         whole = {kind: rows[: (len(found[kind]) - 1) * every + 1] for kind, rows in reference.items()}
-        errors = [error(lines(whole[kind], every, 1e-6 * h), lines(found[kind], 1, 1e-6 * h)) for kind in found]
+        errors = {
+            kind: error(lines(whole[kind], every, 1e-6 * h), lines(rows, 1, 1e-6 * h)) for kind, rows in found.items()
+        }
         samples, force = lines(whole["force"][::every], 1, 1e-6 * h), lines(found["force"], 1, 1e-6 * h)
-        errors += [error(samples, force), error(lines(whole["force"], every, 1e-6 * h), samples)]
+        errors["sampled"] = error(samples, force)
+        errors["aliases"] = error(lines(whole["force"], every, 1e-6 * h), samples)
         lowered = re.search(r"gamma lowered to ([\d.]+\d)", said)
         gamma = lowered[1] if lowered else "1"
-        yield [name, level, "+".join(effects), f"{h:g}", *(f"{e:.3g}" for e in errors), gamma, f"{unsolved}"]
+        yield {"scene": name, "level": level, "effect": "+".join(effects), "h_us": f"{h:g}"} | {
+            **{kind: f"{e:.3g}" for kind, e in errors.items()},
+            "gamma": gamma,
+            "unsolved": f"{unsolved}",
+        }
 
 
 def main() -> None:
@@ -178,15 +182,13 @@ def main() -> None:
     parser.add_argument("--effects", nargs="+", default=[], choices=EFFECTS)
     chosen = parser.parse_args()
     own = [(name, level, chosen.effects, chosen.h) for name in chosen.scenes for level in chosen.levels]
-    found = [list(COLUMNS)]
-    print(",".join(COLUMNS))
+    found = []
     for name, level, effects, steps in own or TABLE:
         for row in rows(name, level, effects, steps):
-            print(",".join(row), flush=True)
+            told(row)
             found.append(row)
     if not own:
-        with FILE.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows(found)
+        write_rows(Path(__file__).with_suffix(".csv"), found)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ step, largest values over all starts. With --cases only the lines of those cases
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -24,15 +23,16 @@ import numpy as np
 
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_states, variant
+from evidence.tables import read_rows
 from gearfmu.body import load_bodies
 from gearfmu.errors import SimulationError
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stage.run.trace import write_columns
 from gearfmu.stagefile.stage import load_stage
 
 STEPS = (5e-6, 7.5e-6, 10e-6)
 SLICES = (1, 5, 10)
 RELIEVED, HELICAL = "fzg_c/stage_relief", "helical_demo"
-LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 DG4, EM = 0, 1
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped (10 000 steps that round states to
 # single precision: 1e-5 of a mode's energy), double with the load-dependent law
@@ -129,7 +129,7 @@ def random_start(base: Rattle, seed: int) -> Rattle:
 def row(pair: FreePair, name: str, case: Case, chosen: tuple[str, int, int, float], run: Mapping) -> dict[str, object]:
     """One line of the table. chosen: build, law, slices, step; run: libraries, starts, duration, level."""
     build, law, slices, h = chosen
-    parameters = {"level": LEVELS[run["level"]], "h": h, "slices": slices, "effect.hertz": law, **case.parameters}
+    parameters = {"level": LEVELS.index(run["level"]), "h": h, "slices": slices, "effect.hertz": law, **case.parameters}
     worst: dict[str, float] = {"drift": 0.0, "growth": -np.inf, "changes": 0, "retried_steps": 0}
     for seed in range(run["starts"]):
         kernel = started(pair, random_start(case.start, seed), parameters, run["libraries"][build])
@@ -171,13 +171,12 @@ def keeps(case: Case, line: Mapping) -> bool:
     )
 
 
-def kept(file: Path, anew: list[str]) -> list[dict[str, object]]:
+def kept(file: Path, anew: list[str]) -> list[Mapping[str, object]]:
     """Lines of the table in `file` that belong to no case in `anew`."""
-    with open(file, newline="", encoding="utf-8") as lines:
-        return [line for line in csv.DictReader(lines) if line["case"] not in anew]
+    return [line for line in read_rows(file) if line["case"] not in anew]
 
 
-def write(file: Path, lines: list[dict[str, object]]) -> None:
+def write(file: Path, lines: list[Mapping[str, object]]) -> None:
     """The table in the order of the cases."""
     order = [*CASES, *CONTROLS]
     lines = sorted(lines, key=lambda line: order.index(str(line["case"])))

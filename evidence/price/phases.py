@@ -3,15 +3,13 @@ N·m, 2000 rpm, 5 slices); at level fast on a train, a planetary set, a helical 
 
     python -m evidence.price.phases [SCENE …]
 
-Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Beside the
-cycles of the pair the arithmetic that the phase cannot do without and the bytes that it reads and writes, counted from
-the sizes of the model (`work`). `pass`: what engagements of an island do to each other. Prints a table and writes
-evidence/price/phases.csv; with SCENE only the rows of these are made again.
+Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. `pass`: what
+engagements of an island do to each other. Prints a table and writes evidence/price/phases.csv; with SCENE only the rows
+of these are made again.
 """
 
 from __future__ import annotations
 
-import csv
 import math
 import statistics
 import sys
@@ -22,16 +20,15 @@ from itertools import pairwise
 from pathlib import Path
 
 from evidence.price.counted import SET_START, SET_TORQUES
+from evidence.tables import read_rows, told, write_rows
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
 from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stage.assembly.blob import read_blob
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stagefile.stage import load_stage
 
 STEP, BLOCK, BLOCKS = 1e-4, 10, 50
-PAIRS = 2  # tooth pairs within reach, nearly always
-LEVELS = ("rigid", "fast", "standard", "full")
 TABLE = Path(__file__).with_suffix(".csv")
 
 
@@ -67,39 +64,6 @@ def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
     return {phase: statistics.median(block[phase] for block in found) for phase in found[0]}
 
 
-def lanes(model: StageModel, cut: float) -> int:
-    """Lanes of modal state of both gear groups: a pair is one lane of each half, halves are padded to LANES / 2."""
-    total, sections = 0, read_blob(model.blob)
-    for gear in (0, 1):
-        part = sections[f"member{gear}"][sections[f"omega{gear}"] < 2 * math.pi * cut]
-        total += 2 * math.ceil(int((part != 2).sum()) / 8) * 8
-    return total
-
-
-def work(n: int, pairs: int, strips: int) -> dict[str, tuple[float, float]]:
-    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision on both
-    gears, `pairs` tooth pairs of `strips` contact rows, a row for each port. The ground group is left out.
-
-    predict: eight coefficients, three states. rows: two nodes of both tables. system: what the rows read, D and A by
-    block rows from two tables of either gear, two motions of either gear and the spins into both. solve: tangent, its
-    factors, two solutions and four products. correct: scatter of two forces, new state, damping."""
-    rows = pairs * strips
-    m, cells = rows + 2, rows * (rows + 4) / 2
-    return {
-        "predict": (12 * n, 4 * n * (8 + 3 + 2)),
-        "rows": (3 * rows * n, 4 * n * 3 * rows),
-        "system": (
-            2 * rows * n + cells * (2 * 2 * 6 + 4 * 2 * 4 + 2 * 2 * 2),
-            4 * n * rows + cells * (4 * 2 * 2 * 3 + 8 * 2),
-        ),
-        "solve": (
-            2 * m * m * (1 + 3 * strips) + 2 / 3 * m**3 + 2 * 2 * m * m + 4 * 2 * m * m,
-            8 * m * m * (3 + 2 + 2 + 4),
-        ),
-        "correct": (4 * rows * n + 16 * n, 4 * n * (rows + 12)),
-    }
-
-
 def run(kernel: Kernel, scene: Scene, model: StageModel) -> dict[str, float]:
     """Cycles a step of each phase."""
     inputs = None if scene.torques else Steady(model, scene.speed, scene.torque, parameters=scene.parameters)
@@ -123,11 +87,7 @@ def profile(name: str, library: Path) -> list[dict[str, object]]:
     model, rows = assemble(spec, load_bodies(spec)), []
     for level in scene.levels:
         kernel = Kernel(model.blob, {"level": LEVELS.index(level), **scene.parameters}, library)
-        cycles, counted = run(kernel, scene, model), {}
-        if name == "pair":
-            cut = {"rigid": 0.0, "fast": spec.levels.fast_cut, "standard": spec.levels.standard_cut}
-            strips = (spec.written.contact.slices + 1) // 2
-            counted = work(lanes(model, cut.get(level, math.inf)), PAIRS, strips)
+        cycles = run(kernel, scene, model)
         rows += [
             {
                 "scene": name,
@@ -138,8 +98,6 @@ def profile(name: str, library: Path) -> list[dict[str, object]]:
                 "n_dyn": int(kernel.get("solver.n_dyn")),
                 "h_s": kernel.get("solver.h"),
                 "iterations": round(kernel.get("solver.iterations") / kernel.get("solver.steps"), 3),
-                "flops": round(counted.get(phase, (0, 0))[0]),
-                "bytes": round(counted.get(phase, (0, 0))[1]),
             }
             for phase, value in cycles.items()
         ]
@@ -148,24 +106,16 @@ def profile(name: str, library: Path) -> list[dict[str, object]]:
 
 def main(scenes: list[str]) -> None:
     """Measure, print, write the table."""
-    table: list[dict[str, object]] = []
-    with TABLE.open(newline="", encoding="utf-8") as file:
-        known = list(csv.DictReader(file))
+    known = read_rows(TABLE)
     with tempfile.TemporaryDirectory() as folder:
         library = build_library(out=Path(folder) / "profiled.so", compiler=("cc", "-DGK_PROFILE"))
+        table: list[Mapping[str, object]] = []
         for name in SCENES:
             found = profile(name, library) if name in (scenes or SCENES) else []
             table += found or [row for row in known if row["scene"] == name]
             for row in found:
-                print(
-                    f"{row['scene']:18s} {row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:8d} cycles a step"
-                    f"  {row['share']:6.1%}  {row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, "
-                    f"{row['n_dyn']} modes"
-                )
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, table[0], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
+                told(row)
+    write_rows(TABLE, table, digits=6)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,10 @@ Prints a table and writes evidence/price/sizes.csv; tests/fmu/test_fmu_sizes.py 
 
 from __future__ import annotations
 
-import csv
 import json
 import multiprocessing
 import os
 import resource
-import sys
 import tempfile
 import time
 import zipfile
@@ -25,10 +23,9 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 import gearfmu
+from evidence.tables import told, write_rows
 from gearfmu.fmu import export
 
-ROOT = Path(__file__).resolve().parents[2]
-TABLE = Path(__file__).with_suffix(".csv")
 STAGES = ("fzg_c", "helical_demo", "two_stage", "planetary54", "helical_set")
 STEP = 1e-4  # s
 PAGE = resource.getpagesize()
@@ -95,19 +92,16 @@ def measure(stage: str, work: Path) -> dict[str, object]:
     return {"stage": stage} | {name: round(value, 3) for name, value in row.items()}
 
 
-def main() -> int:
+def main() -> None:
+    """Measure, print, write the table."""
     os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # waiting threads are no work
     rows = []
     with tempfile.TemporaryDirectory() as work:
         for stage in STAGES:
             rows.append(measure(stage, Path(work)))
-            print("  ".join(f"{name} {value}" for name, value in rows[-1].items()), flush=True)
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    return 0
+            told(rows[-1])
+    write_rows(Path(__file__).with_suffix(".csv"), rows, digits=6)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -10,7 +10,6 @@ the set, nearly all of it the model's preparation under valgrind.
 
 from __future__ import annotations
 
-import csv
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -18,14 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evidence.price.counted import SET, SET_START, SET_TORQUES, Period, count, make_host, words
+from evidence.tables import read_rows, told, write_rows
 from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
 from gearfmu.stage import Steady, assemble
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stagefile.stage import load_stage
 
 TABLE = Path(__file__).with_suffix(".csv")
-COLUMNS = ("stage", "level", "h_s", "instructions_per_step")
-LEVELS = {"rigid": 0.0, "fast": 1.0, "standard": 2.0, "full": 3.0}
 DEFAULT, SLICES = 20e-6 / 3, 5.0  # s
 
 
@@ -57,7 +56,7 @@ BENCHES = (
 )
 
 
-def rows_of(bench: Bench, folder: Path) -> Iterator[list[str]]:
+def rows_of(bench: Bench, folder: Path) -> Iterator[dict[str, str]]:
     """The rows of a stage."""
     spec = load_stage(bench.stage)
     model = assemble(spec, load_bodies(spec))
@@ -67,22 +66,20 @@ def rows_of(bench: Bench, folder: Path) -> Iterator[list[str]]:
     load, start = (SET_TORQUES, SET_START) if of_set else (Steady(model, 209.44, 302.0), {})
     for level, steps in bench.cases.items():
         for h in steps:
-            given = {"level": LEVELS[level], "h": h, "slices": SLICES} | start
+            given = {"level": float(LEVELS.index(level)), "h": h, "slices": SLICES} | start
             found = count(host, library_path(), blob, bench.period, words(model, given, load)).instructions
-            yield [bench.stage, level, f"{h:g}", f"{found:.0f}"]
+            yield {"stage": bench.stage, "level": level, "h_s": f"{h:g}", "instructions_per_step": f"{found:.0f}"}
 
 
 def main(stages: list[str]) -> None:
     """Measure, print, write the table."""
-    with TABLE.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in list(csv.reader(file))[1:] if stages and row[0] not in stages]
+    rows = [row for row in read_rows(TABLE) if stages and row["stage"] not in stages]
     with tempfile.TemporaryDirectory() as folder:
         for bench in BENCHES:
             for row in rows_of(bench, Path(folder)) if bench.stage in (stages or [bench.stage]) else ():
                 rows.append(row)
-                print(",".join(row), flush=True)
-    with TABLE.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+                told(row)
+    write_rows(TABLE, rows)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,8 @@ import numpy as np
 
 from evidence.stability.case import COMPLETED, Finding
 from evidence.stability.record import Record
+from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
 
 ENERGY = 1e-4  # of the energy through the ports and the largest stored one: the balance of a loaded damped run
 SOFTEST = 1.2e8  # N/m: one tooth pair in the corner of its path; 12.5 N/(mm µm) × 14 mm = 1.75e8 at the pitch point
@@ -61,6 +63,23 @@ def deep(record: Record, depth: np.ndarray, pressed: np.ndarray, flanks: str = "
         return []
     limit = f"its force presses {1e6 * pressed[worst]:.1f} µm at most"
     return [f"{flanks} overlap by {1e6 * depth[worst]:.1f} µm at {record.time[worst]:.6g} s, where {limit}"]
+
+
+def beyond_touch(te: np.ndarray, play: float) -> np.ndarray:
+    """(n,) m: by how much gear A has turned beyond the touch of drive or coast flanks. play: of `play_of`."""
+    return np.maximum(te, -te - play)
+
+
+def play_of(stage: Stage, mesh: str) -> float:
+    """Backlash of an engagement along its line of action, m."""
+    engagement = next(one for one in stage.engagements if one.name == mesh)
+    return float(engagement.backlash * np.cos(mesh_shape(stage, engagement).alpha_wt))
+
+
+def locking(record: Record, port: str) -> tuple[np.ndarray, dict[str, float]]:
+    """Whether a port's clutch is locked (n,), and from when on, s; NaN where it never is."""
+    locked = record[f"{port}.clutch.locked"] > 0.5
+    return locked, {"locked_at_s": float(record.time[np.argmax(locked)]) if locked.any() else float("nan")}
 
 
 def lost(record: Record) -> dict[str, float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from evidence.stability.bench import run_shipped
 from evidence.stability.case import Case, Finding
-from evidence.stability.checks import Expected, at_least, lost, statistics
+from evidence.stability.checks import Expected, at_least, locking, lost, statistics
 from evidence.stability.motion import RPM, Constant, Step
 from evidence.stability.pair import Pair
 from evidence.stability.train import Train
@@ -68,8 +68,7 @@ def clutch_dump(bench: Pair, case: Case) -> Finding:
     """The shipped scene through the coupling: full capacity in 2 ms, the teeth hammer through the backlash.
     Contact-loss share and share of contact on the coast flanks repeat; the clutch is locked at the end."""
     made, _ = run_shipped(bench, "clutch_dump", case)
-    locked = made["pinion.clutch.locked"] > 0.5
-    facts = {"locked_at_s": float(made.time[np.argmax(locked)]) if locked.any() else float("nan")}
+    locked, facts = locking(made, "pinion")
     facts["coast_share"] = float(np.mean(made["mesh.contact"] < 0))
     said = at_least("share of contact on the coast flanks", facts["coast_share"], 0.01)
     said += at_least("impacts", made["mesh.impacts"][-1], 10)
@@ -81,10 +80,9 @@ def closing_clutch(bench: Train, case: Case, duration: float) -> Finding:
     """The beginning of the shipped scene `clutch_closure_train` through the coupling: slip 52 rad/s, capacity 0 to
     250 N·m in 50 ms. The clutch locks within the capacity's rise, and the teeth hammer through the backlash."""
     made, _ = run_shipped(bench, "clutch_closure_train", case, duration=duration)
-    locked = made["input.clutch.locked"] > 0.5
+    locked, facts = locking(made, "input")
     said = at_least("samples with the clutch locked", float(locked.sum()), 1)
     said += at_least("impacts in stage1", made["stage1.impacts"][-1], 1)
-    facts = {"locked_at_s": float(made.time[np.argmax(locked)]) if locked.any() else float("nan")}
     return bench.finding(made, said, facts)
 
 

@@ -5,18 +5,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from evidence.stability.bench import run_shipped
 from evidence.stability.case import COMPLETED, Case, Finding
-from evidence.stability.checks import CLEARANCE, Expected, at_least, at_most, near, statistics
+from evidence.stability.checks import (
+    CLEARANCE,
+    Expected,
+    at_least,
+    at_most,
+    beyond_touch,
+    locking,
+    near,
+    play_of,
+    statistics,
+)
 from evidence.stability.motion import Constant, Step, UpAndDown
 from evidence.stability.of_pairs import turns_of
-from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SPEED, PlanetSet, shares, sun_torque
+from evidence.stability.planetary import ALL_MESHES, MESHES, RATIO, SET, SPEED, PlanetSet, shares, sun_torque
 from evidence.stability.record import Record, Watched
-from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import ChainSpec, PortSpec
 
@@ -135,8 +143,7 @@ def clutch_dump(bench: PlanetSet, case: Case, capacity: float) -> Finding:
         }
 
     made = bench.run(case, inputs, 0.03, {"carrier.disc.w_start": SPEED})
-    locked = made["carrier.clutch.locked"] > 0.5
-    facts = {"locked_at_s": float(made.time[np.argmax(locked)]) if locked.any() else float("nan")}
+    locked, facts = locking(made, "carrier")
     said = at_least("clutch locked at the end", float(locked[-1]), 1.0)
     for sun, ring in zip(MESHES["sun"], MESHES["ring"], strict=True):  # one of them may touch from the start
         said += at_least(f"impacts in {sun} and {ring}", made[f"{sun}.impacts"][-1] + made[f"{ring}.impacts"][-1], 1.0)
@@ -181,9 +188,7 @@ def each_effect_off(bench: PlanetSet, case: Case, duration: float) -> Finding:
 
 
 def _without(bench: PlanetSet, case: Case, name: str, duration: float) -> Finding:
-    level = (
-        "paper" if name == "residual" else case.level
-    )  # the level at which it may be left out: all modes are dynamic
+    level = "paper" if name == "residual" else case.level  # all modes are dynamic there, so that it may be left out
     speed = 0.0 if name == "roll_motion" else SPEED  # without it a turning mesh jams along the slope of its relief
     off = {f"effect.{name}": 0.0}
     made = bench.loaded(replace(case, level=level), Constant(speed), bench.nominal, duration, parameters=off)
@@ -196,10 +201,7 @@ def _without(bench: PlanetSet, case: Case, name: str, duration: float) -> Findin
 class Shipped(PlanetSet):
     """The set of the scene `planetary_backfire`, of which no places of gears are recorded."""
 
-    SOFTNESS = {
-        "sun": 11.4e-9,
-        "ring": 17.4e-9,
-    }  # m/N: beyond the touch, at rest under 1774 N a mesh
+    SOFTNESS = {"sun": 11.4e-9, "ring": 17.4e-9}  # m/N: beyond the touch, at rest under 1774 N a mesh
 
     @property
     def watched(self) -> Watched:  # type: ignore[override]
@@ -208,20 +210,13 @@ class Shipped(PlanetSet):
 
     def depths(self, record: Record, backlash: float | None) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         """Transmission errors beyond the touch of drive or coast flanks, which hold what pins, bolts and bores give."""
+        stage = load_stage(SET)
         for central, meshes in MESHES.items():
             largest = max(record[f"{mesh}.force_max"].max() for mesh in meshes)
             for mesh in meshes:
-                te = record[f"{mesh}.te"]
+                depth = beyond_touch(record[f"{mesh}.te"], play_of(stage, mesh))
                 pressed = CLEARANCE + 1.5 * self.SOFTNESS[central] * largest
-                yield f"flanks of {mesh}", np.maximum(te, -te - _play(mesh)), np.full(te.size, pressed)
-
-
-@lru_cache(maxsize=8)
-def _play(mesh: str) -> float:
-    """Backlash of an engagement of the shipped set along its line of action, m."""
-    stage = load_stage("planetary54")
-    engagement = next(m for m in stage.engagements if m.name == mesh)
-    return float(engagement.backlash * np.cos(mesh_shape(stage, engagement).alpha_wt))
+                yield f"flanks of {mesh}", depth, np.full(depth.size, pressed)
 
 
 def backfire(bench: Shipped, case: Case) -> Finding:

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from evidence.stability.bench import Bench, at
+from evidence.stability.checks import beyond_touch, play_of
 from evidence.stability.motion import Step, Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import load_bodies
@@ -63,7 +64,7 @@ class Train(Bench):
         bearings give too; no deeper than the largest load of the run presses them at rest."""
         for mesh, (port, gear) in PORT_OF.items():
             rest, yields, play, radii = _at_rest(mesh)
-            depth = _depth(record[f"{mesh}.te"], play)
+            depth = beyond_touch(record[f"{mesh}.te"], play)
             load = record[f"{mesh}.force_max"].max(), np.abs(record[f"{port}.tau_mean"]).max() / radii[gear]
             yield f"flanks of {mesh}", depth, np.full(depth.size, rest + MARGIN * yields * max(load))
 
@@ -87,13 +88,6 @@ def _at_rest(mesh: str) -> tuple[float, float, float, tuple[float, float]]:
     the line of action and base radii (m)."""
     stage = _train().stage
     found = loaded_te(_train(), [0.0, LIGHT, LARGEST], 8, mesh=mesh)
-    engagement = next(m for m in stage.engagements if m.name == mesh)
-    shape = mesh_shape(stage, engagement)
-    backlash = float(engagement.backlash * np.cos(shape.alpha_wt))
-    deepest, yields = float(_depth(found.te[0], backlash).max()), float(1.0 / found.stage_stiffness.min())
-    return deepest, yields, backlash, (shape.gears[0].r_b, shape.gears[1].r_b)
-
-
-def _depth(te: np.ndarray, backlash: float) -> np.ndarray:
-    """(n,) m: by how much gear A has turned beyond the touch of drive or coast flanks."""
-    return np.maximum(te, -te - backlash)
+    shape = mesh_shape(stage, next(m for m in stage.engagements if m.name == mesh))
+    play, yields = play_of(stage, mesh), float(1.0 / found.stage_stiffness.min())
+    return float(beyond_touch(found.te[0], play).max()), yields, play, (shape.gears[0].r_b, shape.gears[1].r_b)

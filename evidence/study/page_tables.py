@@ -1,11 +1,12 @@
-"""Tables of docs/study.md from study.csv, sets.csv and the counted instructions, default step first."""
+"""Tables of docs/study.md from study.csv, sets.csv and the counted instructions, default step first; that of
+docs/coupling.md."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-from evidence.rows_again import rows_of
+from evidence.tables import read_rows
 
 LEVELS = ("fast", "standard", "full", "rigid", "paper")
 DEFAULT, SET_DEFAULT = 20e-6 / 3, 10e-6  # s: of a pair and of a set, in communication steps of 20 µs
@@ -23,7 +24,7 @@ Row = dict[str, str]
 
 def pairs(folder: Path) -> str:
     """The loaded pair: levels and steps of PAIR_STEPS, then explicit integrators at the mean of their own steps."""
-    rows = [r for r in rows_of(folder / "study" / "study.csv") if r["scene"] == "pair_loaded" and r["slices"] == "5"]
+    rows = [r for r in read_rows(folder / "study" / "study.csv") if r["scene"] == "pair_loaded" and r["slices"] == "5"]
     counted = instructions(folder, "fzg_c/stage_relief")
     own = [row for level in LEVELS for row in at(rows, level, PAIR_STEPS.get(level, ()), "dg4")]
     own += [row for row in rows if row["integrator"] == "rk45"]
@@ -33,7 +34,7 @@ def pairs(folder: Path) -> str:
 def sets(folder: Path) -> str:
     """The planetary set of four planets at 85 rad/s."""
     wanted = {"planets": "4", "speed": "85", "slices": "5", "off": "", "against": "full, 0.4 µs"}
-    rows = [row for row in rows_of(folder / "study" / "sets.csv") if wanted.items() <= row.items()]
+    rows = [row for row in read_rows(folder / "study" / "sets.csv") if wanted.items() <= row.items()]
     own = [row for level in LEVELS for row in at(rows, level, SET_STEPS.get(level, ()))]
     counted = instructions(folder, "planetary54")
     return table(own, SET_DEFAULT, counted, ("force_error", "pin_error"), HEAD.format("mesh forces", "pins"))
@@ -41,7 +42,7 @@ def sets(folder: Path) -> str:
 
 def instructions(folder: Path, stage: str) -> dict[tuple[str, int], float]:
     """(Level, step in ns) → instructions a step."""
-    rows = [row for row in rows_of(folder / "price" / "steps.csv") if row["stage"] == stage]
+    rows = [row for row in read_rows(folder / "price" / "steps.csv") if row["stage"] == stage]
     return {(row["level"], nanoseconds(row["h_s"])): float(row["instructions_per_step"]) for row in rows}
 
 
@@ -79,4 +80,27 @@ def number(value: float) -> str:
     return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
 
 
-TABLES: dict[str, Callable[[Path], str]] = {"pairs": pairs, "sets": sets}
+def couplings(folder: Path) -> str:
+    """Errors at 100 µs and 1 ms, a line for every master and what is connected."""
+    lines = [
+        "| clutch | master | torque held | not connected | 100 µs: std | AC | 1 ms: std | AC |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    found: dict[tuple[str, ...], dict[str, Row]] = {}
+    for row in read_rows(folder / "accuracy" / "coupling.csv"):
+        if row["level"] == "fast":
+            line = tuple(row[key] for key in ("clutch", "master", "held", "unconnected"))
+            found.setdefault(line, {})[row["H_s"]] = row
+    for (clutch, *line), by_step in found.items():
+        cells = [clutch, *(f"`{part}`" if part else "" for part in line)]
+        cells += [percent(by_step[h], f"error_over_{of}") for h in ("0.0001", "0.001") for of in ("std", "ac")]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def percent(row: Row, key: str) -> str:
+    """An error in %, or how the run ended."""
+    return f"{number(100 * float(row[key]))} %" if row["outcome"] == "ok" else "stopped"
+
+
+TABLES: dict[str, Callable[[Path], str]] = {"pairs": pairs, "sets": sets, "coupling": couplings}

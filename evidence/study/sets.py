@@ -1,5 +1,7 @@
 """The price list of a planetary set: error and processor time over level, step, slices, number of planets and effects.
 
+    python -m evidence.study.sets SCENE … [--out evidence/study] [--quick]
+
 What is judged and how it is timed is as in the study of a pair (norm.py, bench.py), on the first milliseconds of the
 scene: a set's step costs some 200 µs. Levels and steps are measured against level full with a step that is halved once
 more to see what it still moves; numbers of planets each against their own; slices and effects against the same run with
@@ -8,6 +10,7 @@ five slices and all effects, so that their error is what they change and not tha
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -16,11 +19,15 @@ from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
+from evidence.tables import tidy
 from gearfmu.body import load_bodies, reduce_body
+from gearfmu.commands.models import bodies_for_motion
+from gearfmu.commands.shared import progress_bar
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
-from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.report.study import write_chart
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stagefile.forms.expand import rewritten
@@ -262,3 +269,23 @@ def _is_at(row: SetRow, case: _Case, point: Point) -> bool:
 
 def _percent(e: Errors) -> str:
     return f"te {100 * e.te:.2g} %, mesh forces {100 * e.force:.2g} %, pins {100 * e.bearing:.2g} %"
+
+
+def main(given: Sequence[str] | None = None) -> None:
+    """Price lists of the scenes' sets, and their charts."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent)
+    parser.add_argument("--quick", action="store_true", help="few points on a short window")
+    chosen = parser.parse_args(given)
+    for spec in map(load_scene, chosen.scenes):
+        bodies_for_motion(spec.stage.name)
+        with progress_bar(spec.name) as progress:
+            found = set_study(spec, chosen.out, chosen.quick, progress)
+        print(tidy(found.rows), *(f"- {note}" for note in found.notes), sep="\n")
+        levels = ladder(found.rows, load_stage(spec.stage.name).written.set.planets)
+        write_chart(levels, spec.stage.slices, chosen.out / spec.name, f"{spec.name}: {spec.description}")
+
+
+if __name__ == "__main__":
+    main()

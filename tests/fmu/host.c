@@ -1,14 +1,13 @@
 /* A small importer in C: loads the binary of an FMU and drives it. Compiled natively and, for Windows, with the cross
  * compiler. host LIBRARY RESOURCES GUID run STEPS H REFERENCE,… [REFERENCE=BASE+SLOPE …]   hex of the outputs after
  * every step; inputs follow BASE + k·SLOPE host LIBRARY RESOURCES GUID fuzz SEED CALLS REFERENCES random calls, wrong
- * ones too; exit code 1 when an answer is wrong host LIBRARY RESOURCES GUID bench STEPS REFERENCE REFERENCE ns per step
- * through the FMI face, through gk_ (set, step, get), and the difference */
+ * ones too; exit code 1 when an answer is wrong */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L
 #endif
 #include "fmi2FunctionTypes.h"
-#include "gk.h"
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,24 +19,10 @@ static void *symbol(void *library, const char *name)
     return (void *)(uintptr_t)GetProcAddress((HMODULE)library, name);
 }
 static void *load(const char *path) { return (void *)LoadLibraryA(path); }
-static double now(void)
-{
-    LARGE_INTEGER count, frequency;
-    QueryPerformanceCounter(&count);
-    QueryPerformanceFrequency(&frequency);
-    return (double)count.QuadPart / (double)frequency.QuadPart;
-}
 #else
 #include <dlfcn.h>
-#include <time.h>
 static void *symbol(void *library, const char *name) { return dlsym(library, name); }
 static void *load(const char *path) { return dlopen(path, RTLD_NOW | RTLD_LOCAL); }
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 #endif
 
 #define FUNCTIONS(X)                                                                                                   \
@@ -327,103 +312,6 @@ static int run_fuzz(const char *guid, const char *resources, char **arguments)
     return 0;
 }
 
-/* ---- bench ---- */
-typedef struct direct {
-    gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double);
-    gk_outcome (*get)(const gk_model *, const gk_data *, uint32_t, double *);
-    gk_outcome (*step)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double, double);
-    gk_model *model;
-    gk_setup *setup;
-    gk_work *work;
-    gk_data *data;
-} direct;
-
-static void *block(size_t size)
-{
-    void *memory = malloc(size + 64);
-    return memset((void *)(((uintptr_t)memory + 63) / 64 * 64), 0, size);
-}
-
-static char *read_file(const char *resources, long *size)
-{
-    char path[4096];
-    snprintf(path, sizeof path, "%s/model.gkb", resources + (strncmp(resources, "file://", 7) ? 0 : 7));
-    FILE *file = fopen(path, "rb");
-    need(file != NULL, "open model.gkb");
-    fseek(file, 0, SEEK_END);
-    *size = ftell(file);
-    rewind(file);
-    char *bytes = block((size_t)*size);
-    need(fread(bytes, 1, (size_t)*size, file) == (size_t)*size, "read model.gkb");
-    fclose(file);
-    return bytes;
-}
-
-static void open_direct(direct *d, void *library, const char *resources)
-{
-    char message[GK_MESSAGE];
-    long size;
-    char *bytes = read_file(resources, &size);
-    size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *),
-        (*work_size)(const gk_model *);
-    gk_outcome (*open)(gk_model *, const void *, size_t, char *), (*defaults)(const gk_model *, gk_data *);
-    gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, gk_work *, char *),
-        (*initialize)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double);
-    *(void **)&model_size = lookup(library, "gk_model_size"), *(void **)&setup_size = lookup(library, "gk_setup_size");
-    *(void **)&data_size = lookup(library, "gk_data_size"), *(void **)&open = lookup(library, "gk_model_open");
-    *(void **)&defaults = lookup(library, "gk_defaults"), *(void **)&prepare = lookup(library, "gk_prepare");
-    *(void **)&initialize = lookup(library, "gk_initialize"), *(void **)&d->set = lookup(library, "gk_set");
-    *(void **)&d->get = lookup(library, "gk_get"), *(void **)&d->step = lookup(library, "gk_step");
-    *(void **)&work_size = lookup(library, "gk_work_size");
-    d->model = block(model_size());
-    need(open(d->model, bytes, (size_t)size, message) == GK_OK, "gk_model_open");
-    d->setup = block(setup_size(d->model)), d->data = block(data_size(d->model)), d->work = block(work_size(d->model));
-    need(defaults(d->model, d->data) == GK_OK, "gk_defaults");
-    need(prepare(d->model, d->data, d->setup, d->work, message) == GK_OK, "gk_prepare");
-    need(initialize(d->model, d->setup, d->work, d->data, 0) == GK_OK, "gk_initialize");
-}
-
-static int by_size(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
-}
-
-/* The same step on both roads in turn, each timed alone: the clock's own time cancels in the median of the paired
- * differences. */
-static int bench(void *library, const char *resources, fmi2Component c, char **arguments)
-{
-    static inputs none;
-    static direct d;
-    fmi2ValueReference in = (fmi2ValueReference)strtoul(arguments[1], NULL, 10),
-                       out = (fmi2ValueReference)strtoul(arguments[2], NULL, 10);
-    long steps = strtol(arguments[0], NULL, 10);
-    double *samples = malloc(3 * (size_t)steps * sizeof *samples), *fmi = samples, *gk = fmi + steps,
-           *extra = gk + steps;
-    double H = 5e-6, input = 0, first = 0, second = 0;
-    start(c, &none);
-    open_direct(&d, library, resources);
-    for (long k = 0; k < steps; k++) {
-        double t0 = now();
-        SetReal(c, &in, 1, &input);
-        fmi2Status status = DoStep(c, (double)k * H, H, fmi2True);
-        GetReal(c, &out, 1, &first);
-        double t1 = now();
-        d.set(d.model, d.data, in, input);
-        gk_outcome outcome = d.step(d.model, d.setup, d.work, d.data, (double)k * H, H);
-        d.get(d.model, d.data, out, &second);
-        double t2 = now();
-        need(status == fmi2OK && outcome == GK_OK && memcmp(&first, &second, sizeof first) == 0,
-             "both roads give the same bits");
-        fmi[k] = t1 - t0, gk[k] = t2 - t1, extra[k] = fmi[k] - gk[k];
-    }
-    qsort(fmi, (size_t)steps, sizeof *fmi, by_size), qsort(gk, (size_t)steps, sizeof *gk, by_size),
-        qsort(extra, (size_t)steps, sizeof *extra, by_size);
-    printf("%.1f %.1f %.1f\n", fmi[steps / 2] * 1e9, gk[steps / 2] * 1e9, extra[steps / 2] * 1e9);
-    free(samples);
-    FreeInstance(c);
-    return 0;
-}
-
 int main(int count, char **arguments)
 {
     if (count < 7) return 2;
@@ -435,6 +323,5 @@ int main(int count, char **arguments)
     if (!loud) return run_fuzz(guid, resources, arguments + 5);
     fmi2Component c = Instantiate("host", fmi2CoSimulation, guid, resources, &environment, 0, 0);
     need(c != NULL, "fmi2Instantiate");
-    return strcmp(arguments[4], "bench") ? run(c, count - 5, arguments + 5)
-                                         : bench(library, resources, c, arguments + 5);
+    return run(c, count - 5, arguments + 5);
 }

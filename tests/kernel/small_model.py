@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 from exact_bars import Bar
+from flat import FlatBody, FlatContact, flat_blob
 from handmade import mass_matrix, toothed
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.stage.assembly.assemble import (
     MODEL_VERSION,

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from driven import stepped
+from flat import FlatBody, FlatContact, flat_blob
 from scipy.integrate import solve_ivp
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
 
 MASSES, SPEED, LOCAL = (0.8, 1.7), 0.2, 2.8e-12  # kg, m/s, 1/Pa

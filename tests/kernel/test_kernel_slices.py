@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from by_hand import slice_weights
 from driven import begun, stepped
+from flat import FlatBody, FlatContact, flat_blob
 from reference_dg4 import Problem, Reference, Scheme
 from small_model import pair_blob
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
 
 H, STEPS, SPEED = 5e-6, 600, 0.2

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 from driven import stepped
+from flat import FlatBody, FlatContact, flat_blob
 from small_model import pair_blob, with_nodes
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly.blob import read_blob, write_blob

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 from driven import stepped
+from flat import FlatBody, FlatContact, flat_blob
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.optimize import brentq
 
-from evidence.study.dashpot import own_path
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble, loaded_te
 from gearfmu.stagefile.stage import load_stage
+from tests.stage.dashpot import own_path
 
 RATIO = 0.03
 CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ

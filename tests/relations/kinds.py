@@ -227,7 +227,7 @@ def family(name: str) -> str:
 @cache
 def _stage(file: str) -> Stage:
     if file == "internal":
-        spec = load_stage(ROOT / "evidence" / "peers" / "calculix" / "internal" / "stage.toml")
+        spec = load_stage(ROOT / "tests" / "reference" / "internal_pair" / "stage.toml")
         coarse = {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}
         spring = {"kind": "spring", "k": 2e4, "c": 1.0}
         ports = {name: port.model_copy(update=spring) for name, port in spec.ports.items()}

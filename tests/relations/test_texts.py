@@ -90,7 +90,7 @@ class Style:
 def tables_of(kind: str) -> Table:
     """What the stage file of a kind says, its bases included."""
     file = KINDS[kind].file
-    inside = ROOT / "evidence" / "peers" / "calculix" / "internal" / "stage.toml"
+    inside = ROOT / "tests" / "reference" / "internal_pair" / "stage.toml"
     tables = read_layers(inside if file == "internal" else find_stage(file)).tables
     return {key: value for key, value in tables.items() if key != "source"}
 

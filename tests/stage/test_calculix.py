@@ -1,7 +1,7 @@
 """Tooth pair and loaded transmission error against CalculiX, an independent finite-element code with its own contact.
 
-The goldens come from static contact solutions of the whole gears with a fine mesh where the teeth touch
-(evidence/peers/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
+The goldens come from static contact solutions of the whole gears with a fine mesh where the teeth touch (programs of
+commit 4f20d638). The bores' mean displacement and rotation are held in both codes where they are compared.
 """
 
 from __future__ import annotations
@@ -9,20 +9,31 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from evidence.peers.calculix import positions, rigid_bores, sun_planet
+from gearfmu.body import Body, load_bodies
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import PairGeometry
+from gearfmu.reduction.cyclic.flank import tooth_flank
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.run.te import TeResult
+from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.planetary import SetGearSpec
+from gearfmu.stagefile.forms.shapes import gear_geometry
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.tables.bodies import GearSpec
 
-ROOT = Path(__file__).resolve().parents[2]
-TABLES = ROOT / "evidence" / "peers" / "calculix"
-GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))
+REFERENCE = Path(__file__).resolve().parents[1] / "reference"
+GOLDEN = json.loads((REFERENCE / "calculix_fzg_c.json").read_text(encoding="utf-8"))
+TE = json.loads((REFERENCE / "calculix_te.json").read_text(encoding="utf-8"))
+POSITIONS = 12  # of one pitch
 SECANT = GOLDEN["pitch_point_secant_N_per_mm_um"]
 HELD = {"effect.bearings": 0.0}  # axes
 LINE_LOAD = 1e3 * GOLDEN["line_load_N_per_mm"]  # N/m
@@ -79,23 +90,17 @@ def test_pair_stiffness_at_the_pitch_point(plain: StageModel, spec: Stage, pair:
 
 
 # ---- transmission error ----------------------------------------------------------------------------------------------
-def beside(ours: TeResult, table: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Our and CalculiX's transmission errors (µm) of every torque at all positions of the pitch."""
-    rows = positions.read(TABLES / table)
-    for curve, torque in zip(1e6 * ours.te, ours.torque, strict=True):
-        own = [row for row in rows if float(row["torque_Nm"]) == torque]
-        here = curve[[round(positions.POSITIONS * float(row["position"])) for row in own]]
-        theirs = np.array([float(row["te_um"]) for row in own])
-        assert len(own) == positions.POSITIONS
-        yield here, theirs
-
-
-TORQUES = [80.0, 302.0, 600.0]  # N·m
+def beside(model: StageModel, table: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Our and CalculiX's transmission errors (µm) of every torque of a table at all positions of the pitch."""
+    theirs = {float(torque): np.array(curve) for torque, curve in TE[table].items()}
+    ours = loaded_te(model, list(theirs), POSITIONS, **HELD)
+    for here, there in zip(1e6 * ours.te, theirs.values(), strict=True):
+        yield here, there
 
 
 def test_transmission_error_over_one_pitch(plain: StageModel) -> None:
     """Mean and peak to peak within 3 % of CalculiX, tip contact included."""
-    for here, theirs in beside(loaded_te(plain, TORQUES, positions.POSITIONS, **HELD), "positions.csv"):
+    for here, theirs in beside(plain, "averaged"):
         assert here.mean() == pytest.approx(theirs.mean(), rel=0.03)
         assert np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.03)
 
@@ -104,19 +109,50 @@ def test_transmission_error_over_one_pitch(plain: StageModel) -> None:
 def test_transmission_error_on_rigid_bores(spec: Stage) -> None:
     """Bores clamped node by node there, rigid here, all positions and loads: mean and peak to peak within 3 %, as for
     averaged bores, which are 4 % softer; in truth single positions stay within 1 %."""
-    model = assemble(spec, rigid_bores.rigid_bore_bodies(spec))
-    for here, theirs in beside(loaded_te(model, TORQUES, positions.POSITIONS, **HELD), "positions_clamped.csv"):
+    bodies = [with_rigid_bore(spec, index, body) for index, body in enumerate(load_bodies(spec))]
+    for here, theirs in beside(assemble(spec, bodies), "clamped"):
         assert here.mean() == pytest.approx(theirs.mean(), rel=0.015)
         assert np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.01)
         assert np.allclose(here, theirs, rtol=0.015)
 
 
+def with_rigid_bore(spec: Stage, index: int, stored: Body) -> Body:
+    """A stored body with the static tables of a gear whose bore is rigid; its modes stay, of use at level rigid."""
+    gear = spec.gears[index]
+    geometry = gear_geometry(gear, spec.written.pair, (1, -1)[index])
+    sector = gear_sector(geometry, gear.face_width, gear.body.mesh)
+    body = SectorBody(sector, gear.material, *tooth_flank(geometry, gear), rigid_bore=True)
+    tables = static_tables(body, [])
+    flank = replace(stored.flank, static=tables.static_ff, node=tables.static_fb)
+    return replace(stored, flank=flank, static=tables.static_bb)
+
+
 def test_sun_and_planet_within_3_percent_at_two_loads() -> None:
     """The shipped bodies of `planetary54` as a pair: mean and peak to peak, and single positions but where a tooth pair
     begins or ends at a tip edge: 3.3 and 7.3 % there at the smaller load, where CalculiX hardly settles."""
-    ours = positions.te_of_gearfmu(sun_planet.sun_planet(), "averaged")
-    for torque, (here, theirs) in zip(ours.torque, beside(ours, "sun_planet.csv"), strict=True):
-        inside = [k for k in range(positions.POSITIONS) if torque > 40.0 or k not in (5, 6)]
+    model = assemble(sun_planet(), load_bodies(load_stage("planetary54"))[:2])
+    for light, (here, theirs) in zip((True, False), beside(model, "sun_planet"), strict=True):
+        inside = [k for k in range(POSITIONS) if not light or k not in (5, 6)]
         assert np.allclose(here[inside], theirs[inside], rtol=0.03)
         assert here.mean() == pytest.approx(theirs.mean(), rel=0.03)
         assert np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.03)
+
+
+def sun_planet() -> Stage:
+    """Sun and first planet of `planetary54` on fixed axes, without tip relief."""
+    of_set, pair = load_stage("planetary54").written, load_stage("fzg_c")
+    form = pair.written
+    gears = tuple(as_gear(*both) for both in zip(form.gears, (of_set.sun, of_set.planet), strict=True))
+    return rewritten(
+        pair, name="sun_planet", pair=form.pair.model_copy(update=shared(form.pair, of_set.set)), gears=gears
+    )
+
+
+def as_gear(form: GearSpec, gear: SetGearSpec) -> GearSpec:
+    """A gear of a set as one of a pair."""
+    return form.model_copy(update=shared(form, gear) | {"name": form.name, "tip_relief": None})
+
+
+def shared(form: Any, other: Any) -> dict[str, Any]:
+    """What another table says in fields of the same names."""
+    return {name: getattr(other, name) for name in type(form).model_fields if hasattr(other, name)}

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from by_hand import Pair
+from dashpot import own_path, same_loss
 from test_memory import of_few_modes
 
-from evidence.study.dashpot import own_path, same_loss
 from gearfmu.body import Body
 from gearfmu.stage import assemble
 from gearfmu.stagefile.forms.general import Stage

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from builds import edited_library
 from driven import give, stepped
+from light_rattle import SCENES, missed, run, statistics
 
-from evidence.energy import energy, light_rattle
+from evidence.energy import energy
 from evidence.energy.free import FreePair, Rattle, energies, free_pair, started
 from evidence.energy.kernel_variants import WITHOUT_ETA
-from evidence.energy.light import run, statistics
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
@@ -157,14 +157,12 @@ def test_central_is_the_same_physics_and_drifts(relieved_free: FreePair, relieve
     assert 1e-6 < energies(rattle, 2e-6, 0.01).drift < 0.03
 
 
-@pytest.mark.parametrize("name", light_rattle.SCENES)
+@pytest.mark.parametrize("name", SCENES)
 def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: StageModel, name: str) -> None:
     """Some 40 % of the time open; one start, 0.1 s, against a third of the step, which keeps eight ninths of an error
-    of second order (all, against an eighth: `python -m evidence.energy.light_rattle`)."""
-    scene = light_rattle.start(light_rattle.SCENES[name], 1)
-    found, wanted = (statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, 2.5e-6))
-    line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
-    assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
+    of second order."""
+    found, wanted = (statistics(run(relieved, SCENES[name], 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, 2.5e-6))
+    assert 0.35 < wanted["open_share"] < 0.45 and not missed(found, wanted)
 
 
 # ---- changes of h, the start of a free train, the limits of central and the level explicit ---------------------------

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from driven import give, stepped
+from flat import FlatBody, FlatContact, flat_blob
 from scipy.integrate import solve_ivp
 
 from evidence.energy.free import FreePair, Rattle, energies, started
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel

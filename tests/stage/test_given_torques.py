@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from driven import begun
+from flat import FlatBody, FlatContact, flat_blob
 
-from evidence.study.flat import FlatBody, FlatContact, flat_blob
 from gearfmu.body import Body
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble

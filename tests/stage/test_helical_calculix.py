@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from evidence.peers.calculix import helical
-from evidence.peers.calculix.positions import read
+from evidence.tables import read_rows
 from gearfmu.body import Body
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of
@@ -33,7 +33,7 @@ def test_te_within_2_5_percent_peak_to_peak_10_and_layer_loads_6(
     to peak where all positions of a pitch are there, with five and seven slices within 15 %."""
     bodies = helical.bodies(tmp_path_factory.mktemp("helical"), helix)
     loads: dict[tuple[str, float], list[tuple[float, float]]] = {}
-    for row in read(helical.HERE / "helical.csv"):
+    for row in read_rows(helical.HERE / "helical.csv"):
         case = helical.case_of(row)
         if case.helix != helix:
             continue

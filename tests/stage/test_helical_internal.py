@@ -13,7 +13,7 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.stage import load_stage
 
-STAGE = Path(__file__).parents[2] / "evidence" / "peers" / "calculix" / "internal" / "stage.toml"
+STAGE = Path(__file__).parents[1] / "reference" / "internal_pair" / "stage.toml"
 WIDTH, MODULE, ANGLE = 20e-3, 2.5e-3, math.radians(20)  # m, m, rad: of the section
 WHOLE = math.atan(math.pi * MODULE / WIDTH)  # rad: overlap ratio one
 

@@ -9,14 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from evidence.study import cuts
-from evidence.study.limits import limit_rows
-from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
 from gearfmu.kernel import Kernel
 from gearfmu.scenefile.scene import SceneSpec, load_scene
-from gearfmu.stage.assembly.teeth import ROLLS
 from gearfmu.study import bench
-from gearfmu.study.bench import Point, Price, Replay, measure, models_for, paired_price
+from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.run import Job, study
 from gearfmu.study.table import ReferenceRow, Row, read_rows, write_rows
@@ -122,38 +118,3 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert all(20e-6 / p.h == pytest.approx(round(20e-6 / p.h)) for p in found if p.h)
     assert min(p.h for p in found if p.h) == pytest.approx(min(STEPS))
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
-
-
-def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
-    rows = [
-        BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
-        for scene in ("one", "other")
-        for text in ("slices 10", "mesh × 1.3")
-    ]
-    svg, png = write_bodies_chart(rows, tmp_path / "bodies.csv")
-    text = svg.read_text(encoding="utf-8")
-    assert png.stat().st_size > 1000 and all(word in text for word in ("one", "other", "slices 10", "mesh × 1.3"))
-
-
-def test_cheap_refinements_of_a_few_milliseconds(scene: SceneSpec) -> None:
-    """Ten slices and a finer roll grid move level full by less than the level fast is off."""
-    rows = body_rows([scene], cheap(scene), h=5e-6)
-    assert [row.refined for row in rows] == ["slices 10", f"rolls {2 * ROLLS}", f"rolls {4 * ROLLS}"]
-    assert all(0 < row.te_error < 0.05 and row.n_dyn == rows[0].n_dyn and row.cpu_s == 0 for row in rows)
-
-
-def test_a_higher_cut_has_more_modes_and_less_error(scene: SceneSpec, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cuts, "paired_price", lambda run, base: Price(1.0, 1.0))
-    rows, _ = cuts.cut_rows(scene, quick=True)
-    low, high = (min(rows, key=lambda r: r.n_dyn), max(rows, key=lambda r: r.n_dyn))
-    assert low.n_dyn < high.n_dyn and low.te_error > 3 * high.te_error and low.h_default_s >= high.h_default_s
-
-
-def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
-    rows = limit_rows(scene, ("fast",), (12, 6, 4, 1))
-    kinds = [row.kind for row in rows]
-    assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
-    lowered = [row.gamma_lowered for row in rows]
-    assert lowered == sorted(lowered) and not lowered[0] and lowered[-1]
-    gammas, errors = [row.gamma for row in rows[:4]], [row.te_error for row in rows[:4]]
-    assert gammas == sorted(gammas, reverse=True) and errors == sorted(errors)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from evidence.study.__main__ import main as program
 from evidence.study.sets import SetRow, at_speed, ladder, with_planets
+from evidence.study.sets import main as program
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.stagefile.stage import load_stage
@@ -64,7 +64,7 @@ def test_only_levels_and_steps_are_drawn(tmp_path: Path) -> None:
 
 @pytest.mark.full
 def test_the_program_makes_a_quick_list_and_keeps_it(tmp_path: Path) -> None:
-    arguments = ["sets", "planetary_paper", "--quick", "--out", str(tmp_path)]
+    arguments = ["planetary_paper", "--quick", "--out", str(tmp_path)]
     program(arguments)
     made = (tmp_path / "sets.csv").read_bytes()
     program(arguments)

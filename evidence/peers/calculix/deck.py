@@ -1,148 +1,155 @@
-"""CalculiX decks of two gears in static contact. Lengths in mm, forces in N, stresses in MPa.
+"""CalculiX decks of two helical gears in static contact, both whole. Lengths in mm, forces in N, stresses in MPa.
 
-Small displacements, linear material, contact of surfaces by penalty pressure (no friction). The wheel's bore is held;
-the pinion's is turned about its axis by a given angle; the bores' reactions are printed. One load a deck: a second
-step that starts from the first one's contact can end with teeth that stick (tensile pressure).
+Small displacements, linear material, contact of surfaces by penalty pressure (no friction). All nodes of a bore are
+held, the wheel's where it is, the pinion's turned about its axis by a given angle; between the bores the gears are free
+in all directions. One contact pair for every layer of the width, so that its force can be printed. One load a deck: a
+second step that starts from the first one's contact can end with teeth that stick (tensile pressure).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.linalg as sl
 
+from evidence.peers.calculix.ccx import reactions
 from evidence.peers.calculix.solid import Solid
+
+YOUNGS, POISSON = 206e9, 0.3  # Pa, –
+PENALTY = 1e16  # Pa/m: two pairs do not converge at 3e16; costs 0.3 % of stiffness at the pitch point
+FORCE = re.compile(r"total surface force \(fx,fy,fz\)")
+PAIR = re.compile(r"statistics for slave set (\S+), master set (\S+) and time")
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A gear where it stands. centre (2,) m, angle (rad) of its frame, held: "clamped" (every bore node) or "averaged"
-    (mean displacement and rotation of the bore surface). turned: (rad) prescribed rotation of the bore."""
+    """A gear where it stands. centre (2,) m, angle (rad) of its frame, turned: (rad) prescribed rotation of the bore.
+    tilt (2,) rad: the axis is turned about x and y through its mid-width, first order."""
 
     name: str
     solid: Solid
     centre: np.ndarray
     angle: float
-    held: str
-    turned: float
+    turned: float = 0.0
+    tilt: tuple[float, float] = (0.0, 0.0)
 
     @property
     def nodes(self) -> np.ndarray:
         """(N, 3) m in the common frame."""
+        return self.arms + [*self.centre, 0.0]
+
+    @property
+    def arms(self) -> np.ndarray:
+        """(N, 3) m from the centre at mid-width, in the common frame."""
         c, s = np.cos(self.angle), np.sin(self.angle)
-        turned = self.solid.nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-        return turned + [*self.centre, 0.0]
+        x, y = self.tilt
+        rotation = sl.expm(np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]]))
+        return self.solid.nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ rotation.T
 
 
 @dataclass(frozen=True)
 class Problem:
-    """gears: pinion, wheel. pairs: their teeth that may touch; half the width, the low end face a plane of symmetry.
-    youngs, poisson: Pa, –. penalty: Pa/m. increments: equal parts in which the pinion is turned."""
+    """gears: pinion "P" and wheel "W". pairs: their teeth that may touch."""
 
     gears: tuple[Placed, Placed]
     pairs: Sequence[tuple[int, int]]
-    youngs: float = 206e9
-    poisson: float = 0.3
-    penalty: float = 3e16
-    element: str = "C3D20R"
-    increments: int = 1
+
+    def numbered(self) -> Iterator[tuple[Placed, int, int]]:
+        """Gears with their first node and element number; the wheel's come after the pinion's."""
+        node, element = 1, 1
+        for gear in self.gears:
+            yield gear, node, element
+            node, element = node + len(gear.solid.nodes), element + len(gear.solid.elements)
+
+    def contacts(self) -> list[tuple[str, str]]:
+        """Slave and master surface of every tooth pair, layers in order."""
+        layers = len(next(iter(self.gears[0].solid.flank.values())))
+        return [(_name("P", one, k), _name("W", other)) for one, other in self.pairs for k in range(layers)]
 
 
-def write_deck(problem: Problem, path: Path) -> None:
-    """The deck of a problem; one node numbering, the wheel's nodes after the pinion's, dummy nodes of averaging last.
-
-    The pinion's fine zone is the slave surface, the wheel's whole flank the master."""
-    lines = ["*NODE, NSET=ALL"]
-    for gear, (node, _) in zip(problem.gears, starts(problem), strict=True):
-        lines += [f"{node + k}, {x:.12g}, {y:.12g}, {z:.12g}" for k, (x, y, z) in enumerate(1e3 * gear.nodes)]
-    for gear, (node, element), zone in zip(problem.gears, starts(problem), ("patch", "flank"), strict=True):
-        lines += [f"*ELEMENT, TYPE={problem.element}, ELSET=E{gear.name}"]
-        for k, row in enumerate(gear.solid.elements + node):
-            text = [str(n) for n in row]
-            lines += [f"{element + k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
-        lines += node_set(f"BORE{gear.name}", gear.solid.bore + node)
-        for side in ("low", "high"):
-            lines += node_set(f"{side.upper()}{gear.name}", getattr(gear.solid, side) + node)
-        for tooth, faces in getattr(gear.solid, zone).items():
-            lines += [f"*SURFACE, NAME={_tooth(gear, tooth)}, TYPE=ELEMENT"]
-            lines += [f"{element + e}, S{f}" for e, f in faces]
-    lines += _physics(problem) + _step(problem)
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+def node_lines(nodes: np.ndarray, start: int = 1, digits: int = 12) -> list[str]:
+    """Numbered nodes (N, 3) m."""
+    return [f"{k}, {x:.{digits}g}, {y:.{digits}g}, {z:.{digits}g}" for k, (x, y, z) in enumerate(1e3 * nodes, start)]
 
 
-def starts(problem: Problem) -> list[tuple[int, int]]:
-    """First node and element number of either gear."""
-    first = problem.gears[0].solid
-    return [(1, 1), (len(first.nodes) + 1, len(first.elements) + 1)]
-
-
-def _dummies(problem: Problem) -> list[int]:
-    """Number of either gear's node whose displacements are the bore's mean x, mean y and rotation × 1 mm."""
-    last = sum(len(gear.solid.nodes) for gear in problem.gears)
-    return [last + 1, last + 2]
-
-
-def _tooth(gear: Placed, tooth: int) -> str:
-    return f"T{gear.name}{tooth}".replace("-", "M")
-
-
-def node_set(name: str, nodes: np.ndarray) -> list[str]:
-    return [f"*NSET, NSET={name}"] + [", ".join(map(str, nodes[k : k + 12])) + "," for k in range(0, len(nodes), 12)]
-
-
-def _physics(problem: Problem) -> list[str]:
-    lines = ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * problem.youngs:.9g}, {problem.poisson:.9g}"]
-    for gear, dummy, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
-        lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL"]
-        lines += ["*BOUNDARY", f"LOW{gear.name}, 3, 3"]
-        if gear.held == "averaged":
-            lines += ["*NODE, NSET=ALL", f"{dummy}, 0, 0, 0", *_averaging(gear, dummy, node)]
-    lines += ["*SURFACE INTERACTION, NAME=DRY", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
-    lines += [f"{1e-9 * problem.penalty:.9g}, 0.001"]
-    first, second = problem.gears
-    for one, other in problem.pairs:
-        lines += ["*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE"]
-        lines += [f"{_tooth(first, one)}, {_tooth(second, other)}"]
+def element_lines(elements: np.ndarray, start: int = 1) -> list[str]:
+    """Numbered 20-node hexahedra, two lines each; elements (E, 20) node numbers of the deck."""
+    lines = []
+    for k, row in enumerate(elements, start):
+        text = [str(node) for node in row]
+        lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
     return lines
 
 
-def _averaging(gear: Placed, dummy: int, start: int) -> list[str]:
-    """Equations Σ row·u = dummy, reduced so that each has a dependent displacement of its own."""
-    r = 1e3 * (gear.nodes[gear.solid.bore, :2] - gear.centre)
-    w, zero = gear.solid.weights, np.zeros(len(gear.solid.weights))
-    polar = w @ (r * r).sum(axis=1)
-    means = ([w, zero], [zero, w], [-w * r[:, 1] / polar, w * r[:, 0] / polar])
-    rows = np.array([np.ravel(mean, order="F") for mean in means])
-    here = int(np.argmax(w))
-    there = int(np.argmax(w * np.linalg.norm(r - r[here], axis=1)))
-    other = 2 * there + int(np.argmax(np.abs([r[there, 1] - r[here, 1], r[there, 0] - r[here, 0]])))
-    pivots = [2 * here, 2 * here + 1, other]
-    inverse = np.linalg.inv(rows[:, pivots])
+def write_deck(problem: Problem, path: Path) -> None:
+    """The deck of a problem."""
+    lines = ["*NODE, NSET=ALL"]
+    for gear, node, _ in problem.numbered():
+        lines += node_lines(gear.nodes, node)
+    for gear, node, element in problem.numbered():
+        lines += [f"*ELEMENT, TYPE=C3D20R, ELSET=E{gear.name}", *element_lines(gear.solid.elements + node, element)]
+        bore = gear.solid.bore + node
+        lines += [f"*NSET, NSET=BORE{gear.name}"]
+        lines += [", ".join(map(str, bore[k : k + 12])) + "," for k in range(0, len(bore), 12)]
+    lines += _surfaces(problem)
+    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * YOUNGS:.9g}, {POISSON:.9g}"]
+    lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL" for gear in problem.gears]
+    lines += ["*SURFACE INTERACTION, NAME=DRY", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+    lines += [f"{1e-9 * PENALTY:.9g}, 0.001"]
+    for slave, master in problem.contacts():
+        lines += ["*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE", f"{slave}, {master}"]
+    path.write_text("\n".join(lines + _step(problem)) + "\n", encoding="ascii")
+
+
+def _name(gear: str, tooth: int, layer: int | None = None) -> str:
+    return f"{gear}{'M' if tooth < 0 else ''}{abs(tooth)}" + ("" if layer is None else f"L{layer}")
+
+
+def _surfaces(problem: Problem) -> list[str]:
+    """The pinion's flanks by layers, the wheel's as one, tip edges included."""
     lines = []
-    for equation, (row, mean) in enumerate(zip(inverse @ rows, inverse, strict=True)):
-        columns = [pivots[equation]] + [c for c in np.flatnonzero(row) if c not in pivots]
-        terms = [(start + gear.solid.bore[c // 2], c % 2 + 1, row[c]) for c in columns]
-        terms += [(dummy, k + 1, -mean[k]) for k in range(3) if mean[k] != 0]
-        lines += ["*EQUATION", str(len(terms))]
-        text = [f"{node}, {axis}, {value:.14g}" for node, axis, value in terms]
-        lines += [", ".join(text[k : k + 4]) for k in range(0, len(text), 4)]
+    (pinion, _, first), (wheel, _, other) = problem.numbered()
+    surfaces = [(_name("P", t, k), faces, first) for t, all_of in pinion.solid.flank.items()
+                for k, faces in enumerate(all_of)]  # fmt: skip
+    surfaces += [(_name("W", t), all_of.reshape(-1, 2), other) for t, all_of in wheel.solid.flank.items()]
+    for name, faces, start in surfaces:
+        lines += [f"*SURFACE, NAME={name}, TYPE=ELEMENT", *(f"{start + e}, S{f}" for e, f in faces)]
     return lines
 
 
 def _step(problem: Problem) -> list[str]:
-    share = "1." if problem.increments == 1 else f"{1 / problem.increments + 1e-3:.3f}"  # the last one is shorter
-    lines = ["*STEP, INC=100", "*STATIC, DIRECT", f"{share}, 1.", "*BOUNDARY"]
-    for gear, dummy, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
-        angle = gear.turned
-        if gear.held == "averaged":
-            lines += [f"{dummy}, 1, 2, 0", f"{dummy}, 3, 3, {angle:.12g}"]
-            continue
-        arm = 1e3 * (gear.nodes[gear.solid.bore, :2] - gear.centre)
-        for number, (x, y) in zip(node + gear.solid.bore, arm, strict=True):
-            lines += [f"{number}, 1, 1, {-angle * y:.12g}", f"{number}, 2, 2, {angle * x:.12g}"]
+    lines = ["*STEP, INC=100", "*STATIC, DIRECT", "1., 1.", "*BOUNDARY"]
+    for gear, node, _ in problem.numbered():
+        for number, (x, y, _) in zip(node + gear.solid.bore, 1e3 * gear.arms[gear.solid.bore], strict=True):
+            lines += [f"{number}, 1, 1, {-gear.turned * y:.12g}", f"{number}, 2, 2, {gear.turned * x:.12g}"]
         lines += [f"BORE{gear.name}, 3, 3"]
     for gear in problem.gears:
         lines += [f"*NODE PRINT, NSET=BORE{gear.name}", "RF"]
+    for slave, master in problem.contacts():
+        lines += [f"*CONTACT PRINT, SLAVE={slave}, MASTER={master}", "CF"]
     return [*lines, "*END STEP"]
+
+
+def pinion_load(problem: Problem, path: Path) -> np.ndarray:
+    """(6,) force (N) and moment (N·m) about its mid-width that the pinion's bore exerts on it."""
+    gear, node, _ = next(problem.numbered())
+    forces = reactions(path)[f"BORE{gear.name}"]
+    arm, force = gear.arms[np.array(list(forces)) - node], np.array(list(forces.values()))
+    return np.concatenate([force.sum(axis=0), np.cross(arm, force).sum(axis=0)])
+
+
+def layer_forces(problem: Problem, path: Path) -> np.ndarray:
+    """(pairs, layers) N: contact force of every tooth pair in every layer."""
+    found: dict[tuple[str, str], float] = {}
+    lines = [line for line in path.read_text(encoding="ascii").splitlines() if line.strip()]
+    for line, following in zip(lines, lines[1:], strict=False):
+        if head := PAIR.search(line):
+            current = head[1], head[2]
+        elif FORCE.search(line):
+            found[current] = float(np.linalg.norm([float(value) for value in following.split()[:3]]))
+    forces = [found.get(pair, 0.0) for pair in problem.contacts()]
+    return np.array(forces).reshape(len(problem.pairs), -1)

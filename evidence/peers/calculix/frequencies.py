@@ -11,8 +11,6 @@ Needs CalculiX's ccx (Debian: calculix-ccx); seconds to some minutes a case.
 from __future__ import annotations
 
 import argparse
-import csv
-import hashlib
 import re
 import sys
 from dataclasses import dataclass, replace
@@ -21,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from evidence.peers.calculix.ccx import require_ccx, run
-from evidence.peers.calculix.positions import read
+from evidence.peers.calculix.ccx import digest, require_ccx, run
+from evidence.peers.calculix.deck import element_lines, node_lines
+from evidence.tables import read_rows, write_rows
 from gearfmu.body.sector import body_sector
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.files import written_whole
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -34,7 +32,6 @@ from gearfmu.stagefile.tables.bodies import Material
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent
-FIELDS = ("case", "mode", "frequency_Hz", "nodes", "elements", "seconds", "deck_sha256")
 
 
 @dataclass(frozen=True)
@@ -93,12 +90,8 @@ def compare(rows: list[dict[str, Any]]) -> None:
 
 def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
     """Free vibration of a body, whole or (`mesh.teeth` > 1) by one sector, in mm, N, tonnes and s."""
-    lines = ["*NODE, NSET=ALL"]
-    lines += [f"{k}, {x:.14g}, {y:.14g}, {z:.14g}" for k, (x, y, z) in enumerate(1e3 * mesh.nodes, start=1)]
-    lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY"]
-    for k, row in enumerate(mesh.elements + 1, start=1):
-        text = [str(node) for node in row]
-        lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
+    lines = ["*NODE, NSET=ALL", *node_lines(mesh.nodes, digits=14)]
+    lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY", *element_lines(mesh.elements + 1)]
     lines += [
         "*MATERIAL, NAME=STEEL",
         "*ELASTIC",
@@ -153,8 +146,8 @@ def solved(case: Case, work: Path, known: list[dict[str, Any]]) -> list[dict[str
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "free.inp"
     write_deck(mesh, material, deck)
-    digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
-    if known and all(row["deck_sha256"] == digest for row in known):
+    made = digest(deck)
+    if known and all(row["deck_sha256"] == made for row in known):
         return known
     seconds = run(deck)
     result = deck.with_suffix(".dat")
@@ -163,18 +156,9 @@ def solved(case: Case, work: Path, known: list[dict[str, Any]]) -> list[dict[str
         "nodes": len(mesh.nodes),
         "elements": len(mesh.elements),
         "seconds": f"{seconds:.0f}",
-        "deck_sha256": digest,
+        "deck_sha256": made,
     }
     return [{"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size} for k, f in enumerate(found, start=1)]
-
-
-def write(path: Path, rows: list[dict[str, Any]]) -> None:
-    """The table in the order of CASES."""
-    rows = [row for name in CASES for row in rows if row["case"] == name]
-    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def main() -> None:
@@ -187,12 +171,13 @@ def main() -> None:
     if unknown := [name for name in chosen.cases if name not in CASES]:
         parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
     if chosen.compare:
-        return compare(read(chosen.out))
+        return compare(read_rows(chosen.out))
     require_ccx()
     for name in chosen.cases or CASES:
-        known = [row for row in read(chosen.out) if row["case"] == name]
+        known = [row for row in read_rows(chosen.out) if row["case"] == name]
         fresh = solved(CASES[name], chosen.work, [] if chosen.cases else known)
-        write(chosen.out, [row for row in read(chosen.out) if row["case"] != name] + fresh)
+        rows = [row for row in read_rows(chosen.out) if row["case"] != name] + fresh
+        write_rows(chosen.out, [row for case in CASES for row in rows if row["case"] == case])
         kept = " (of the same deck)" if fresh is known else ""
         print(f"{name}: {fresh[0]['nodes']} nodes, {fresh[0]['seconds']} s{kept}", file=sys.stderr, flush=True)
 

@@ -6,10 +6,11 @@ The pair is `helical_demo` with 12 mm of width, without modifications (overlap r
 helix angle of 30° (0.85). CASES are helix angle, axes (`tilted`: the wheel's axis turned by 1 µm over 1 mm across the
 line of centres), torque on the pinion and positions. Both gears are whole and twisted, with quadratic elements in five
 layers across the width; fine zones follow the slanting lines of contact, and layers where a line ends at a tip edge
-have elements of 0.6 mm. Both codes have rigid bores that are held. The way to the torque asked is that of positions.py.
-Table: helical.csv beside this file, one row a solution with the load share of every layer in both codes. A row of the
-same mesh at nearly its torque is not solved again: its error is computed anew. The bodies are reduced into the work
-folder first (some minutes). `--compare` runs nothing. Needs CalculiX's ccx; four to nine minutes a solution.
+have elements of 0.6 mm. Both codes have rigid bores that are held. The pinion is turned to where gearfmu expects the
+torque; from the torque that comes out te is moved to the one asked by gearfmu's tangent stiffness. Table: helical.csv
+beside this file, one row a solution with the load share of every layer in both codes. A row of the same mesh at nearly
+its torque is not solved again: its error is computed anew. The bodies are reduced into the work folder first (some
+minutes). `--compare` runs nothing. Needs CalculiX's ccx; four to nine minutes a solution.
 """
 
 from __future__ import annotations
@@ -17,38 +18,41 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evidence.accuracy.helical_overlap import bodies_of
-from evidence.peers.calculix.case import digest
-from evidence.peers.calculix.ccx import first_solved, require_ccx, run_deck
-from evidence.peers.calculix.deck import Problem
-from evidence.peers.calculix.helical_section import Zone, twisted
-from evidence.peers.calculix.positions import NUDGES, PENALTY, read, write
+from evidence.peers.calculix.ccx import digest, first_solved, require_ccx, run_deck
+from evidence.peers.calculix.deck import Placed, Problem, layer_forces, pinion_load, write_deck
 from evidence.peers.calculix.section import Fineness
-from evidence.peers.calculix.spatial_deck import Tilted, bore_loads, layer_forces, write_spatial_deck
-from gearfmu.body import Body, load_body
+from evidence.peers.calculix.solid import twisted
+from evidence.tables import read_rows, write_rows
+from gearfmu.body import Body, load_bodies, load_body
 from gearfmu.body.store import save_body
-from gearfmu.geometry import PairGeometry
+from gearfmu.body.toothed import flank_of, symmetric_mass
+from gearfmu.femesh.sector import gear_sector
+from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.mesh import contact_modulus, half_width
+from gearfmu.reduction.cyclic.flank import tooth_flank
+from gearfmu.reduction.cyclic.modal import elastic_modes
+from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stage import assemble
 from gearfmu.stage.run.te import TANGENT, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import MeshSpec, Misalignment
+from gearfmu.stagefile.tables.bodies import GearSpec, MeshSpec, Misalignment
 
 WIDTH, LAYERS, SLICES = 12e-3, 5, 10
 POSITIONS = 4
 TILT = 1e-3  # rad, of the wheel's axis across the line of centres
 MARGIN = 0.4e-3  # m beyond the ends of the path where tooth pairs are still in the deck
-PATCH, ZONE = 1.5, Zone()  # half length of the fine zones in Hertz half-widths, elements
+PATCH = 1.5  # half length of the fine zones in Hertz half-widths
 MESH = MeshSpec(flank=14, thickness=4, root=5, rim=3, width=6)
-ROLLS, FUNCTIONS = 20, 6
+ROLLS, FUNCTIONS, MODES = 20, 6, 12
 NEAR = 0.05  # parts of the torque asked, up to which a solution's torque is carried to it
 HERE = Path(__file__).parent
 WHOLE = (1,) * LAYERS
@@ -122,9 +126,29 @@ def bodies(work: Path, helix: int = 20) -> list[Body]:
     files = [work / f"helical_{helix}_{name}.h5" for name in ("pinion", "wheel")]
     if not all(file.exists() for file in files):
         work.mkdir(parents=True, exist_ok=True)
-        for body, file in zip(bodies_of(stage(helix)), files, strict=True):
-            save_body(body, file)
+        spec, stored = stage(helix).written, load_bodies(load_stage("helical_demo"))
+        for *entry, file in zip(stored, spec.gears, spec.geometry.gears, files, strict=True):
+            save_body(_body(*entry), file)
     return [load_body(file) for file in files]
+
+
+def _body(stored: Body, gear: GearSpec, shape: GearGeometry) -> Body:
+    """The body of a gear with static tables and a dozen modes of its own, without picture and gyroscopic terms."""
+    flank, points = tooth_flank(shape, gear)
+    sector = gear_sector(shape, gear.face_width, gear.body.mesh)
+    body = SectorBody(sector, gear.material, flank, points, gear.rigid_bore)
+    statics, modes = static_tables(body, []), elastic_modes(body, MODES)
+    return replace(
+        stored,
+        mass=symmetric_mass(body.inertia),
+        frequency=modes.frequency,
+        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
+        rows=modes.bore_rows,
+        static=statics.static_bb,
+        flank=replace(flank_of(gear.teeth, (flank, points), modes, statics), tangent=None),
+        picture=None,
+        spin=None,
+    )
 
 
 def ours(case: Case, gears: list[Body]) -> Ours:
@@ -168,26 +192,17 @@ def problem_at(case: Case, te: float) -> Problem:
     e_star = contact_modulus((steel.youngs_modulus,) * 2, (steel.poisson_ratio,) * 2)
     radius = pair.largest_relative_radius()
     wide = half_width(case.torque / pair.gears[0].r_b / WIDTH, radius, e_star)
-    fine = Fineness(
-        patch=PATCH * wide, growth=2.0, thickness=2, depth_growth=2.6, rim=2, root=2, far_root=1, far_flank=1
-    )
-    levels = levels_of(case.divisions)
+    fine, levels = Fineness(patch=PATCH * wide), levels_of(case.divisions)
     solids = [
-        twisted(gear, {teeth[g]: rolls[g] for teeth, rolls in contacts.items()}, levels, fine, ZONE).solid
+        twisted(gear, {teeth[g]: rolls[g] for teeth, rolls in contacts.items()}, levels, fine)
         for g, gear in enumerate(pair.gears)
     ]
     phase = pair.wheel_phase - turn * pair.gears[0].r_b / pair.gears[1].r_b
     error = spec.written.pair.misalignment
     tilt = (0.0, 0.0) if error is None else (-error.out_of_plane / error.span, error.in_plane / error.span)
-    return Problem(
-        gears=(
-            Tilted("P", solids[0], np.zeros(2), turn, "clamped", te / pair.gears[0].r_b),
-            Tilted("W", solids[1], np.array([pair.a, 0.0]), phase, "clamped", 0.0, tilt=tilt),
-        ),
-        pairs=list(contacts),
-        penalty=PENALTY,
-        element="C3D20R",
-    )
+    pinion = Placed("P", solids[0], np.zeros(2), turn, te / pair.gears[0].r_b)
+    wheel = Placed("W", solids[1], np.array([pair.a, 0.0]), phase, tilt=tilt)
+    return Problem((pinion, wheel), list(contacts))
 
 
 def row(case: Case, gears: list[Body], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
@@ -197,7 +212,7 @@ def row(case: Case, gears: list[Body], work: Path, known: dict[str, Any] | None)
     folder = work / f"helical_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "load_0.inp"
-    write_spatial_deck(problem_at(case, 0.0), deck)
+    write_deck(problem_at(case, 0.0), deck)
     mesh = digest(deck)
     theirs = known if known and known["mesh_sha256"] == mesh and _near(known) else solution(case, mine.te, deck)
     te, torque = 1e-6 * float(theirs["solved_te_um"]), float(theirs["solved_torque_Nm"])
@@ -222,16 +237,16 @@ def solution(case: Case, te: float, deck: Path) -> dict[str, Any]:
 
     def attempt(nudge: float) -> tuple[float, Problem, float]:
         problem = problem_at(case, nudge * te)
-        write_spatial_deck(problem, deck)
+        write_deck(problem, deck)
         return nudge * te, problem, run_deck(deck)
 
-    te, problem, seconds = first_solved(NUDGES, attempt)
-    loads, layers = bore_loads(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
+    te, problem, seconds = first_solved(attempt)
+    load, layers = pinion_load(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
     share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *case.divisions[:-1]))) / layers.sum()
     return {f"share_{k + 1}": f"{value:.5f}" for k, value in enumerate(share)} | {
         "solved_te_um": f"{1e6 * te:.4f}",
-        "solved_torque_Nm": f"{abs(loads[0, 5]):.3f}",
-        "axial_N": f"{loads[0, 2]:.2f}",
+        "solved_torque_Nm": f"{abs(load[5]):.3f}",
+        "axial_N": f"{load[2]:.2f}",
         "pairs": len(problem.pairs),
         "nodes": sum(len(gear.solid.nodes) for gear in problem.gears),
         "seconds": f"{seconds:.0f}",
@@ -276,7 +291,7 @@ def main() -> None:
     chosen = parser.parse_args()
     if unknown := [name for name in chosen.cases if name not in CASES]:
         parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
-    rows, failed = {case_of(row).name: row for row in read(chosen.out)}, []
+    rows, failed = {case_of(row).name: row for row in read_rows(chosen.out)}, []
     if chosen.compare:
         return compare(list(rows.values()))
     require_ccx()
@@ -287,7 +302,8 @@ def main() -> None:
         except RuntimeError as failure:
             failed.append(f"{name}: {failure}")
             continue
-        write(chosen.out, [rows[name] for name in CASES if name in rows])
+        done = [name for name in CASES if name in rows]
+        write_rows(chosen.out, [rows[k] for k in sorted(done, key=lambda k: (CASES[k].torque, CASES[k].position))])
         print(", ".join(f"{key} {value}" for key, value in rows[name].items()), file=sys.stderr, flush=True)
     if failed:
         raise SystemExit("\n".join(failed))

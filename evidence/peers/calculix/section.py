@@ -1,6 +1,6 @@
-"""Plane mesh of a whole gear for a contact solution: one tooth, or a few, with fine surface elements where they touch.
+"""Plane mesh of half a tooth for a contact solution: three blocks of eight-node quadrilaterals (tooth, root, rim),
+transfinite between exact boundary curves.
 
-Three blocks of eight-node quadrilaterals per half tooth (tooth, root, rim), transfinite between exact boundary curves.
 The counts across the thickness and the rim are those of every sector, so that sectors fit at their cuts; elements
 along the surface are each sector's own. The tip edge rounding is meshed as an arc: it takes part in contact.
 """
@@ -8,7 +8,7 @@ along the surface are each sector's own. The tip edge rounding is meshed as an a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,35 +22,23 @@ CORE_DEPTH = 0.6  # depth of the root block under the root circle, modules
 
 @dataclass(frozen=True)
 class Fineness:
-    """Elements of a section. patch: (m) half length of the fine surface zone; size: (m) of its elements; coarse: (m)
-    largest surface element; growth from the patch outwards. thickness, depth_growth: elements from surface to tooth
-    middle. rim: from the root block to the bore. root: along half a space, far_root and far_flank in sectors without
-    contact. toothed: so many sectors beside a touched one have their tooth; farther ones end at the root circle."""
+    """Elements of a section. patch: (m) half length of the fine surface zone; inner, below, above: elements in it and
+    beside it; growth from the patch outwards. thickness, depth_growth: elements from surface to tooth middle. rim: from
+    the root block to the bore. root: along half a space; far_root and far_flank: in sectors without contact. toothed:
+    so many sectors beside a touched one have their tooth; farther ones end at the root circle."""
 
-    patch: float = 0.25e-3
-    size: float = 0.042e-3
-    coarse: float = 1.5e-3
-    growth: float = 1.6
-    thickness: int = 6
-    depth_growth: float = 1.9
-    rim: int = 3
-    root: int = 6
-    far_root: int = 2
-    far_flank: int = 2
+    patch: float
+    inner: int = 6
+    below: int = 3
+    above: int = 3
+    growth: float = 2.0
+    thickness: int = 2
+    depth_growth: float = 2.6
+    rim: int = 2
+    root: int = 2
+    far_root: int = 1
+    far_flank: int = 1
     toothed: int = 1
-
-
-@dataclass(frozen=True)
-class Plane:
-    """nodes (N, 2) m, body frame. quads (E, 8) counter-clockwise, mid nodes last. bore: (B, 3) start, end, middle of
-    its edges. flank, patch: by touched tooth the edges (F, 3) of its sg = +1 surface from root form point to tip edge,
-    and those of them in the fine zone."""
-
-    nodes: np.ndarray
-    quads: np.ndarray
-    bore: np.ndarray
-    flank: dict[int, np.ndarray]
-    patch: dict[int, np.ndarray]
 
 
 def surface(gear: GearGeometry, u: np.ndarray) -> np.ndarray:
@@ -61,13 +49,13 @@ def surface(gear: GearGeometry, u: np.ndarray) -> np.ndarray:
     turn = np.maximum(u - (end - start), 0.0) / gear.tip_edge
     normal = gear.flank_normal(gear.s_tip)
     along = np.array([normal[1], -normal[0]])
-    arc = tip_edge_centre(gear) + gear.tip_edge * (
+    arc = _tip_edge_centre(gear) + gear.tip_edge * (
         np.cos(turn)[:, None] * normal + np.sin(turn)[:, None] * along * np.sign(along[0])
     )
     return np.where((turn > 0)[:, None], arc, flank)
 
 
-def tip_edge_centre(gear: GearGeometry) -> np.ndarray:
+def _tip_edge_centre(gear: GearGeometry) -> np.ndarray:
     """Centre (2,) in m of the tip edge rounding of flank sg = +1."""
     return gear.flank_point(gear.s_tip) - gear.tip_edge * gear.flank_normal(gear.s_tip)
 
@@ -75,42 +63,9 @@ def tip_edge_centre(gear: GearGeometry) -> np.ndarray:
 def lengths(gear: GearGeometry) -> tuple[float, float]:
     """Arc length (m) of the flank, and of flank and meshed tip edge together."""
     start, end = involute.arc_length(np.array([gear.s_form, gear.s_tip]), gear.r_b)
-    full_turn = math.acos(float(gear.flank_normal(gear.s_tip) @ _radial(tip_edge_centre(gear))))
+    centre = _tip_edge_centre(gear)
+    full_turn = math.acos(float(gear.flank_normal(gear.s_tip) @ (centre / np.linalg.norm(centre))))
     return float(end - start), float(end - start) + EDGE_TURN * full_turn * gear.tip_edge
-
-
-def surface_stations(gear: GearGeometry, centre: float | None, fine: Fineness) -> np.ndarray:
-    """`stations` of a gear's surface, fine around the roll `centre` (m)."""
-    middle = None
-    if centre is not None:
-        middle = float(involute.arc_length(centre, gear.r_b) - involute.arc_length(gear.s_form, gear.r_b))
-    return stations(*lengths(gear), middle, fine)
-
-
-def stations(flank: float, total: float, middle: float | None, fine: Fineness) -> np.ndarray:
-    """Arc lengths (2F + 1,) of surface nodes, corner and mid: fine around the arc length `middle` (m), `far_flank`
-    equal elements and one on the edge where that is None. The tip form point, at `flank`, is always a corner."""
-    if middle is None:
-        corners = np.append(np.linspace(0, flank, fine.far_flank + 1), total)
-    else:
-        low, high = max(middle - fine.patch, 0.0), min(middle + fine.patch, total)
-        inner = np.linspace(low, high, max(2, round((high - low) / fine.size)) + 1)
-        corners = np.concatenate([_outwards(low, 0.0, fine)[::-1], inner, _outwards(high, total, fine)])
-        free = corners[1:-1]
-        free[np.argmin(np.abs(free - flank))] = flank
-    return np.interp(np.arange(2 * len(corners) - 1) / 2, np.arange(len(corners)), corners)
-
-
-def _outwards(start: float, end: float, fine: Fineness) -> np.ndarray:
-    """Corners from `start` (left out) to `end`, growing."""
-    span, sizes = abs(end - start), []
-    while sum(sizes) < span - 1e-9:
-        sizes.append(min(fine.coarse, fine.size * fine.growth ** (len(sizes) + 1)))
-    return start + math.copysign(1, end - start) * np.cumsum(sizes) * (span / sum(sizes)) if sizes else np.empty(0)
-
-
-def _radial(point: np.ndarray) -> np.ndarray:
-    return point / np.linalg.norm(point)
 
 
 def half_tooth(gear: GearGeometry, stations: np.ndarray, root: int, fine: Fineness) -> list[np.ndarray]:
@@ -149,35 +104,9 @@ def quadrilaterals(lattice: np.ndarray) -> np.ndarray:
     return quads[:, [0, 3, 2, 1, 7, 6, 5, 4]] if clockwise else quads
 
 
-def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, fine: Fineness) -> Plane:
-    """The section of the sectors `teeth`; contacts: roll (m) at which a tooth of this gear is touched."""
-    cells, bore, flank, patch = [], [], {}, {}
-    for tooth in teeth:
-        near = min(abs((tooth - loaded + gear.z // 2) % gear.z - gear.z // 2) for loaded in contacts) <= fine.toothed
-        turn = turning(2 * math.pi * tooth / gear.z)
-        stations = surface_stations(gear, contacts.get(tooth), fine)
-        blocks = half_tooth(gear, stations, fine.root if tooth in contacts else fine.far_root, fine)
-        upper = np.concatenate([quadrilaterals(block) for block in blocks[0 if near else 1 :]])
-        cells += [upper @ turn, (upper * [1, -1])[:, [0, 3, 2, 1, 7, 6, 5, 4]] @ turn]
-        edge = edges(blocks[2][-1])
-        bore += [edge @ turn, (edge * [1, -1]) @ turn]
-        if tooth in contacts:
-            flank[tooth] = edges(surface(gear, stations)) @ turn
-            patch[tooth] = flank[tooth][np.diff(stations[::2]) < 1.2 * fine.size]
-    nodes, (quads, bore_edges, *zones) = joined(cells, bore, *flank.values(), *patch.values())
-    return Plane(
-        nodes=nodes,
-        quads=quads,
-        bore=bore_edges,
-        flank=dict(zip(flank, zones[: len(flank)], strict=True)),
-        patch=dict(zip(patch, zones[len(flank) :], strict=True)),
-    )
-
-
-def joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+def joined(groups: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
     """Nodes (N, 2), and each group's points (…, 2) as node numbers (…). Points within 10 nm of each other are one node;
     the bins are shifted off the axes, where the rounding of turned points has either sign."""
-    groups = [np.concatenate(group) if isinstance(group, list) else group for group in groups]
     points = np.concatenate([group.reshape(-1, 2) for group in groups])
     bins = np.floor(points / 1e-8 + 0.37).astype(np.int64)
     _, first, index = np.unique(bins, axis=0, return_index=True, return_inverse=True)
@@ -193,4 +122,5 @@ def turning(angle: float) -> np.ndarray:
 
 
 def edges(line: np.ndarray) -> np.ndarray:
+    """Start, end and middle (E, 3, …) of the edges along a line of corner and mid nodes."""
     return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)

@@ -29,10 +29,9 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
             "tooth of the ring, µm": 1e6 * read("ring", "tooth0", "uy"),
             "ring a quarter away, µm": 1e6 * read("ring", QUARTER, "uy"),
         }
-    radius = scene.solids["planet"].centre[0]
     bolt = read("carrier", "bolt0", "uy")
     found = {
-        "bolt deflection, µm": 1e6 * (bolt - radius * read("carrier", "bore", "rz")),
+        "bolt deflection, µm": 1e6 * (bolt - scene.radius * read("carrier", "bore", "rz")),
         "bolt tilt, mrad": 1e3 * read("carrier", "bolt0", "rx"),
         "pin elongation, µm": 1e6 * (read("planet", "bore", "uy") - bolt),
     }

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.ticker import FuncFormatter
 
-from evidence.reduction.in_time.tables import read_columns
+from evidence.tables import read_columns
 from gearfmu.files import written_whole
 from gearfmu.report.style import INK, panels, styled
 

@@ -29,8 +29,8 @@ from evidence.reduction.in_time.channels import channels, errors
 from evidence.reduction.in_time.chart import RUNS, draw
 from evidence.reduction.in_time.ring_scene import ring_hammering
 from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
-from evidence.reduction.in_time.tables import read_rows, write_columns, write_rows
 from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
+from evidence.tables import read_rows, told, write_columns, write_rows
 from gearfmu.files import written_whole
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
@@ -113,9 +113,8 @@ STUDIES = {
 
 @dataclass(frozen=True)
 class Line:
-    """A channel of a run. error, late: over the reference's rms, of the whole run and of its last
-    fifth; seconds: processor time
-    of the integration."""
+    """A channel of a run. error, late: over the reference's rms, of the whole run and of its last fifth; seconds:
+    processor time of the integration."""
 
     scene: str
     carrier: str
@@ -195,7 +194,7 @@ def main() -> None:
             found = []
             for line in measure(name, STUDIES[name], chosen.work):
                 found.append(asdict(line))
-                print("  ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in found[-1].values()), flush=True)
+                told(found[-1])
             write_rows(TABLE, [*(row for row in read_rows(TABLE) if row["scene"] != name), *found])
         draw(name)
 

@@ -13,22 +13,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from evidence.reduction.in_time.contact_points import Placed, contact_points
+from evidence.reduction.in_time.contact_points import Placed
 from evidence.reduction.in_time.scenes import (
-    FIVE,
-    GRID,
     SPEED,
     Meshes,
     Scene,
     Solid,
-    foundation,
     gear,
-    joint_rows,
-    nominal_play,
-    placed_gear,
-    touching,
+    placed_planet,
+    points_in_the_middle,
+    scene,
 )
-from evidence.reduction.in_time.transient import Assembly, Joints, Member
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.full_order import Interface
 from gearfmu.reduction.toothed import ring_full_order
@@ -40,25 +35,15 @@ from gearfmu.stagefile.stage import load_stage
 def ring_hammering(meshes: Meshes) -> Scene:
     """The planet's teeth meet those of the ring."""
     stage = load_stage("planetary54")
-    spec, geometry = stage.written, set_geometry(stage.written)
-    mesh, centre = geometry.ring_mesh, np.array([spec.set.center_distance, 0.0])
-    planet = placed_gear(spec.planet, mesh.planet, centre, 0.0, meshes.gear)
-    ring = placed_ring(spec, meshes)
-    play = (mesh.normal_backlash - nominal_play(mesh)) / 2
-    points = contact_points(planet, ring, GRID, {1: play, -1: play})
+    spec = stage.written
+    mesh, planet, ring = set_geometry(spec).ring_mesh, placed_planet(spec, meshes), placed_ring(spec, meshes)
+    points = points_in_the_middle(planet, ring, mesh)
     solids = {
         "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
         "ring": _ring(stage, meshes, points.rows[1]),
     }
-    joints, kinds = _pin(spec, solids)
-    roll = mesh.path["C"]
-    penalty = foundation(stage, roll * (mesh.length + roll) / mesh.length)
-    joints, kinds = touching(joints, kinds, solids, points, penalty)
-    patterns = tuple(np.zeros(solid.full.rows().shape[0]) for solid in solids.values())
-    members = tuple(Member.whole(solid.full) for solid in solids.values())
-    start = (SPEED * np.eye(6)[5], np.zeros(0))
-    assembly = Assembly(members, joints, patterns, lambda time: 0.0, start)
-    return Scene("ring_hammering", solids, assembly, kinds, spec.planet.material, points)
+    roll, start = mesh.path["C"], (SPEED * np.eye(6)[5], np.zeros(0))
+    return scene(spec, solids, start, points, roll * (mesh.length + roll) / mesh.length)
 
 
 def placed_ring(spec: Any, meshes: Meshes) -> Placed:
@@ -74,14 +59,4 @@ def _ring(stage: Stage, meshes: Meshes, flank: sp.csr_array) -> Solid:
     inputs = ring_full_order(stage.by_file["ring"], stage.mounts, meshes.ring)
     labels = tuple(f"n{k}" for k in range(flank.shape[0]))
     full = replace(inputs, interfaces=(*inputs.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
-    return Solid(np.zeros(3), None, (), full, inputs)
-
-
-def _pin(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
-    """The bearing of the planet on a pin that stands."""
-    bearing = spec.planet.bearing
-    stiffness = np.array([bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt])
-    entries = [(n, "planet", solids["planet"].index("bore", component), 1.0) for n, component in enumerate(FIVE)]
-    count = len(FIVE)
-    joints = Joints(joint_rows(solids, entries, count), stiffness, np.zeros(count), np.zeros(count, bool))
-    return joints, np.full(count, "pin")
+    return Solid(full, inputs)

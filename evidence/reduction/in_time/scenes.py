@@ -20,10 +20,11 @@ from evidence.reduction.in_time.transient import Assembly, Joints, Member
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import rotated
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry.mesh import PlanetaryGeometry, contact_modulus, half_width
+from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.stage import load_stage
 
@@ -35,15 +36,9 @@ FIVE = ("ux", "uy", "uz", "rx", "ry")  # what a bearing holds
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A body: elements and couplings in axes of the set about `centre` (3,) m, and the whole body as FullOrder.
+    """A body in axes of the set about its centre. inputs: of a ring, `full` with the interfaces alone by which it is
+    reduced, without the points of its flanks."""
 
-    elements : None of a body that no deck is written of. inputs : of a ring, `full` with the interfaces alone by which
-    it is reduced, without the points of its flanks.
-    """
-
-    centre: np.ndarray
-    elements: Elements | None
-    couplings: tuple[Coupling, ...]
     full: FullOrder
     inputs: FullOrder | None = None
 
@@ -55,13 +50,13 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """solids by name in the order of the assembly's members; kinds (j,) tells pin, bearings and contacts apart."""
+    """solids by name in the order of the assembly's members; kinds (j,) tells pin, bearings and contacts apart; radius
+    (m) on which the bolts stand."""
 
-    name: str
     solids: dict[str, Solid]
     assembly: Assembly
     kinds: np.ndarray
-    material: hex20.Material
+    radius: float
     points: Points | None = None
 
 
@@ -76,50 +71,46 @@ class Meshes:
 
 def carrier_planet(meshes: Meshes) -> Scene:
     """Fig. 3: the carrier is driven, the planet hangs on its pin."""
-    spec = load_stage("planetary54")
-    solids = {
-        "carrier": _carrier(spec, meshes),
-        "planet": gear("planet", _planet(spec, meshes), spec.written.planet.material),
-    }
-    joints, kinds = _supports(spec, solids)
-    at_rest = (np.zeros(6), np.zeros(6))
-    return Scene("carrier_planet", solids, _driven(solids, joints, at_rest), kinds, _steel(spec))
+    stage = load_stage("planetary54")
+    spec = stage.written
+    planet = placed_planet(spec, meshes)
+    solids = {"carrier": _carrier(stage, meshes), "planet": gear("planet", planet, spec.planet.material)}
+    return scene(spec, solids, (np.zeros(6), np.zeros(6)))
 
 
 def hammering(meshes: Meshes) -> Scene:
     """Fig. 4: the planet's teeth meet those of the sun."""
-    spec = load_stage("planetary54")
-    geometry = set_geometry(spec.written)
-    planet, sun = _planet(spec, meshes), _sun(spec, meshes, geometry)
-    mesh = geometry.sun_mesh
-    play = (mesh.normal_backlash - nominal_play(mesh)) / 2
-    points = contact_points(planet, sun, GRID, {1: play, -1: play})
+    stage = load_stage("planetary54")
+    spec = stage.written
+    mesh, planet = set_geometry(spec).sun_mesh, placed_planet(spec, meshes)
+    # the tooth or space that the planet shows the sun meets a space or tooth
+    angle = 0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth
+    sun = placed_gear(spec.sun, mesh.gears[0], np.zeros(2), angle, meshes.gear)
+    points = points_in_the_middle(planet, sun, mesh)
     solids = {
-        "carrier": _carrier(spec, meshes),
-        "planet": gear("planet", planet, spec.written.planet.material, points.rows[0]),
-        "sun": gear("sun", sun, spec.written.sun.material, points.rows[1]),
+        "carrier": _carrier(stage, meshes),
+        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
+        "sun": gear("sun", sun, spec.sun.material, points.rows[1]),
     }
+    roll, turning = mesh.path["C"], SPEED * np.eye(6)[5]
+    start = (turning, turning + SPEED * spec.set.center_distance * np.eye(6)[1], np.zeros(6))
+    return scene(spec, solids, start, points, roll * (mesh.length - roll) / mesh.length)
+
+
+def scene(
+    spec: Any, solids: dict[str, Solid], start: tuple[np.ndarray, ...], points: Points | None = None, curve: float = 0.0
+) -> Scene:
+    """All bodies unreduced on their supports, TORQUE on the bore of a carrier. curve: relative radius of curvature (m)
+    of the teeth that touch at the points."""
     joints, kinds = _supports(spec, solids)
-    roll = mesh.path["C"]
-    penalty = foundation(spec, roll * (mesh.length - roll) / mesh.length)
-    joints, kinds = touching(joints, kinds, solids, points, penalty)
-    turning, a = SPEED * np.eye(6)[5], spec.written.set.center_distance
-    start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
-    return Scene("hammering", solids, _driven(solids, joints, start), kinds, _steel(spec), points)
-
-
-def _driven(solids: dict[str, Solid], joints: Joints, start: tuple[np.ndarray, ...]) -> Assembly:
-    """All bodies unreduced, TORQUE on the carrier's bore."""
+    if points:
+        joints, kinds = touching(joints, kinds, solids, points, foundation(spec, curve))
     patterns = {name: np.zeros(solid.full.rows().shape[0]) for name, solid in solids.items()}
-    patterns["carrier"][solids["carrier"].index("bore", "rz")] = TORQUE
+    if "carrier" in solids:
+        patterns["carrier"][solids["carrier"].index("bore", "rz")] = TORQUE
     members = tuple(Member.whole(solid.full) for solid in solids.values())
-    return Assembly(members, joints, tuple(patterns.values()), _ramp, start)
-
-
-def _steel(spec: Any) -> hex20.Material:
-    """The one material of all bodies."""
-    assert spec.written.carrier.material == spec.written.planet.material == spec.written.sun.material
-    return spec.written.carrier.material
+    assembly = Assembly(members, joints, tuple(patterns.values()), _ramp, start)
+    return Scene(solids, assembly, kinds, spec.set.center_distance, points)
 
 
 def _ramp(time: float) -> float:
@@ -127,24 +118,22 @@ def _ramp(time: float) -> float:
     return 0.5 * (1 - math.cos(math.pi * min(time / RAMP, 1.0)))
 
 
-def _carrier(spec: Any, meshes: Meshes) -> Solid:
-    carrier = spec.by_file["carrier"]
+def _carrier(stage: Stage, meshes: Meshes) -> Solid:
+    carrier = stage.by_file["carrier"]
     elements, couplings = carrier_elements(carrier, scaled_sector(carrier, meshes.carrier))
-    full = full_order("carrier", elements, couplings, ("bore",), spec.written.set.center_distance)
-    return Solid(np.zeros(3), elements, tuple(couplings), full)
+    return Solid(full_order("carrier", elements, couplings, ("bore",), stage.written.set.center_distance))
 
 
-def _planet(spec: Any, meshes: Meshes) -> Placed:
+def placed_planet(spec: Any, meshes: Meshes) -> Placed:
     """The planet of bolt 0, tooth 0 on +x."""
-    geometry = set_geometry(spec.written)
-    centre = np.array([spec.written.set.center_distance, 0.0])
-    return placed_gear(spec.written.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
+    centre = np.array([spec.set.center_distance, 0.0])
+    return placed_gear(spec.planet, set_geometry(spec).sun_mesh.gears[1], centre, 0.0, meshes.gear)
 
 
-def _sun(spec: Any, meshes: Meshes, geometry: PlanetaryGeometry) -> Placed:
-    """The sun, turned so that the tooth or space that the planet shows it meets a space or tooth."""
-    angle = 0.0 if spec.written.planet.teeth % 2 else np.pi / spec.written.sun.teeth
-    return placed_gear(spec.written.sun, geometry.sun_mesh.gears[0], np.zeros(2), angle, meshes.gear)
+def points_in_the_middle(planet: Placed, other: Placed, mesh: Any) -> Points:
+    """Contact points of two gears whose teeth stand in the middle of their backlash."""
+    play = (mesh.normal_backlash - mesh.nominal_backlash * np.cos(mesh.alpha_wt)) / 2
+    return contact_points(planet, other, GRID, {1: play, -1: play})
 
 
 def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scale: float) -> Placed:
@@ -164,31 +153,28 @@ def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_arra
     if flank is not None:
         labels = tuple(f"n{k}" for k in range(flank.shape[0]))
         full = replace(full, interfaces=(*full.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
-    return Solid(np.array([*placed.centre, 0.0]), elements, (bore,), full)
+    return Solid(full)
 
 
 def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
-    """Pin of the planet on bolt 0, bearings of carrier and sun on the ground: stiffness as in the stage file."""
+    """Pin of the planet on bolt 0, which stands where there is no carrier, bearings of carrier and sun on the ground:
+    stiffness as in the stage file."""
     ends = {
-        "pin": (spec.written.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
-        "carrier bearing": (spec.written.carrier.bearing, (("carrier", "bore", 1.0),)),
-        "sun bearing": (spec.written.sun.bearing, (("sun", "bore", 1.0),)),
+        "pin": (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
+        "carrier bearing": (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
+        "sun bearing": (spec.sun.bearing, (("sun", "bore", 1.0),)),
     }
     stiffness, kinds, entries = [], [], []
     for kind, (bearing, sides) in ends.items():
-        if sides[0][0] not in solids:
-            continue
-        for component, k in zip(FIVE, _five(bearing), strict=True):
-            entries += [(len(kinds), name, solids[name].index(at, component), sign) for name, at, sign in sides]
+        there = [side for side in sides if side[0] in solids]
+        five = (bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt)
+        for component, k in zip(FIVE, five if there else (), strict=bool(there)):
+            entries += [(len(kinds), name, solids[name].index(at, component), sign) for name, at, sign in there]
             stiffness.append(k)
             kinds.append(kind)
     count = len(kinds)
     joints = Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
     return joints, np.array(kinds)
-
-
-def _five(bearing: Any) -> tuple[float, ...]:
-    return (bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt)
 
 
 def joint_rows(
@@ -224,19 +210,10 @@ def touching(
     )
 
 
-def nominal_play(mesh: Any) -> float:
-    """Gap (m) along the normal of one flank of the nominal teeth while the other one touches."""
-    return mesh.nominal_backlash * np.cos(mesh.alpha_wt)
-
-
 def foundation(spec: Any, radius: float) -> float:
     """N/m³, 3π E*/(8 b): an elastic foundation with Hertz's half-width b under TORQUE (theory, eq. 8j), for a relative
     radius of curvature (m)."""
-    a, b = spec.written.sun.material, spec.written.planet.material
+    a, b = spec.sun.material, spec.planet.material
     modulus = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
-    force = (
-        TORQUE
-        / (1 + spec.written.ring.teeth / spec.written.sun.teeth)
-        / set_geometry(spec.written).sun_mesh.gears[0].r_b
-    )
-    return 3 * np.pi * modulus / (8 * half_width(force / spec.written.planet.face_width, radius, modulus))
+    force = TORQUE / (1 + spec.ring.teeth / spec.sun.teeth) / set_geometry(spec).sun_mesh.gears[0].r_b
+    return 3 * np.pi * modulus / (8 * half_width(force / spec.planet.face_width, radius, modulus))

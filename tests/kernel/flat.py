@@ -1,10 +1,10 @@
-"""Two elastic bodies in a flat contact of constant stiffness, as a model of the kernel and as its exact motion."""
+"""Two elastic bodies in a flat contact of constant stiffness, as a model of the kernel."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -139,70 +139,3 @@ def _flat_numbers(local: float) -> np.ndarray:
             "helix": 0.0,
         }
     )
-
-
-def _body(mass: float, frequency: tuple[float, ...], rows: tuple[tuple[float, ...], ...]) -> FlatBody:
-    omega = 2 * np.pi * np.array(frequency)
-    return FlatBody(mass, omega, np.zeros(omega.size), np.array(rows), np.diag([4e-8, 1.5e-8]))
-
-
-@dataclass(frozen=True)
-class FlatPair:
-    """Left body thrown with `speed` (m/s) against the right one at rest; contact 1 m wide in an even number of slices,
-    with width functions P0 and P2."""
-
-    left: FlatBody = field(default_factory=lambda: _body(0.8, (1.9e3,), ((0.5,), (0.3,))))
-    right: FlatBody = field(default_factory=lambda: _body(1.7, (3.0e3,), ((0.6,), (-0.3,))))
-    slices: int = 2
-    speed: float = 0.2
-
-    @property
-    def bodies(self) -> tuple[FlatBody, FlatBody]:
-        return self.left, self.right
-
-    def blob(self) -> bytes:
-        """The model that the kernel runs."""
-        return flat_blob("flat_pair", self.bodies, FlatContact(slices=self.slices, degrees=(0, 2)))
-
-
-def contact_rows(pair: FlatPair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """rows (slices, n) of the gaps by mass-normalised coordinate (each body's rigid motion first), compliance
-    (slices, slices) m/N, ω (n,)."""
-    edges = np.linspace(-1, 1, pair.slices + 1)
-    second = np.diff(0.5 * (edges**3 - edges)) / np.diff(edges)  # mean of P2 over each slice
-    weights = np.stack([np.ones(pair.slices), 5 * second], axis=1)
-    parts: list[np.ndarray] = []
-    omega: list[np.ndarray] = []
-    compliance = np.zeros((pair.slices, pair.slices))
-    for body, direction in zip(pair.bodies, (-1, 1), strict=True):
-        parts += [np.full((pair.slices, 1), direction / np.sqrt(body.mass)), -weights @ body.rows]
-        omega += [np.zeros(1), body.omega]
-        compliance += weights @ body.residual @ weights.T
-    return np.hstack(parts), compliance, np.concatenate(omega)
-
-
-def contact_frequencies(pair: FlatPair) -> np.ndarray:
-    """Angular frequencies (k,), rad/s, of the two bodies while they are in contact: eigenvalues of Ω² + WᵀC⁻¹W, their
-    common rigid motion left out."""
-    rows, springs, omega = _linear(pair)
-    square = np.linalg.eigvalsh(np.diag(omega**2) + rows.T @ springs @ rows)
-    return np.sqrt(square[square > 1e-9 * square.max()])
-
-
-def exact_force(pair: FlatPair, time: np.ndarray) -> np.ndarray:
-    """Contact force (t,) N at `time` (t,) while the contact that closes at time 0 stays closed."""
-    rows, springs, omega = _linear(pair)
-    square, shape = np.linalg.eigh(np.diag(omega**2) + rows.T @ springs @ rows)
-    v0 = np.zeros(omega.size)
-    v0[0] = pair.speed * np.sqrt(pair.left.mass)
-    root = np.sqrt(np.maximum(square, 0.0))
-    part = np.where(root > 1.0, np.sin(np.outer(time, root)) / np.maximum(root, 1.0), time[:, None])
-    q = (part * (shape.T @ v0)) @ shape.T
-    return -(q @ rows.T @ springs).sum(axis=1)
-
-
-def _linear(pair: FlatPair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """rows, stiffness of the contact, ω. Slices that mirror each other are one contact: the inverse is that of the
-    symmetric part."""
-    rows, compliance, omega = contact_rows(pair)
-    return rows, np.linalg.pinv(compliance), omega

@@ -1,5 +1,6 @@
 """Light-load rattle of a pair between springs: the pinion's shaft end swings while it turns, the teeth part for a good
-part of the time. Statistics of such a run, which repeat where the motion itself is chaotic."""
+part of the time, or hit the coast flanks too. Statistics of such a run, which repeat where the motion itself is
+chaotic."""
 
 from __future__ import annotations
 
@@ -14,22 +15,27 @@ from gearfmu.stage.run.simulate import Wound
 
 STEP = 60e-6  # s, communication step
 SETTLE = 0.05  # s
+# of what a step may change: the share of the time as a difference, others relative
+LIMITS = {"open_share": 0.01, "force_rms": 0.015, "te_std": 0.005, "impulse": 0.005}
 
 
 @dataclass(frozen=True)
 class LightRattle:
-    """speed of the pinion, rad/s; torque: mean, N·m; swing: amplitude of the pinion's shaft end, rad; frequency, Hz;
-    phase of the swing at the start, rad: another phase is another start."""
+    """torque: mean, N·m; swing: amplitude of the pinion's shaft end, rad; speed of the pinion, rad/s; its
+    frequency (Hz) and phase (rad)."""
 
+    torque: float
+    swing: float
     speed: float = 2000 * math.pi / 30
-    torque: float = 8.0
-    swing: float = 2.75e-3
     frequency: float = 127.0
-    phase: float = 0.0
+    phase: float = math.pi / 2 + 0.3
 
     def inputs(self, model: StageModel) -> Wound:
         """Steady drive plus the swing, with speed and acceleration."""
         return _Swinging(Steady(model, self.speed, self.torque), self)
+
+
+SCENES = {"one flank": LightRattle(8.0, 2.75e-3), "both flanks": LightRattle(9.0, 4e-3)}
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,7 @@ def run(model: StageModel, scene: LightRattle, duration: float, parameters: Mapp
 
 def statistics(trace: Trace) -> dict[str, float]:
     """After settling: open_share of the time, rms of the mesh force (means over STEP, N), std of the transmission error
-    (m), impulse a second (mean of the force's magnitude, N), share of the time on the coast flanks, impacts a
-    second."""
+    (m), impulse a second (mean of the force's magnitude, N)."""
     settled = trace.time > SETTLE
     seconds = trace.time[-1] - SETTLE
     force, before = trace["mesh.force_mean"][settled], np.flatnonzero(~settled)[-1]
@@ -68,6 +73,10 @@ def statistics(trace: Trace) -> dict[str, float]:
         "force_rms": float(np.sqrt(np.mean(force**2))),
         "te_std": float(np.std(trace["mesh.te"][settled])),
         "impulse": float(np.mean(np.abs(force))),
-        "coast_share": float(np.mean(force < -1.0)),
-        "impacts": float(trace["mesh.impacts"][-1] - trace["mesh.impacts"][before]) / seconds,
     }
+
+
+def missed(found: dict[str, float], wanted: dict[str, float]) -> list[str]:
+    """Names of the statistics that are not within LIMITS."""
+    scale = wanted | {"open_share": 1.0}
+    return [name for name, most in LIMITS.items() if abs(found[name] - wanted[name]) > most * scale[name]]
