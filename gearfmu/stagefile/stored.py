@@ -17,7 +17,7 @@ from gearfmu.stagefile.reading.base import Spec, validate
 from gearfmu.stagefile.stage import stage_class
 from gearfmu.stagefile.tables.bodies import TOOTHING
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.imported import FILES, import_inputs
+from gearfmu.stagefile.tables.imported import import_inputs, named_files
 
 FREE = ("description", "ports")  # fields in which two exports of one stage may differ
 
@@ -26,7 +26,7 @@ def stored(spec: Spec) -> dict[str, Any]:
     """The fields of a stage, or of what is written in its file, for JSON, SI, without `source`; files by their names
     without folders."""
     tables = spec.model_dump(mode="json", exclude={"source"})
-    for table, key, _ in _files(tables):
+    for table, key, _ in named_files(tables):
         table[key] = Path(table[key]).name
     return tables
 
@@ -35,7 +35,7 @@ def stored_files(spec: Spec) -> dict[str, str]:
     """SHA-256, hex, of every file that a stage names, by its field ("gears.0.topography"). SpecError for one that
     cannot be read."""
     found = {}
-    for table, key, field in _files(spec.model_dump(mode="json", exclude={"source"})):
+    for table, key, field in named_files(spec.model_dump(mode="json", exclude={"source"})):
         try:
             found[field] = hashlib.sha256(Path(table[key]).read_bytes()).hexdigest()
         except OSError as error:
@@ -74,18 +74,6 @@ def _differences(one: Any, other: Any, field: str) -> Iterator[tuple[str, str, s
 def _shown(value: Any) -> str:
     text = "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
     return text if len(text) <= 60 else f"{text[:57]}…"
-
-
-def _files(tables: Any, field: str = "") -> Iterator[tuple[dict[str, Any], str, str]]:
-    """(table, key, field) of every name of a file."""
-    for key, value in tables.items() if isinstance(tables, dict) else enumerate(tables):
-        place = f"{field}.{key}" if field else str(key)
-        if key in ("imported", "reduced") and isinstance(value, dict):
-            yield from ((value, name, f"{place}.{name}") for name in FILES if value.get(name))
-        elif key == "topography" and value:
-            yield tables, "topography", place
-        elif isinstance(value, (dict, list)):
-            yield from _files(value, place)
 
 
 ALGORITHMS = {"gear": 3, "ring": 3, "carrier": 3, "housing": 3}  # raised when the numbers of such bodies change
