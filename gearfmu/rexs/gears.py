@@ -99,8 +99,6 @@ def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> Non
     diameters."""
     draft.put(f"{place}.teeth", gear.teeth, gear.origin)
     draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
-    for part in ("tip_relief", "lead", "index_deviation", "import"):
-        draft.drop(f"{place}.{part}")
     put_proportions(draft, place, gear.module, gear.face_width)
     draft.assume(f"{place}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
     _put_material(model, draft, place, gear.component)

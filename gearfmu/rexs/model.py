@@ -24,6 +24,11 @@ class Attribute:
     unit: str
     read: bool = False
 
+    @property
+    def shown(self) -> str:
+        """As stage files have it."""
+        return f"{self.text} {_SPELLINGS.get(self.unit, self.unit)}".strip()
+
 
 @dataclass
 class Component:
@@ -41,15 +46,10 @@ class Component:
 
 @dataclass(frozen=True)
 class Relation:
-    """Components that belong together: role → identifier."""
+    """Components that belong together, by their identifiers."""
 
     type: str
-    roles: tuple[tuple[str, str], ...]
-
-    @property
-    def members(self) -> tuple[str, ...]:
-        """Identifiers of all of them."""
-        return tuple(member for _, member in self.roles)
+    members: tuple[str, ...]
 
 
 @dataclass
@@ -80,33 +80,18 @@ class RexsModel:
     def quantity(self, component: Component, name: str, unit: str) -> str | None:
         """The attribute as text for a stage file ("4.5 mm"), which must have the dimension of the SI unit `unit`."""
         attribute = component.attributes.get(name)
-        return None if attribute is None else self._with_unit(component, attribute, unit)
+        return attribute.shown if attribute and self._value(component, attribute, unit) is not None else None
 
     def si(self, component: Component, name: str, unit: str) -> float | None:
         """The attribute in the SI unit `unit`; without one a plain number."""
-        if not unit:
-            return self._number(component, name)
-        text = self.quantity(component, name, unit)
-        return None if text is None else to_si(text, unit)
+        attribute = component.attributes.get(name)
+        return None if attribute is None else self._value(component, attribute, unit)
 
     def largest(self, component: Component, name: str, unit: str) -> float | None:
         """Its largest magnitude over the component itself and all load cases, SI."""
         places = [component.attributes, *component.cases]
-        texts = [self._with_unit(component, place[name], unit) for place in places if name in place]
-        return max((abs(to_si(text, unit)) for text in texts if text is not None), default=None)
-
-    def _number(self, component: Component, name: str) -> float | None:
-        attribute = component.attributes.get(name)
-        if attribute is None:
-            return None
-        attribute.read = True
-        if attribute.unit not in ("", "none"):
-            self._refuse(component, attribute, "a plain number has no unit")
-        try:
-            return float(attribute.text)
-        except ValueError:
-            self._refuse(component, attribute, "not a number")
-            return None
+        values = [self._value(component, place[name], unit) for place in places if name in place]
+        return max((abs(value) for value in values if value is not None), default=None)
 
     def unread(self) -> Iterator[tuple[Component, Attribute]]:
         """What nobody has asked for."""
@@ -114,18 +99,18 @@ class RexsModel:
             for place in (component.attributes, *component.cases):
                 yield from ((component, attribute) for attribute in place.values() if not attribute.read)
 
-    def _with_unit(self, component: Component, attribute: Attribute, unit: str) -> str | None:
+    def _value(self, component: Component, attribute: Attribute, unit: str) -> float | None:
         attribute.read = True
-        text = f"{attribute.text} {_SPELLINGS.get(attribute.unit, attribute.unit)}".strip()
+        shown = f"{attribute.text} {attribute.unit}".strip()
+        if not unit and attribute.unit not in ("", "none"):
+            self.refuse(component, attribute.id, shown, "a plain number has no unit")
         try:
-            to_si(text, unit)
+            return to_si(attribute.shown, unit) if unit else float(attribute.text)
         except UnitError as error:
-            self._refuse(component, attribute, str(error))
-            return None
-        return text
-
-    def _refuse(self, component: Component, attribute: Attribute, why: str) -> None:
-        self.refuse(component, attribute.id, f"{attribute.text} {attribute.unit}".strip(), why)
+            self.refuse(component, attribute.id, shown, str(error))
+        except ValueError:
+            self.refuse(component, attribute.id, shown, "not a number")
+        return None
 
     def refuse(self, component: Component, name: str, shown: str, remedy: str) -> None:
         """Adds a problem of a component's attribute, once."""

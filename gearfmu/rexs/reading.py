@@ -20,7 +20,6 @@ from gearfmu.rexs.model import Attribute, Component, Relation, RexsModel
 _ENDINGS = (".rexs", ".xml", ".rexsj", ".json")
 _LARGEST = 256 * 2**20  # bytes; gear units are below one hundredth of that
 _NO_VALUES = ("id", "unit")  # keys of an attribute in JSON
-Cases = list[tuple[str, dict[str, Attribute]]]  # component and what a load case says about it
 
 
 def read_rexs(path: Path) -> RexsModel:
@@ -28,14 +27,7 @@ def read_rexs(path: Path) -> RexsModel:
     .zip). SpecError when it is none."""
     content = _bytes(path)
     is_json = content.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
-    version, components, relations, cases = (_from_json if is_json else _from_xml)(path, content)
-    known = {component.id: component for component in components}
-    if len(known) < len(components):
-        raise SpecError.of(path, "", "", "two components have the same id")
-    for identifier, attributes in cases:
-        if identifier in known:
-            known[identifier].cases.append(attributes)
-    return RexsModel(path, version, known, relations)
+    return _from_json(path, content) if is_json else _model(path, _xml_tables(path, content))
 
 
 def _bytes(path: Path) -> bytes:
@@ -51,71 +43,77 @@ def _bytes(path: Path) -> bytes:
         raise SpecError.of(path, "", "", f"the file cannot be read ({error.strerror}): check the path") from error
 
 
-def _known_version(path: Path, version: str) -> str:
-    if version.split(".")[0] != "1":
-        raise SpecError.of(path, "", "", f"REXS version {version}: versions 1.0 to 1.7 are read")
-    return version
+def _from_json(path: Path, content: bytes) -> RexsModel:
+    try:
+        return _model(path, json.loads(content.decode("utf-8-sig"), parse_float=str)["model"])
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise SpecError.of(path, "", "", f"no valid JSON ({error})") from error
+    except (KeyError, TypeError, AttributeError) as error:
+        remedy = 'not of the form {"model": {"version": …, "relations": […], "components": […]}} of REXS in JSON'
+        raise SpecError.of(path, "", "", f"{remedy} ({type(error).__name__}: {error})") from error
 
 
-def _from_xml(path: Path, content: bytes) -> tuple[str, list[Component], tuple[Relation, ...], Cases]:
+def _xml_tables(path: Path, content: bytes) -> dict[str, Any]:
+    """The tables that the file would have in JSON."""
     try:
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
         raise SpecError.of(path, "", "", f"neither JSON nor well-formed XML ({error})") from error
     if root.tag != "model" or not root.get("version"):
         raise SpecError.of(path, "", "", "the root element of a REXS file is <model version=…>")
-    version = _known_version(path, root.get("version", ""))
-    components = [
-        Component(element.get("id", ""), element.get("type", ""), element.get("name", ""), _xml_attributes(element))
-        for element in root.iterfind("components/component")
+
+    def components(place: str) -> list[dict[str, Any]]:
+        return [
+            {"id": "", "type": ""}
+            | entry.attrib
+            | {"attributes": [_xml_attribute(a) for a in entry.iterfind("attribute")]}
+            for entry in root.iterfind(place)
+        ]
+
+    relations = [
+        {"type": relation.get("type", ""), "refs": [{"id": ref.get("id", "")} for ref in relation.iterfind("ref")]}
+        for relation in root.iterfind("relations/relation")
     ]
-    relations = tuple(
-        Relation(
-            element.get("type", ""), tuple((ref.get("role", ""), ref.get("id", "")) for ref in element.iterfind("ref"))
-        )
-        for element in root.iterfind("relations/relation")
-    )
     places = ("load_spectrum/load_case/components/component", "load_spectrum/load_case/component")
-    cases = [(element.get("id", ""), _xml_attributes(element)) for place in places for element in root.iterfind(place)]
-    return version, components, relations, cases
+    return {
+        "version": root.get("version"),
+        "components": components("components/component"),
+        "relations": relations,
+        "load_spectrum": {"load_cases": [{"components": components(place)} for place in places]},
+    }
 
 
-def _xml_attributes(element: ElementTree.Element) -> dict[str, Attribute]:
-    found = {}
-    for entry in element.iterfind("attribute"):
-        name, text = entry.get("id", ""), (entry.text or "").strip()
-        if len(entry):  # an array, a matrix or coded values
-            text = " ".join(part.strip() for part in entry.itertext() if part.strip())
-        found[name] = Attribute(name, text, entry.get("unit", ""))
-    return found
+def _xml_attribute(entry: ElementTree.Element) -> dict[str, Any]:
+    text = (entry.text or "").strip()
+    if len(entry):  # an array, a matrix or coded values
+        text = " ".join(part.strip() for part in entry.itertext() if part.strip())
+    return {"id": entry.get("id", ""), "unit": entry.get("unit", ""), "string": text}
 
 
-def _from_json(path: Path, content: bytes) -> tuple[str, list[Component], tuple[Relation, ...], Cases]:
-    try:
-        model = json.loads(content.decode("utf-8-sig"), parse_float=str)["model"]
-        version = _known_version(path, model["version"])
-        components = [
-            Component(str(entry["id"]), entry["type"], entry.get("name", ""), _json_attributes(entry))
-            for entry in model["components"]
-        ]
-        relations = tuple(
-            Relation(entry["type"], tuple((ref["role"], str(ref["id"])) for ref in entry["refs"]))
-            for entry in model["relations"]
-        )
-        cases = [
-            (str(entry["id"]), _json_attributes(entry))
-            for case in (model.get("load_spectrum") or {}).get("load_cases", [])
-            for entry in case["components"]
-        ]
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise SpecError.of(path, "", "", f"no valid JSON ({error})") from error
-    except (KeyError, TypeError, AttributeError) as error:
-        remedy = 'not of the form {"model": {"version": …, "relations": […], "components": […]}} of REXS in JSON'
-        raise SpecError.of(path, "", "", f"{remedy} ({type(error).__name__}: {error})") from error
-    return version, components, relations, cases
+def _model(path: Path, tables: dict[str, Any]) -> RexsModel:
+    """The model of the tables of a file. KeyError, TypeError and AttributeError for those of something else."""
+    version = tables["version"]
+    if version.split(".")[0] != "1":
+        raise SpecError.of(path, "", "", f"REXS version {version}: versions 1.0 to 1.7 are read")
+    components = [
+        Component(str(entry["id"]), entry["type"], entry.get("name", ""), _attributes(entry))
+        for entry in tables["components"]
+    ]
+    known = {component.id: component for component in components}
+    relations = tuple(
+        Relation(entry["type"], tuple(str(ref["id"]) for ref in entry["refs"])) for entry in tables["relations"]
+    )
+    for case in (tables.get("load_spectrum") or {}).get("load_cases", []):
+        for entry in case["components"]:
+            if str(entry["id"]) in known:
+                known[str(entry["id"])].cases.append(_attributes(entry))
+    if len(known) < len(components):
+        raise SpecError.of(path, "", "", "two components have the same id")
+    return RexsModel(path, version, known, relations)
 
 
-def _json_attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+    """Of a component, by their ids."""
     found = {}
     for attribute in entry.get("attributes") or []:
         values = [value for key, value in attribute.items() if key not in _NO_VALUES]

@@ -47,6 +47,15 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class Neglected:
+    """A term of the floating frame that is left out: what it is, its size as a formula, why it may be left out."""
+
+    name: str
+    formula: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Cost:
     """Instructions of an internal step: effect on, off, and in a build without its code (nan: no such build)."""
 
@@ -82,7 +91,9 @@ def _effect(name: str, told: dict[str, Any]) -> Effect:
     return Effect(**usual | told, name=name)
 
 
-EFFECTS = tuple(_effect(*entry) for entry in read_toml(Path(__file__).with_name("effects.toml")).items())
+_TABLES = read_toml(Path(__file__).with_name("effects.toml"))
+NEGLECTED = tuple(Neglected(**term) for term in _TABLES.pop("neglected"))
+EFFECTS = tuple(_effect(*entry) for entry in _TABLES.items())
 
 
 def costs() -> dict[str, Cost]:

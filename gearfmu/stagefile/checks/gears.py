@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import reduce
 from itertools import accumulate
+from typing import Any
 
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
@@ -137,20 +139,17 @@ def _flank_problems(gear: ToothedBody, shape: GearShape) -> Found:
         yield "lead.end_relief.length", gear.lead.end_relief.length, remedy
 
 
+_AMOUNTS = (
+    "tip_relief.amount root_relief.amount profile.slope profile.crowning lead.slope lead.crowning "
+    "lead.end_relief.amount eccentricity.amount"
+).split()
+
+
 def _amounts(gear: ToothedBody, shape: GearShape) -> Found:
     """Lengths that a module bounds."""
     most = _LARGEST * shape.m
-    given = {
-        "tip_relief.amount": gear.tip_relief and gear.tip_relief.amount,
-        "root_relief.amount": gear.root_relief and gear.root_relief.amount,
-        "profile.slope": gear.profile and gear.profile.slope,
-        "profile.crowning": gear.profile and gear.profile.crowning,
-        "lead.slope": gear.lead and gear.lead.slope,
-        "lead.crowning": gear.lead and gear.lead.crowning,
-        "lead.end_relief.amount": gear.lead and gear.lead.end_relief and gear.lead.end_relief.amount,
-        "eccentricity.amount": gear.eccentricity and gear.eccentricity.amount,
-    }
-    for field, value in given.items():
+    for field in _AMOUNTS:
+        value: Any = reduce(lambda table, key: table and getattr(table, key), field.split("."), gear)
         if value and abs(value) > most:
             yield field, value, f"more than a tenth of the module: at most {millimetres(most)}"
 

@@ -88,7 +88,10 @@ class Draft:
 
 
 def put_proportions(draft: Draft, gear: str, module: float, width: float) -> None:
-    """Tip edge and element count across the face of a gear of this module and face width (m)."""
+    """Tip edge and element count across the face of a gear of this module and face width (m), whose flanks are
+    nominal and whose body is meshed here."""
+    for part in ("tip_relief", "lead", "index_deviation", "import"):
+        draft.drop(f"{gear}.{part}")
     draft.assume(f"{gear}.tip_edge_radius", millimetres(TIP_EDGE_PER_MODULE * module), "0.05 m_n")
     across = max(draft.at(f"{gear}.body.mesh")["width"], round(width / (_ELEMENT_WIDTH * module)))
     draft.assume(f"{gear}.body.mesh.width", across, "elements of at most 1.25 m_n")

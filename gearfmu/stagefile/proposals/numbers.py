@@ -162,8 +162,6 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
     for gear in gears:
         draft.put(f"{gear}.face_width", millimetres(wish.width or 0.0), GIVEN)
         put_proportions(draft, gear, rack.m, wish.width or 0.0)
-        for part in ("tip_relief", "lead"):
-            draft.drop(f"{gear}.{part}")
     return draft
 
 

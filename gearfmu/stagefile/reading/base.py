@@ -63,21 +63,26 @@ SpecType = TypeVar("SpecType", bound=Spec)
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """Annotation of a float field: the name of its range (`gearfmu.quantities`), which says unit and limits, and words
-    that may replace a number.
-
-    `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
-    plain number.
-    """
+class _Ranged:
+    """Annotation of a field: the name of its range (`gearfmu.quantities`)."""
 
     name: str
-    words: tuple[str, ...] = ()
 
     @property
     def range(self) -> Range:
         """Limits, SI unit and remedy."""
         return range_of(self.name)
+
+
+@dataclass(frozen=True)
+class Quantity(_Ranged):
+    """Annotation of a float field, whose range says unit and limits, and words that may replace a number.
+
+    `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
+    plain number.
+    """
+
+    words: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
@@ -122,15 +127,8 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Whole:
-    """Annotation of an integer field: the name of its range (`gearfmu.quantities`)."""
-
-    name: str
-
-    @property
-    def range(self) -> Range:
-        """Limits and remedy."""
-        return range_of(self.name)
+class Whole(_Ranged):
+    """Annotation of an integer field."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         return core_schema.no_info_after_validator_function(self._checked, handler(source))
