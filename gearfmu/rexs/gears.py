@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 from gearfmu.geometry.shifts import sum_of_shifts
-from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres, put_proportions
+from gearfmu.rexs.reading import Component, RexsModel
+from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
@@ -99,7 +99,7 @@ def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> Non
     diameters."""
     draft.put(f"{place}.teeth", gear.teeth, gear.origin)
     draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
-    put_proportions(draft, place, gear.module, gear.face_width)
+    draft.put_proportions(place, gear.module, gear.face_width)
     draft.assume(f"{place}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
     _put_material(model, draft, place, gear.component)
 

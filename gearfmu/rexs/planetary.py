@@ -20,10 +20,10 @@ from gearfmu.rexs.gears import (
     shaft_speed,
     shaft_torque,
 )
-from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import assumed_torque, put_rack_data
+from gearfmu.rexs.reading import Component, RexsModel
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres, put_limit
+from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
@@ -227,7 +227,7 @@ def _put_loads(
     sharing = draft.at("set.load_sharing")
     known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
     assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
-    put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
+    draft.put_limit("torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
     known = (speed and rounded_up(speed / ratio, 4), "REXS shaft of the sun, over 1 + z_ring/z_sun")
     assumed = PITCH_SPEED / sun.reference_radius / ratio
-    put_limit(draft, "speed_max", known, (assumed, "20 m/s at the sun's reference circle"))
+    draft.put_limit("speed_max", known, (assumed, "20 m/s at the sun's reference circle"))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
@@ -26,7 +26,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError, near_or_all
-from gearfmu.quantities import Range, range_of, to_si
+from gearfmu.quantities import Range, quantity_text, range_of, to_si
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -313,3 +313,29 @@ def _inner_models(annotation: Any) -> list[type[BaseModel]]:
 def _shown(value: Any) -> str:
     text = f'"{value}"' if isinstance(value, str) else str(value)
     return text if len(text) <= 60 else f"{text[:57]}…"
+
+
+def shown(spec: BaseModel) -> dict[str, Any]:
+    """The fields of a spec as a person reads it: quantities as text with their units, in those of the drawing office;
+    parts that have names under them. What is not given is left out."""
+    found = {}
+    for name, field in type(spec).model_fields.items():
+        value = getattr(spec, name)
+        quantity = quantity_of(field)
+        if value is not None:
+            found[name] = _as_read(value, quantity.unit if quantity else "")
+    return found
+
+
+def _as_read(value: Any, unit: str) -> Any:
+    if isinstance(value, BaseModel):
+        return shown(value)
+    if isinstance(value, Mapping):
+        return {str(key): _as_read(item, unit) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        if value and all(isinstance(item, BaseModel) and hasattr(item, "name") for item in value):
+            return {item.name: _as_read(item, unit) for item in value}
+        return [_as_read(item, unit) for item in value]
+    if unit and isinstance(value, float):
+        return quantity_text(value, unit)
+    return value
