@@ -224,14 +224,11 @@ def _put_bearing(model: RexsModel, draft: Draft, place: str, component: Componen
             draft.put(f"{place}.tilt", f"{tilt:.6g} N*m/rad", origin)
 
 
-def shaft_torque(model: RexsModel, component: Component) -> float | None:
-    """Largest torque (N·m) that an external load brings into the shaft of a gear, over all load cases."""
+def shaft_loads(model: RexsModel, component: Component) -> tuple[float | None, float | None]:
+    """Largest torque (N·m) that an external load brings into the shaft of a gear, and largest speed (rad/s) of that
+    shaft, over all load cases."""
     shafts = model.related(component, "shaft", relation="assembly")
     loads = [load for shaft in shafts for load in model.related(shaft, "external_load")]
-    return max((m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))), default=None)
-
-
-def shaft_speed(model: RexsModel, component: Component) -> float | None:
-    """Largest speed (rad/s) of the shaft of a gear, over all load cases."""
-    shafts = model.related(component, "shaft", relation="assembly")
-    return max((v for s in shafts if (v := model.largest(s, "rotational_speed", "rad/s"))), default=None)
+    torques = [m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))]
+    speeds = [v for shaft in shafts if (v := model.largest(shaft, "rotational_speed", "rad/s"))]
+    return max(torques, default=None), max(speeds, default=None)

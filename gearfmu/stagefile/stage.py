@@ -228,18 +228,15 @@ def _mounts(spec: PlanetarySpec) -> Found:
 def _carrier(spec: PlanetarySpec) -> Found:
     g, carrier = carrier_geometry(set_carrier(spec)), spec.carrier
     half = g.a * math.sin(least_apart(g.angles) / 2)
-    if 2 * g.r_bolt >= spec.planet.bore_diameter:
-        remedy = f"does not fit the planet's bore: less than {millimetres(spec.planet.bore_diameter)}"
-        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
-    if g.r_bore >= g.a - g.r_bolt:
-        remedy = f"cuts into the bolts: less than {millimetres(2 * (g.a - g.r_bolt))}"
-        yield "carrier.bore_diameter", millimetres(carrier.bore_diameter), remedy
-    if g.r_o <= g.a + g.r_bolt:
-        remedy = f"the bolts reach over the edge: more than {millimetres(2 * (g.a + g.r_bolt))}"
-        yield "carrier.outer_diameter", millimetres(carrier.outer_diameter), remedy
-    if 0 < half <= g.r_bolt:
-        remedy = f"neighbouring bolts touch: less than {millimetres(2 * half)}"
-        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
+    planet, inner, outer = spec.planet.bore_diameter, 2 * (g.a - g.r_bolt), 2 * (g.a + g.r_bolt)
+    for field, wrong, why, limit in (
+        ("bolt_diameter", 2 * g.r_bolt >= planet, "does not fit the planet's bore: less than", planet),
+        ("bore_diameter", g.r_bore >= g.a - g.r_bolt, "cuts into the bolts: less than", inner),
+        ("outer_diameter", g.r_o <= g.a + g.r_bolt, "the bolts reach over the edge: more than", outer),
+        ("bolt_diameter", 0 < half <= g.r_bolt, "neighbouring bolts touch: less than", 2 * half),
+    ):
+        if wrong:
+            yield f"carrier.{field}", millimetres(getattr(carrier, field)), f"{why} {millimetres(limit)}"
     if carrier.imported is not None and len(set(carrier.imported.bolts)) != g.planets:
         named = ", ".join(carrier.imported.bolts) or "none"
         yield "carrier.import.bolts", named, f"one node set for each of the {g.planets} bolts, each its own"
