@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from typing import Any
 
@@ -86,22 +86,28 @@ NOT_OF_BODY = {  # fields that shape no body: names, flanks, what holds it, what
 
 
 def body_inputs(table: Reduced) -> dict[str, Any]:
-    """Everything that shapes a body, in SI: every field of its table but `NOT_OF_BODY`, so that a new field counts.
-
-    The addendum of a gear's rack is left out: the tip diameter says where the tooth ends. With finite elements made
-    elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
-    """
-    inputs = table.model_dump(exclude={*NOT_OF_BODY[table.kind], "imported", "reduced"}, exclude_none=True)
-    if "rack" in inputs:
-        inputs["rack"].pop("addendum")
+    """Everything that shapes a body, in SI: every field of its table but `NOT_OF_BODY`, so that a new field counts."""
+    inputs = shaping(table, NOT_OF_BODY[table.kind] | {"reduced"}, exclude_none=True)
     if isinstance(table, CarrierBody):
         nodes = ("bore", *(f"bolt{k}" for k in range(len(table.bolts))))
         inputs["coupling"] = {node: table.coupling_of(node) for node in nodes}
+    if isinstance(table, HousingBody) and table.reduced is not None:
+        inputs["reduced"] = import_inputs(table.reduced)
+    return inputs
+
+
+def shaping(table: Any, left_out: Set[str], exclude_none: bool = False) -> dict[str, Any]:
+    """The fields of the table of a body but those that are left out, SI.
+
+    The addendum of a gear's rack is none of them: the tip diameter says where the tooth ends. With finite elements made
+    elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
+    """
+    inputs: dict[str, Any] = table.model_dump(exclude={"imported", *left_out}, exclude_none=exclude_none)
+    if "rack" in inputs:
+        inputs["rack"].pop("addendum")
     if table.imported is not None:
         inputs.get("body", inputs).pop("mesh", None)
         inputs["import"] = import_inputs(table.imported)
-    if isinstance(table, HousingBody) and table.reduced is not None:
-        inputs["reduced"] = import_inputs(table.reduced)
     return inputs
 
 
