@@ -22,6 +22,7 @@ from gearfmu.quantities import to_si
 _ENDINGS = (".rexs", ".xml", ".rexsj", ".json")
 _LARGEST = 256 * 2**20  # bytes; gear units are below one hundredth of that
 _NO_VALUES = ("id", "unit")  # keys of an attribute in JSON
+Tables = dict[str, Any]  # as JSON has them
 _SPELLINGS = {"mum": "um", "1 / min": "rpm", "N m": "N*m"}
 
 
@@ -160,7 +161,7 @@ def _from_json(path: Path, content: bytes) -> RexsModel:
         raise SpecError.of(path, "", "", f"{remedy} ({type(error).__name__}: {error})") from error
 
 
-def _xml_tables(path: Path, content: bytes) -> dict[str, Any]:
+def _xml_tables(path: Path, content: bytes) -> Tables:
     """The tables that the file would have in JSON."""
     try:
         root = ElementTree.fromstring(content)
@@ -169,7 +170,7 @@ def _xml_tables(path: Path, content: bytes) -> dict[str, Any]:
     if root.tag != "model" or not root.get("version"):
         raise SpecError.of(path, "", "", "the root element of a REXS file is <model version=…>")
 
-    def components(place: str) -> list[dict[str, Any]]:
+    def components(place: str) -> list[Tables]:
         return [
             {"id": "", "type": ""}
             | entry.attrib
@@ -190,14 +191,14 @@ def _xml_tables(path: Path, content: bytes) -> dict[str, Any]:
     }
 
 
-def _xml_attribute(entry: ElementTree.Element) -> dict[str, Any]:
+def _xml_attribute(entry: ElementTree.Element) -> Tables:
     text = (entry.text or "").strip()
     if len(entry):  # an array, a matrix or coded values
         text = " ".join(part.strip() for part in entry.itertext() if part.strip())
     return {"id": entry.get("id", ""), "unit": entry.get("unit", ""), "string": text}
 
 
-def _model(path: Path, tables: dict[str, Any]) -> RexsModel:
+def _model(path: Path, tables: Tables) -> RexsModel:
     """The model of the tables of a file. KeyError, TypeError and AttributeError for those of something else."""
     version = tables["version"]
     if version.split(".")[0] != "1":
@@ -219,7 +220,7 @@ def _model(path: Path, tables: dict[str, Any]) -> RexsModel:
     return RexsModel(path, version, known, relations)
 
 
-def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+def _attributes(entry: Tables) -> dict[str, Attribute]:
     """Of a component, by their ids."""
     found = {}
     for attribute in entry.get("attributes") or []:
