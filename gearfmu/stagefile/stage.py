@@ -29,10 +29,9 @@ from gearfmu.stagefile.forms.shapes import (
     with_rolls,
 )
 from gearfmu.stagefile.reading.base import validate
-from gearfmu.stagefile.reading.files import Changes, Layers, changed_tables, find_stage, put_at, read_layers
+from gearfmu.stagefile.reading.files import Changes, Layers, changed_tables, files_of, find_stage, put_at, read_layers
 from gearfmu.stagefile.reading.judge import as_meant
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.stagefile.tables.imported import named_files
 from gearfmu.stagefile.tables.topography import read_topography
 
 Found = Iterator[tuple[str, str, str]]
@@ -258,9 +257,3 @@ def _missing_files(layers: Layers) -> list[Problem]:
         for field, name, path in files_of(layers)
         if not path.is_file() and not field.endswith(".topography")
     ]
-
-
-def files_of(layers: Layers) -> list[tuple[str, str, Path]]:
-    """Field, text and path of every file that a stage file names for its bodies."""
-    found = ((field, table[key]) for table, key, field in named_files(layers.tables))
-    return [(field, name, layers.named(field, name)) for field, name in found if isinstance(name, str)]

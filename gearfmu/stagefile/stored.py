@@ -14,10 +14,11 @@ from gearfmu.stagefile.forms.expand import expand
 from gearfmu.stagefile.forms.general import Reduced, Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.reading.base import Spec, validate
+from gearfmu.stagefile.reading.files import named_files
 from gearfmu.stagefile.stage import stage_class
 from gearfmu.stagefile.tables.bodies import TOOTHING
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.imported import import_inputs, named_files
+from gearfmu.stagefile.tables.imported import import_inputs
 
 FREE = ("description", "ports")  # fields in which two exports of one stage may differ
 

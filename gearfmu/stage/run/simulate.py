@@ -39,9 +39,9 @@ class Wound(ABC):
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         """Values (n,) by input name at times (n,), s."""
 
-    @abstractmethod
     def under(self, parameters: Mapping[str, float]) -> Self:
         """The same torque and speed in a run with these parameters of the kernel."""
+        return replace(self, parameters=parameters)  # type: ignore[type-var]  # all of them are dataclasses
 
     def __call__(self, time: float) -> dict[str, float]:
         """Values by input name at a time, s."""
@@ -105,9 +105,6 @@ class Steady(Wound):
         near = [m for mesh, m in zip(stage.engagements, own, strict=True) if rotor in map(stage.rotor_of, mesh.gears)]
         pitch = 2 * np.pi / min(abs(float(m.relative(speeds))) * m.teeth for m in near or own)
         return tuple(-pitch * i / count for i in range(count))
-
-    def under(self, parameters: Mapping[str, float]) -> Steady:
-        return replace(self, parameters=parameters)
 
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}

@@ -101,9 +101,6 @@ class Profiled(Wound):
             return 0.0
         return Steady(self.model, speed, torque, parameters=self.parameters).rubbed * float(np.sign(speed))
 
-    def under(self, parameters: Mapping[str, float]) -> Profiled:
-        return replace(self, parameters=parameters)
-
     def over(self, times: np.ndarray) -> dict[str, np.ndarray]:
         shafts, values = self.model.shafts, {}
         torque, growing, _ = self.torque.at(times)

@@ -19,8 +19,8 @@ from gearfmu.errors import SpecError
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
 from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml
-from gearfmu.stagefile.reading.files import Layers, find_stage, put_at, read_layers
-from gearfmu.stagefile.stage import files_of, load_stage
+from gearfmu.stagefile.reading.files import Layers, files_of, find_stage, put_at, read_layers
+from gearfmu.stagefile.stage import load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
 _DESCRIPTION = "made like {like}; describe it here in one line"

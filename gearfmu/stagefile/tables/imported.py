@@ -4,7 +4,6 @@ from finite elements made elsewhere (docs/howto-import.md)."""
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,11 +11,11 @@ from pydantic import model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.reading.base import Quantity, Spec, Text, entry, refuse
+from gearfmu.stagefile.reading.files import FILES
 
 FlankTolerance = Annotated[float, Quantity("flank_tolerance")]
 SurfaceCoupling = Literal["averaging", "rigid"]
 ELSEWHERE = "finite elements made elsewhere; meshed here when the table is absent"
-FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 
 
 class SourceSpec(Spec):
@@ -83,19 +82,6 @@ class CarrierImportSpec(FilesSpec):
 
     bore: Text = entry("node set of the bore")
     bolts: tuple[Text, ...] = entry("node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
-
-
-def named_files(tables: Any, field: str = "") -> Iterator[tuple[dict[str, Any], str, str]]:
-    """(table, key, field) of every name of a file in the tables of a stage, as its file has them or as they are
-    dumped."""
-    for key, value in tables.items() if isinstance(tables, dict) else enumerate(tables):
-        place = f"{field}.{key}" if field else str(key)
-        if key in ("import", "imported", "reduced") and isinstance(value, dict):
-            yield from ((value, name, f"{place}.{name}") for name in FILES if value.get(name))
-        elif key == "topography" and value:
-            yield tables, key, place
-        elif isinstance(value, (dict, list)):
-            yield from named_files(value, place)
 
 
 def import_inputs(spec: SourceSpec) -> dict[str, Any]:
