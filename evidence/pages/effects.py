@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from gearfmu.stage.effects import EFFECTS, costs
-from gearfmu.stage.run.inertia import NEGLECTED
+from gearfmu.stage.effects import EFFECTS, NEGLECTED, costs
 
 HEAD = """# Effects
 

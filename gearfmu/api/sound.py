@@ -20,7 +20,7 @@ from gearfmu.modes.rings import stage_rings
 from gearfmu.sound import Radiation, SoundError, SoundPower
 from gearfmu.stage.assembly.groups import MOTIONS
 from gearfmu.stage.assembly.observed import MODE, MOTION
-from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
+from gearfmu.stage.run.housing import Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stagefile.forms.general import Stage
 

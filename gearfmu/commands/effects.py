@@ -22,8 +22,7 @@ FIELDS = ("formula", "matters", "off", "switch", "code")
 @click.argument("stage", required=False, shell_complete=stage_names)
 def effects(stage: str | None) -> None:
     """The effects there are: formula, when each matters, its price, how to switch it; with STAGE its numbers."""
-    from gearfmu.stage.effects import EFFECTS, costs
-    from gearfmu.stage.run.inertia import NEGLECTED
+    from gearfmu.stage.effects import EFFECTS, NEGLECTED, costs
 
     found, numbers = costs(), _numbers(stage) if stage else {}
     for effect in EFFECTS:

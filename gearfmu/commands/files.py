@@ -159,7 +159,7 @@ def _needs(stage: Stage) -> str | dict[str, dict[str, float]]:
 
 def _toml_with_units(path: Path) -> dict[str, Any]:
     from gearfmu.scenefile.scene import load_scene
-    from gearfmu.stagefile.reading.shown import shown
+    from gearfmu.stagefile.reading.base import shown
     from gearfmu.stagefile.stage import load_stage
 
     found = _toml(path)

@@ -116,7 +116,7 @@ def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
     import numpy as np
 
     from gearfmu.errors import SpecError
-    from gearfmu.rexs import draft_from_rexs
+    from gearfmu.rexs.stage import draft_from_rexs
     from gearfmu.stage.run.trace import write_columns
     from gearfmu.stagefile.proposals.new import write_drafted
     from gearfmu.stagefile.stage import load_stage

@@ -36,7 +36,7 @@ from gearfmu.kernel.binding import status_words
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.assembly.model import integrator_of
-from gearfmu.stage.assembly.observed import gear_hashes
+from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.deformation import FILE_NAME
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.expand import with_ports
@@ -122,7 +122,8 @@ def run(
         if result.frames is not None and out_dir is not None:
             meta["deformation"] = FILE_NAME
             told = {name: meta[name] for name in OF_FRAMES if name in meta} | {"model": source.model.hash}
-            result.frames.frames(gear_hashes(source.model), told).save(Path(out_dir) / FILE_NAME)
+            hashes = gear_bodies(source.model.stage, source.model.body_hashes)
+            result.frames.frames(hashes, told).save(Path(out_dir) / FILE_NAME)
     trace = Trace(result.trace.time, result.trace.channels, meta)
     if out_dir is not None:
         trace.save(Path(out_dir) / "trace.h5")

@@ -20,7 +20,7 @@ from gearfmu.report.runup import RunUp
 from gearfmu.report.signals import GEAR_SPEED, Window
 from gearfmu.sound import BANDS, SoundError, SoundPower, bands_of, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
-from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
+from gearfmu.stage.run.housing import Heard, housing_body, radiated_power
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
 

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 from gearfmu.geometry.shifts import sum_of_shifts
-from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres, put_proportions
+from gearfmu.rexs.reading import Component, RexsModel
+from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
@@ -99,9 +99,7 @@ def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> Non
     diameters."""
     draft.put(f"{place}.teeth", gear.teeth, gear.origin)
     draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
-    for part in ("tip_relief", "lead", "index_deviation", "import"):
-        draft.drop(f"{place}.{part}")
-    put_proportions(draft, place, gear.module, gear.face_width)
+    draft.put_proportions(place, gear.module, gear.face_width)
     draft.assume(f"{place}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
     _put_material(model, draft, place, gear.component)
 
@@ -226,14 +224,11 @@ def _put_bearing(model: RexsModel, draft: Draft, place: str, component: Componen
             draft.put(f"{place}.tilt", f"{tilt:.6g} N*m/rad", origin)
 
 
-def shaft_torque(model: RexsModel, component: Component) -> float | None:
-    """Largest torque (N·m) that an external load brings into the shaft of a gear, over all load cases."""
+def shaft_loads(model: RexsModel, component: Component) -> tuple[float | None, float | None]:
+    """Largest torque (N·m) that an external load brings into the shaft of a gear, and largest speed (rad/s) of that
+    shaft, over all load cases."""
     shafts = model.related(component, "shaft", relation="assembly")
     loads = [load for shaft in shafts for load in model.related(shaft, "external_load")]
-    return max((m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))), default=None)
-
-
-def shaft_speed(model: RexsModel, component: Component) -> float | None:
-    """Largest speed (rad/s) of the shaft of a gear, over all load cases."""
-    shafts = model.related(component, "shaft", relation="assembly")
-    return max((v for s in shafts if (v := model.largest(s, "rotational_speed", "rad/s"))), default=None)
+    torques = [m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))]
+    speeds = [v for shaft in shafts if (v := model.largest(shaft, "rotational_speed", "rad/s"))]
+    return max(torques, default=None), max(speeds, default=None)

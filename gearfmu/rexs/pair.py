@@ -6,8 +6,8 @@ import math
 
 from gearfmu.geometry.mesh import common_width
 from gearfmu.quantities import to_si
-from gearfmu.rexs.gears import RexsGear, gear_of, place_shifts, put_external, put_teeth, shaft_speed, shaft_torque
-from gearfmu.rexs.model import Component, RexsModel
+from gearfmu.rexs.gears import RexsGear, gear_of, place_shifts, put_external, put_teeth, shaft_loads
+from gearfmu.rexs.reading import Component, RexsModel
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
 from gearfmu.stagefile.forms.shapes import gears_in_mesh, largest_half_width
 from gearfmu.stagefile.proposals.draft import (
@@ -18,8 +18,6 @@ from gearfmu.stagefile.proposals.draft import (
     Draft,
     degrees,
     millimetres,
-    put_limit,
-    put_shafts,
     usual_torque,
 )
 from gearfmu.stagefile.reading.base import validate
@@ -98,15 +96,14 @@ def assumed_torque(gears: list[RexsGear]) -> float:
 
 def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     ratio = gears[1].teeth / gears[0].teeth
-    torques = [shaft_torque(model, gear.component) for gear in gears]
+    torques, speeds = zip(*(shaft_loads(model, gear.component) for gear in gears), strict=True)
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
     known = (found and rounded_up(found, 3), "REXS external_load, the largest of all load cases")
-    torque = put_limit(draft, "torque_max", known, (assumed_torque(gears), LOAD_RULE))
-    put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
-    speeds = [shaft_speed(model, gear.component) for gear in gears]
+    torque = draft.put_limit("torque_max", known, (assumed_torque(gears), LOAD_RULE))
+    draft.put_shafts(dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     found = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
     known = (found and rounded_up(found, 4), "REXS shaft, the largest of all load cases")
-    put_limit(draft, "speed_max", known, (PITCH_SPEED / gears[0].reference_radius, "20 m/s at the reference circle"))
+    draft.put_limit("speed_max", known, (PITCH_SPEED / gears[0].reference_radius, "20 m/s at the reference circle"))
 
 
 def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:

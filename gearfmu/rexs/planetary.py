@@ -6,8 +6,9 @@ import math
 from dataclasses import replace
 
 from gearfmu.errors import Problem
-from gearfmu.geometry.mesh import MOUNTS, set_ratio
+from gearfmu.geometry.mesh import HANDS, MOUNTS, RingMesh, set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
+from gearfmu.quantities import to_si
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -17,15 +18,16 @@ from gearfmu.rexs.gears import (
     put_teeth,
     section_diameters,
     shaft_diameters,
-    shaft_speed,
-    shaft_torque,
+    shaft_loads,
 )
-from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import assumed_torque, put_rack_data
+from gearfmu.rexs.reading import Component, RexsModel
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres, put_limit
+from gearfmu.stagefile.forms.planetary import RingSpec, SetGearSpec, SetSpec
+from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
+from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, PITCH_SPEED, Draft, millimetres
+from gearfmu.stagefile.reading.base import validate
 
-_PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
 
 
@@ -51,7 +53,7 @@ def draft_set(model: RexsModel, stage: Component) -> Draft:
     put_rack_data(draft, "set", gears)
     _put_planets(model, draft, planets, meshes, gears)
     _put_shifts(draft, gears, abs(distance))
-    for name, gear in zip(_PLACES, gears, strict=True):
+    for name, gear in zip(HANDS, gears, strict=True):
         put_teeth(model, draft, name, gear)
     for name, gear in (("sun", gears[0]), ("planet", gears[1])):
         put_external(model, draft, name, gear, 0.0, "d + 2 m_n (1 + x)")
@@ -162,11 +164,6 @@ def _put_ring(model: RexsModel, draft: Draft, ring: RexsGear, distance: float) -
 def _tip_that_clears(draft: Draft, distance: float) -> float:
     """Smallest tip radius (m) of the ring that does not meet the planet below its form circle; 0 where that cannot be
     told before the rest is put right."""
-    from gearfmu.geometry.mesh import HANDS, RingMesh
-    from gearfmu.stagefile.forms.planetary import RingSpec, SetGearSpec, SetSpec
-    from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
-    from gearfmu.stagefile.reading.base import validate
-
     ring_table = {"tip_diameter": "1 mm", "rim_diameter": "1 m"} | {
         key: value for key, value in draft.tables["ring"].items() if key not in ("tip_diameter", "rim_diameter")
     }
@@ -205,8 +202,6 @@ def _put_carrier(model: RexsModel, draft: Draft, stage: Component, gears: list[R
 
 def _bolt(model: RexsModel, draft: Draft, stage: Component) -> float:
     """Diameter (m) of the bolts: that of the planet pins, which must fit the planets' bores."""
-    from gearfmu.quantities import to_si
-
     largest = to_si(draft.tables["planet"]["bore_diameter"], "m")
     for pin in model.related(stage, "shaft", relation="planet_pin"):
         found = shaft_diameters(model, pin)
@@ -223,11 +218,11 @@ def _put_loads(
 ) -> None:
     sun, planet, ring = gears
     ratio = set_ratio(sun.teeth, ring.teeth)
-    torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
+    torque, speed = shaft_loads(model, sun.component)
     sharing = draft.at("set.load_sharing")
     known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
     assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
-    put_limit(draft, "torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
+    draft.put_limit("torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
     known = (speed and rounded_up(speed / ratio, 4), "REXS shaft of the sun, over 1 + z_ring/z_sun")
     assumed = PITCH_SPEED / sun.reference_radius / ratio
-    put_limit(draft, "speed_max", known, (assumed, "20 m/s at the sun's reference circle"))
+    draft.put_limit("speed_max", known, (assumed, "20 m/s at the sun's reference circle"))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from gearfmu.errors import SpecError
-from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import draft_pair
 from gearfmu.rexs.planetary import draft_set
-from gearfmu.rexs.reading import read_rexs
+from gearfmu.rexs.reading import Component, RexsModel, read_rexs
 from gearfmu.stagefile.proposals.draft import Draft, Unread
 
 

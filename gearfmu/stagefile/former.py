@@ -7,14 +7,14 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.geometry.mesh import HANDS
-from gearfmu.stagefile.forms.general import RingBody, Stage, ToothedBody
+from gearfmu.stagefile.forms.general import RingBody, Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec
-from gearfmu.stagefile.stored import hash_of
+from gearfmu.stagefile.stored import hash_of, shaping
 from gearfmu.stagefile.tables.bodies import TOOTHING
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.imported import import_inputs
 
 ALGORITHM = 2
+_LATER = {"name", "bearing"} | TOOTHING  # fields of a gear that did not count, or are younger than 0.3
 
 
 def former_hash(stage: Stage, name: str) -> str:
@@ -27,7 +27,7 @@ def former_hash(stage: Stage, name: str) -> str:
         inputs = _set_inputs(stage.written, name)
     else:
         assert not isinstance(table, CarrierBody), "carriers are of sets"
-        inputs = _toothed_inputs(table, "bore_coupling", "rim_coupling", "mounts")
+        inputs = shaping(table, _LATER | {"bore_coupling", "rim_coupling", "mounts"})
         if isinstance(table, RingBody):
             inputs |= {"rim_coupling": table.rim_coupling} if table.rigid_bore else {}
             if not inputs["helix_angle"]:
@@ -35,17 +35,6 @@ def former_hash(stage: Stage, name: str) -> str:
         else:
             inputs |= {"kind": "external_pair"} | ({"bore_coupling": table.bore_coupling} if table.rigid_bore else {})
     return hash_of(inputs | {"algorithm_version": ALGORITHM})
-
-
-def _toothed_inputs(gear: ToothedBody | SetGearSpec | RingSpec, *others: str) -> dict[str, Any]:
-    """Fields of a gear but for name, flanks, bearing and `others`; a field that is younger than 0.3 is one of these."""
-    inputs = gear.model_dump(exclude={"name", "bearing", "imported", *others} | TOOTHING)
-    if "rack" in inputs:
-        inputs["rack"].pop("addendum")  # the tip diameter says where the tooth ends
-    if gear.imported is not None:
-        inputs["body"].pop("mesh")
-        inputs["import"] = import_inputs(gear.imported)
-    return inputs
 
 
 def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
@@ -57,13 +46,10 @@ def _set_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
         if s.positions is not None:
             place["positions"] = [k / (spec.sun.teeth + spec.ring.teeth) for k in s.positions]
         couplings = ["bore", *(f"bolt{k}" for k in range(s.planets))]
-        carrier = spec.carrier.model_dump(exclude={"coupling", "imported", "bearing"})
-        if spec.carrier.imported is not None:
-            carrier.pop("mesh")
-            carrier["import"] = import_inputs(spec.carrier.imported)
+        carrier = shaping(spec.carrier, {"coupling", "bearing"})
         return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
     parts: dict[str, SetGearSpec | RingSpec] = dict(zip(HANDS, spec.gears, strict=True))
-    gear, helix = _toothed_inputs(parts[name]), HANDS[name] * s.helix_angle
+    gear, helix = shaping(parts[name], _LATER), HANDS[name] * s.helix_angle
     if gear.get("mounts"):
         gear["mounts"].pop("damping_ratio")
     tooth = {"normal_module": s.normal_module, "pressure_angle": s.pressure_angle, "helix_angle": helix}

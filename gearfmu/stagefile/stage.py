@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry.mesh import HANDS, least_apart
@@ -28,14 +28,12 @@ from gearfmu.stagefile.forms.shapes import (
     with_relief_rolls,
     with_rolls,
 )
-from gearfmu.stagefile.reading.base import Spec, validate
-from gearfmu.stagefile.reading.files import Changes, Layers, changed_tables, find_stage, read_layers
+from gearfmu.stagefile.reading.base import validate
+from gearfmu.stagefile.reading.files import Changes, Layers, changed_tables, files_of, find_stage, put_at, read_layers
 from gearfmu.stagefile.reading.judge import as_meant
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
-from gearfmu.stagefile.tables.imported import FILES
 from gearfmu.stagefile.tables.topography import read_topography
 
-Table = TypeVar("Table", bound=Spec)
 Found = Iterator[tuple[str, str, str]]
 ROLLING = "by its rolling bearing"
 
@@ -54,7 +52,7 @@ def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) ->
     problems += _missing_files(layers)
     if form is None or problems:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    found = expand(_with_rolls(_with_paths(form, layers)))
+    found = expand(_with_rolls(_with_paths(kind, layers)))
     if problems := _topography_problems(found, layers):
         raise SpecError(layers.attributed(problem) for problem in problems)
     return found
@@ -69,9 +67,7 @@ def stage_class(tables: Mapping[str, Any]) -> type[Form | Stage]:
 def _read(kind: type[Form | Stage], layers: Layers) -> tuple[Form | Stage | None, list[Problem]]:
     """What the file says, and all that is wrong with it. What is wrong with the stage that it means stands beside the
     fields that cannot be read, as far as it does not depend on them."""
-    raw, file = layers.tables, str(layers.path)
-    named = {key: raw[key] | {"name": key} for key in ("sun", "planet", "ring") if isinstance(raw.get(key), dict)}
-    tables = raw | (named if kind is PlanetarySpec else {}) | {"source": layers.path}
+    raw, file, tables = layers.tables, str(layers.path), _tables(kind, layers)
     form, problems = validate(kind, tables, file)
     if "source" in raw:
         problems = [Problem("", "source", str(raw["source"]), "unknown key: remove it"), *problems]
@@ -82,6 +78,23 @@ def _read(kind: type[Form | Stage], layers: Layers) -> tuple[Form | Stage | None
     elif kind is StageSpec:
         problems += _problems_of_gears(raw, file)
     return form, problems
+
+
+def _tables(kind: type[Form | Stage], layers: Layers) -> dict[str, Any]:
+    """What the file says, with the names that the gears of a set have, and its path."""
+    raw = layers.tables
+    named = {key: raw[key] | {"name": key} for key in HANDS if isinstance(raw.get(key), dict)}
+    return raw | (named if kind is PlanetarySpec else {}) | {"source": layers.path}
+
+
+def _with_paths(kind: type[Form | Stage], layers: Layers) -> Form | Stage:
+    """What a valid file says, with the files of its bodies named as seen from here."""
+    paths: dict[str, Any] = {}
+    for field, _, path in files_of(layers):
+        put_at(paths, field, str(path))
+    form, _ = validate(kind, _tables(kind, layers.changed(paths)), str(layers.path))
+    assert form is not None, "it was read already"
+    return form
 
 
 def _problems_of_gears(raw: Mapping[str, Any], file: str) -> list[Problem]:
@@ -106,28 +119,6 @@ def _problems_of_gears(raw: Mapping[str, Any], file: str) -> list[Problem]:
         Problem(file, names.get(field, field.replace("bodies.", "gears.", 1)), shown(value), remedy)
         for field, value, remedy in mesh_problems(mesh)
     ]
-
-
-def _with_paths(form: Form | Stage, layers: Layers) -> Form | Stage:
-    """The same with the files of its bodies named as seen from here."""
-    if isinstance(form, StageSpec):
-        return form.model_copy(update={"gears": tuple(_located(g, layers, f"gears.{g.name}") for g in form.gears)})
-    bodies = {name: _located(body, layers, f"bodies.{name}") for name, body in form.bodies.items()}
-    parts: dict[str, Any] = {"bodies": bodies}
-    if isinstance(form, PlanetarySpec):
-        parts |= {name: _located(part, layers, name) for name, part in form if name in (*HANDS, "carrier")}
-    return form.model_copy(update=parts)
-
-
-def _located(part: Table, layers: Layers, place: str) -> Table:
-    """A body with its files as seen from here. place: its table, "gears.pinion"."""
-    found: dict[str, Any] = {}
-    for field, value in part:
-        if field in ("imported", "reduced") and value is not None:
-            found[field] = value.located(layers, f"{place}.{'import' if field == 'imported' else field}")
-        elif field == "topography" and value is not None:
-            found[field] = str(layers.named(f"{place}.{field}", value))
-    return part.model_copy(update=found) if found else part
 
 
 def _with_rolls(form: Form | Stage) -> Form | Stage:
@@ -236,18 +227,15 @@ def _mounts(spec: PlanetarySpec) -> Found:
 def _carrier(spec: PlanetarySpec) -> Found:
     g, carrier = carrier_geometry(set_carrier(spec)), spec.carrier
     half = g.a * math.sin(least_apart(g.angles) / 2)
-    if 2 * g.r_bolt >= spec.planet.bore_diameter:
-        remedy = f"does not fit the planet's bore: less than {millimetres(spec.planet.bore_diameter)}"
-        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
-    if g.r_bore >= g.a - g.r_bolt:
-        remedy = f"cuts into the bolts: less than {millimetres(2 * (g.a - g.r_bolt))}"
-        yield "carrier.bore_diameter", millimetres(carrier.bore_diameter), remedy
-    if g.r_o <= g.a + g.r_bolt:
-        remedy = f"the bolts reach over the edge: more than {millimetres(2 * (g.a + g.r_bolt))}"
-        yield "carrier.outer_diameter", millimetres(carrier.outer_diameter), remedy
-    if 0 < half <= g.r_bolt:
-        remedy = f"neighbouring bolts touch: less than {millimetres(2 * half)}"
-        yield "carrier.bolt_diameter", millimetres(carrier.bolt_diameter), remedy
+    planet, inner, outer = spec.planet.bore_diameter, 2 * (g.a - g.r_bolt), 2 * (g.a + g.r_bolt)
+    for field, wrong, why, limit in (
+        ("bolt_diameter", 2 * g.r_bolt >= planet, "does not fit the planet's bore: less than", planet),
+        ("bore_diameter", g.r_bore >= g.a - g.r_bolt, "cuts into the bolts: less than", inner),
+        ("outer_diameter", g.r_o <= g.a + g.r_bolt, "the bolts reach over the edge: more than", outer),
+        ("bolt_diameter", 0 < half <= g.r_bolt, "neighbouring bolts touch: less than", 2 * half),
+    ):
+        if wrong:
+            yield f"carrier.{field}", millimetres(getattr(carrier, field)), f"{why} {millimetres(limit)}"
     if carrier.imported is not None and len(set(carrier.imported.bolts)) != g.planets:
         named = ", ".join(carrier.imported.bolts) or "none"
         yield "carrier.import.bolts", named, f"one node set for each of the {g.planets} bolts, each its own"
@@ -266,23 +254,6 @@ def _missing_files(layers: Layers) -> list[Problem]:
     with the stage file."""
     return [
         Problem(str(layers.path), field, name, f"no file {path}: write it relative to the stage file")
-        for field, name, path in named_files(layers)
+        for field, name, path in files_of(layers)
         if not path.is_file() and not field.endswith(".topography")
     ]
-
-
-def named_files(layers: Layers) -> Iterator[tuple[str, str, Path]]:
-    """Field, text and path of every file that a stage file names for its bodies."""
-    tables = layers.tables
-    groups = {"gears.": tables.get("gears"), "bodies.": tables.get("bodies")}
-    for prefix, bodies in (groups | {"": {name: tables.get(name) for name in (*HANDS, "carrier")}}).items():
-        for name, table in bodies.items() if isinstance(bodies, dict) else ():
-            if not isinstance(table, dict):
-                continue
-            sections: dict[str, Any] = {"": {"topography": table.get("topography")}}
-            sections |= {f"{key}.": table.get(key) for key in ("import", "reduced")}
-            for inner, section in sections.items():
-                for field in ("topography", *FILES) if isinstance(section, dict) else ():
-                    if isinstance(text := section.get(field), str) and text:
-                        place = f"{prefix}{name}.{inner}{field}"
-                        yield place, text, layers.named(place, text)

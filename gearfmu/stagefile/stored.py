@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,11 @@ from gearfmu.stagefile.forms.expand import expand
 from gearfmu.stagefile.forms.general import Reduced, Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.reading.base import Spec, validate
+from gearfmu.stagefile.reading.files import named_files
 from gearfmu.stagefile.stage import stage_class
 from gearfmu.stagefile.tables.bodies import TOOTHING
 from gearfmu.stagefile.tables.housing import HousingBody
-from gearfmu.stagefile.tables.imported import FILES, import_inputs
+from gearfmu.stagefile.tables.imported import import_inputs
 
 FREE = ("description", "ports")  # fields in which two exports of one stage may differ
 
@@ -26,7 +27,7 @@ def stored(spec: Spec) -> dict[str, Any]:
     """The fields of a stage, or of what is written in its file, for JSON, SI, without `source`; files by their names
     without folders."""
     tables = spec.model_dump(mode="json", exclude={"source"})
-    for table, key, _ in _files(tables):
+    for table, key, _ in named_files(tables):
         table[key] = Path(table[key]).name
     return tables
 
@@ -35,7 +36,7 @@ def stored_files(spec: Spec) -> dict[str, str]:
     """SHA-256, hex, of every file that a stage names, by its field ("gears.0.topography"). SpecError for one that
     cannot be read."""
     found = {}
-    for table, key, field in _files(spec.model_dump(mode="json", exclude={"source"})):
+    for table, key, field in named_files(spec.model_dump(mode="json", exclude={"source"})):
         try:
             found[field] = hashlib.sha256(Path(table[key]).read_bytes()).hexdigest()
         except OSError as error:
@@ -76,18 +77,6 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 
-def _files(tables: Any, field: str = "") -> Iterator[tuple[dict[str, Any], str, str]]:
-    """(table, key, field) of every name of a file."""
-    for key, value in tables.items() if isinstance(tables, dict) else enumerate(tables):
-        place = f"{field}.{key}" if field else str(key)
-        if key in ("imported", "reduced") and isinstance(value, dict):
-            yield from ((value, name, f"{place}.{name}") for name in FILES if value.get(name))
-        elif key == "topography" and value:
-            yield tables, "topography", place
-        elif isinstance(value, (dict, list)):
-            yield from _files(value, place)
-
-
 ALGORITHMS = {"gear": 3, "ring": 3, "carrier": 3, "housing": 3}  # raised when the numbers of such bodies change
 NOT_OF_BODY = {  # fields that shape no body: names, flanks, what holds it, what of it is dynamic
     "gear": {"name", "bearing"} | TOOTHING,
@@ -98,22 +87,28 @@ NOT_OF_BODY = {  # fields that shape no body: names, flanks, what holds it, what
 
 
 def body_inputs(table: Reduced) -> dict[str, Any]:
-    """Everything that shapes a body, in SI: every field of its table but `NOT_OF_BODY`, so that a new field counts.
-
-    The addendum of a gear's rack is left out: the tip diameter says where the tooth ends. With finite elements made
-    elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
-    """
-    inputs = table.model_dump(exclude={*NOT_OF_BODY[table.kind], "imported", "reduced"}, exclude_none=True)
-    if "rack" in inputs:
-        inputs["rack"].pop("addendum")
+    """Everything that shapes a body, in SI: every field of its table but `NOT_OF_BODY`, so that a new field counts."""
+    inputs = shaping(table, NOT_OF_BODY[table.kind] | {"reduced"}, exclude_none=True)
     if isinstance(table, CarrierBody):
         nodes = ("bore", *(f"bolt{k}" for k in range(len(table.bolts))))
         inputs["coupling"] = {node: table.coupling_of(node) for node in nodes}
+    if isinstance(table, HousingBody) and table.reduced is not None:
+        inputs["reduced"] = import_inputs(table.reduced)
+    return inputs
+
+
+def shaping(table: Any, left_out: Set[str], exclude_none: bool = False) -> dict[str, Any]:
+    """The fields of the table of a body but those that are left out, SI.
+
+    The addendum of a gear's rack is none of them: the tip diameter says where the tooth ends. With finite elements made
+    elsewhere the contents of their files count, and not the counts of our own mesh; SpecError when one is missing.
+    """
+    inputs: dict[str, Any] = table.model_dump(exclude={"imported", *left_out}, exclude_none=exclude_none)
+    if "rack" in inputs:
+        inputs["rack"].pop("addendum")
     if table.imported is not None:
         inputs.get("body", inputs).pop("mesh", None)
         inputs["import"] = import_inputs(table.imported)
-    if isinstance(table, HousingBody) and table.reduced is not None:
-        inputs["reduced"] = import_inputs(table.reduced)
     return inputs
 
 

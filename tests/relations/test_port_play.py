@@ -10,8 +10,8 @@ import pytest
 from kinds import KINDS, Kind, assembled, bodies_of
 
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.run.profiled import Line, Profiled
 from gearfmu.stage.run.simulate import simulate
+from gearfmu.stage.run.steady import Line, Profiled
 from gearfmu.stagefile.forms.expand import with_ports
 
 PLAY = 2e-3  # rad, of every port

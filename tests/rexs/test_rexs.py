@@ -11,8 +11,8 @@ import pytest
 from gearfmu.cli import outcome
 from gearfmu.errors import SpecError
 from gearfmu.geometry.shifts import sum_of_shifts
-from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.reading import read_rexs
+from gearfmu.rexs.stage import draft_from_rexs
 from gearfmu.stagefile.proposals.new import write_drafted
 from gearfmu.stagefile.stage import load_stage
 

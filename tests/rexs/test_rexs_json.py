@@ -12,8 +12,8 @@ import pytest
 from test_rexs import PAIR, SET, stage_of
 
 from gearfmu.cli import outcome
-from gearfmu.rexs import draft_from_rexs
 from gearfmu.rexs.reading import read_rexs
+from gearfmu.rexs.stage import draft_from_rexs
 
 
 def in_json(source: Path) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import pytest
 from test_rexs import PAIR, SET, attribute_of, changed, stage_of, without
 
 from gearfmu.errors import SpecError
-from gearfmu.rexs import draft_from_rexs
+from gearfmu.rexs.stage import draft_from_rexs
 
 SECTIONS = ((40, 26, 26, 0, 0), (40, 28, 34, 6, 10), (40, 38, 38, 12, 12))  # length, outer and inner begin and end, mm
 

@@ -11,8 +11,8 @@ import pytest
 import gearfmu as gf
 from gearfmu import cli
 from gearfmu.errors import SpecError
-from gearfmu.stage.run.profiled import Line, Profiled, winding_torques
 from gearfmu.stage.run.simulate import Steady
+from gearfmu.stage.run.steady import Line, Profiled, winding_torques
 from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.tables.connections import PortSpec
 from gearfmu.stagefile.tables.profile import Profile, read_profile

@@ -204,30 +204,21 @@ def mount_sets(layout: Layout, bare: Layout | None = None) -> list[Group]:
 
 def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Kinds, numbers and static compliances of the ports, in the order of the stage."""
-    rotors = list(stage.rotors)
-    numbers = [_port_numbers(port) for port in stage.ports.values()]
-    kinds = [
-        [rotors.index(stage.rotor_of(port.body)), *own[:2]]
-        for port, own in zip(stage.ports.values(), numbers, strict=True)
-    ]
-    plays = np.array([port.play for port in stage.ports.values()])
-    return (
-        port_compliances(group, nodes)
-        | ({"port_play": plays} if plays.any() else {})
-        | {
-            "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
-            "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
-        }
-    )
+    rotors, ports = list(stage.rotors), list(stage.ports.values())
+    kinds = [[rotors.index(stage.rotor_of(own.body)), PORT_KINDS[own.kind], own.chain is not None] for own in ports]
+    plays = np.array([port.play for port in ports])
+    return port_compliances(group, nodes) | {
+        **({"port_play": plays} if plays.any() else {}),
+        "port_kinds": np.array(kinds, np.int32).reshape(-1, 3),
+        "ports": np.array([_port_numbers(port) for port in ports], float).reshape(-1, 6),
+    }
 
 
-def _port_numbers(port: PortSpec) -> np.ndarray:
-    chain = port.chain
-    k = port.k if port.k is not None else FIXED_K if port.kind == "fixed" else 1.0
-    numbers = [PORT_KINDS[port.kind], float(chain is not None), k, port.c or 0.0]
-    return np.array(
-        numbers + ([chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0])
-    )
+def _port_numbers(port: PortSpec) -> list[float]:
+    """Stiffness and damping of the port spring, then of its chain inertias, stiffness and damping."""
+    chain, k = port.chain, port.k if port.k is not None else FIXED_K if port.kind == "fixed" else 1.0
+    of_chain = [chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0]
+    return [k, port.c or 0.0, *of_chain]
 
 
 def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:

@@ -149,22 +149,9 @@ TABLE = Path(__file__).parents[2] / "kernel" / "src" / "model" / "gk_fields.inc"
 COUNTS = ("version", "slices", "rotors", "gears", "engagements", "ports", "supports", "functions", "rolls", "sets")
 SIZES = ("rotor", "z", "modes", "reads", "both_flanks", "points", "low", "mirrored")
 FLANK_SIZES = ("flank_teeth", "flank_places", "flank_rolls")
-GEAR_NUMBERS = (
-    "r_b",
-    "s_form",
-    "s_tip",
-    "psi_b",
-    "phase",
-    "face_width",
-    "local",
-    "strip_half_width",
-    "relief",
-    "relief_start",
-    "tip_edge",
-    "corner_radius",
-    "corner_angle",
-    "z_mid",
-    "helix",
+GEAR_NUMBERS = tuple(
+    "r_b s_form s_tip psi_b phase face_width local strip_half_width relief relief_start tip_edge corner_radius "
+    "corner_angle z_mid helix".split()
 )
 _LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "[^"]*", "[^"]*"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}

@@ -9,7 +9,7 @@ the other nodes alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,15 +25,7 @@ from gearfmu.stagefile.tables.housing import HousingBody
 AXES = "xyz"
 OFF_AXIS = 1e-3  # of the housing's size: how far a seat may lie from its shaft's axis
 ALONG = 0.05  # the same along the axis, for the seat of a superelement, whose surface is not known
-
-
-@dataclass(frozen=True)
-class Meeting:
-    """A support that meets a housing: its name, the node of the housing, and the point (3,) m where it acts."""
-
-    support: str
-    node: str
-    point: np.ndarray
+Meeting = tuple[str, str, np.ndarray]  # a support, the node of a housing that it meets, the point (3,) m where it acts
 
 
 def meetings(stage: Stage, housing: HousingBody, body: Body) -> list[Meeting]:
@@ -49,7 +41,7 @@ def meetings(stage: Stage, housing: HousingBody, body: Body) -> list[Meeting]:
         if support.to == housing.name:
             problems += _misplaced(stage, support, body, node)
             point = _acts_at(stage, support)
-        found.append(Meeting(support.name, str(support.node), np.asarray(point, float)))
+        found.append((support.name, node.name, np.asarray(point, float)))
     if problems:
         frame = f"model {housing.name} in the stage's axes, z along the shafts"
         raise ModelError("; ".join(problems) + f": {frame}, or move the supports")
@@ -81,13 +73,13 @@ def _misplaced(stage: Stage, support: SupportSpec, body: Body, seat: Node) -> li
 def housing_part(body: Body, found: list[Meeting], dynamic_to: float) -> GroundPart:
     """The GroundPart of a reduced housing: nodes of the supports, then of the sensors. dynamic_to: Hz."""
     names, arms = [node.name for node in body.nodes], np.zeros((6 * len(found), len(body.rows)))
-    for k, meeting in enumerate(found):
-        own = names.index(meeting.node)
-        arms[6 * k : 6 * k + 6, 6 * own : 6 * own + 6] = rigid_rows(meeting.point - body.nodes[own].point)
+    for k, (_, node, point) in enumerate(found):
+        own = names.index(node)
+        arms[6 * k : 6 * k + 6, 6 * own : 6 * own + 6] = rigid_rows(point - body.nodes[own].point)
     n = int(np.searchsorted(body.frequency, dynamic_to, "right"))
     moved = replace(
         body,
-        nodes=tuple(Node(meeting.support, "rigid", COMPONENTS, meeting.point) for meeting in found),
+        nodes=tuple(Node(support, "rigid", COMPONENTS, point) for support, _, point in found),
         frequency=body.frequency[:n],
         damping_ratio=body.damping_ratio[:n],
         rows=arms @ body.rows[:, :n],

@@ -20,11 +20,10 @@ from gearfmu.stage.assembly.teeth import MOST_FUNCTIONS, ROLLS, excited_modes, r
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.tables.bodies import ShaftBody
-from gearfmu.stagefile.tables.connections import SupportSpec
+from gearfmu.stagefile.tables.connections import DIRECTIONS, SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
 
 ROLLING = {4: (0, 1, 3, 4), 5: (0, 1, 2, 3, 4)}  # directions of a rolling bearing by their number
-STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 _KEPT = 4  # ways to read a body that are remembered
 _READ: WeakKeyDictionary[Body, dict[Hashable, GroundPart]] = WeakKeyDictionary()
 
@@ -164,7 +163,7 @@ def _springs(
         return held, _inverse(tangent), 2 * support.damping_ratio * np.sqrt(np.diag(tangent) * masses)
     assert support.bearing is None, f"{support.name}: a rolling bearing has a stiffness at a load only"
     directions, compliance, damping = [], [], []
-    for field, own in STIFFNESS.items():
+    for field, own in DIRECTIONS.items():
         stiffness = getattr(support, field)
         if stiffness is None:
             continue

@@ -16,8 +16,7 @@ from gearfmu.body import Body
 from gearfmu.errors import ModelError
 from gearfmu.stage.assembly.ground_part import NODE_MEMBERS
 from gearfmu.stage.assembly.groups import Group, families
-from gearfmu.stage.assembly.model import StageModel
-from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.general import Of, Stage
 
 MOTION, MODE = ".motion.", ".mode_"
 
@@ -50,13 +49,7 @@ def observed_sections(index: int, bodies: Sequence[Body], groups: Sequence[Group
     return found
 
 
-def gear_bodies(stage: Stage, bodies: Sequence[Body]) -> dict[str, Body]:
-    """`Stage.by_name` of the gears alone."""
+def gear_bodies(stage: Stage, bodies: Sequence[Of]) -> dict[str, Of]:
+    """`Stage.by_name` of the gears alone: their bodies, or what stands for them, such as hashes."""
     found = stage.by_name(bodies)
     return {gear.name: found[gear.name] for gear in stage.gears}
-
-
-def gear_hashes(model: StageModel) -> dict[str, str]:
-    """Hash of the reduced body of every gear of a model."""
-    found = model.stage.by_name(model.body_hashes)
-    return {gear.name: found[gear.name] for gear in model.stage.gears}

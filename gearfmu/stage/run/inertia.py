@@ -25,37 +25,6 @@ WHIRL_BAND = 15e3  # Hz
 
 
 @dataclass(frozen=True)
-class Neglected:
-    """A term of the floating frame that is left out: what it is, its size as a formula, why it may be left out."""
-
-    name: str
-    formula: str
-    why: str
-
-
-NEGLECTED = (
-    Neglected(
-        "centrifugal stiffening and softening",
-        "Δω/ω = ½ B (Ω/ω)², B = φᵀ(K_σ − M_xy)φ",
-        "second order in Ω/ω, where the Coriolis forces of the same patterns are of first",
-    ),
-    Neglected(
-        "centrifugal stretch", "w Ω², w = N C f_c ~ ρ r³/E", "a constant shift of the transmission error, no force"
-    ),
-    Neglected(
-        "inertia that depends on deformation",
-        "ΔJ/J = 2 w F/J under a tooth force F, f_cᵀC f_c 2Ω²/J by the speed",
-        "changes an angular acceleration by that part of it",
-    ),
-    Neglected(
-        "Euler acceleration",
-        "Ω̇ ∫ρ φ·(e_z × X) = 0; on the places of carried bodies Ω̇ u/(ω² u) = Ω̇/ω²",
-        "none in a body, whose patterns are orthogonal to its rotation",
-    ),
-)
-
-
-@dataclass(frozen=True)
 class GearInertia:
     """Of a gear at its largest speed (rad/s) and load: whirl: largest 2Ωg/ω below the cut of level fast; stiffening:
     largest Δω/ω there; growth, deflection (m): centrifugal stretch of a flank at its middle, and what the tooth yields

@@ -21,7 +21,7 @@ from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.assembly.shown import Card, Shown, plot_over
 from gearfmu.stage.run.limits import each_load
 from gearfmu.stage.run.place import MeshPlace, place_of
-from gearfmu.stagefile.forms.general import GearBody, RingBody, Stage
+from gearfmu.stagefile.forms.general import GearBody, Stage
 from gearfmu.stagefile.forms.shapes import face_width, gear_shape, mesh_shape, toothed
 
 if TYPE_CHECKING:
@@ -281,8 +281,7 @@ def _of_set(model: StageModel, place: MeshPlace, planets: int, parameters: Mappi
 def _by_iso(model: StageModel, place: MeshPlace) -> float:
     """`TeResult.iso_stiffness` of an engagement."""
     mesh = model.stage.engagements[place.number]
-    a, b = (model.stage.bodies[gear] for gear in mesh.gears)
-    assert isinstance(a, (GearBody, RingBody)) and isinstance(b, (GearBody, RingBody))
+    a, b = (toothed(model.stage, gear) for gear in mesh.gears)
     e_a, e_b = a.material.youngs_modulus, b.material.youngs_modulus
     shape, dedendum = mesh_shape(model.stage, mesh), a.rack.dedendum if isinstance(a, GearBody) else 1.25
     return face_width(model.stage, mesh) * mesh_stiffness(shape, dedendum, 2 * e_a * e_b / (e_a + e_b))

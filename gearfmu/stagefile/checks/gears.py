@@ -6,9 +6,13 @@ and interference by form rolls; tip interference in a ring: Colbourne (1987)."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 from itertools import accumulate
+from typing import Any
+
+from scipy.optimize import brentq
 
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
@@ -95,7 +99,7 @@ def _tip_problems(gear: GearBody, shape: GearGeometry) -> Found:
         remedy = f"no involute is left above the form circle: more than {millimetres(2 * (form + shape.tip_edge))}"
         yield "tip_diameter", gear.tip_diameter, remedy
     elif shape.tip_half_angle <= 0:
-        pointed = _root(lambda radius: float(shape.thickness_angle(radius)), form, shape.r_a)
+        pointed = form if shape.thickness_angle(form) <= 0 else brentq(shape.thickness_angle, form, shape.r_a)
         remedy = f"the tooth is pointed (tip thickness ≤ 0): less than {millimetres(rounded_down(2 * pointed))}"
         yield "tip_diameter", gear.tip_diameter, remedy
     elif shape.tip_land_half_angle < 0:
@@ -137,20 +141,17 @@ def _flank_problems(gear: ToothedBody, shape: GearShape) -> Found:
         yield "lead.end_relief.length", gear.lead.end_relief.length, remedy
 
 
+_AMOUNTS = (
+    "tip_relief.amount root_relief.amount profile.slope profile.crowning lead.slope lead.crowning "
+    "lead.end_relief.amount eccentricity.amount"
+).split()
+
+
 def _amounts(gear: ToothedBody, shape: GearShape) -> Found:
     """Lengths that a module bounds."""
     most = _LARGEST * shape.m
-    given = {
-        "tip_relief.amount": gear.tip_relief and gear.tip_relief.amount,
-        "root_relief.amount": gear.root_relief and gear.root_relief.amount,
-        "profile.slope": gear.profile and gear.profile.slope,
-        "profile.crowning": gear.profile and gear.profile.crowning,
-        "lead.slope": gear.lead and gear.lead.slope,
-        "lead.crowning": gear.lead and gear.lead.crowning,
-        "lead.end_relief.amount": gear.lead and gear.lead.end_relief and gear.lead.end_relief.amount,
-        "eccentricity.amount": gear.eccentricity and gear.eccentricity.amount,
-    }
-    for field, value in given.items():
+    for field in _AMOUNTS:
+        value: Any = reduce(lambda table, key: table and getattr(table, key), field.split("."), gear)
         if value and abs(value) > most:
             yield field, value, f"more than a tenth of the module: at most {millimetres(most)}"
 
@@ -193,14 +194,6 @@ def _pitches(gear: ToothedBody, shape: GearShape) -> Found:
     elif single and (most := max(accumulate(single), key=abs)) and abs(most) > largest:
         remedy = f"they sum to more than a twentieth of the module: at most {millimetres(largest)}"
         yield "pitch_deviation", f"sum {millimetres(most)}", remedy
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a falling function passes zero between low and high, by bisection."""
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if function(middle) > 0 else (low, middle)
-    return low
 
 
 def rounded_down(value: float, digits: int = 4) -> float:

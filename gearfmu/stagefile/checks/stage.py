@@ -13,12 +13,11 @@ from gearfmu.stagefile.checks.gears import Meshed, mesh_problems, millimetres, s
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import centre_distance, toothed
 from gearfmu.stagefile.tables.bodies import ShaftBody
-from gearfmu.stagefile.tables.connections import BallBearing, RollerBearing, SupportSpec
+from gearfmu.stagefile.tables.connections import DIRECTIONS, BallBearing, RollerBearing, SupportSpec
 from gearfmu.stagefile.tables.housing import HousingBody
 
 Found = Iterator[tuple[str, str, str]]  # field of the stage, value, remedy
 _SAME_RACK = ("normal_module", "pressure_angle")
-_SPRINGS = ("radial", "axial", "tilt", "torsion")
 
 
 def stage_problems(stage: Stage) -> list[Problem]:
@@ -57,8 +56,8 @@ def _what_can_be_judged(stage: Stage) -> Stage:
 
 def _counts(stage: Stage) -> Found:
     """Numbers of things that the kernel has room for."""
-    directions = {"radial": 2, "axial": 1, "tilt": 2, "torsion": 1}
-    held = sum(n for s in stage.supports for field, n in directions.items() if getattr(s, field) is not None)
+    springs = [own for s in stage.supports for field, own in DIRECTIONS.items() if getattr(s, field) is not None]
+    held = sum(map(len, springs))
     held += sum(_directions(stage.bearings.get(s.bearing)) for s in stage.supports if s.bearing is not None)
     counts = {
         "rotors": (len(stage.rotors), "ROTORS", "rotors"),
@@ -203,7 +202,7 @@ def _rolling(stage: Stage) -> Found:
             remedy = f"no such bearing: write [bearings.{support.bearing}]; there are {known}"
             yield f"{place}.bearing", support.bearing, remedy
         for field, value in support:
-            if field in _SPRINGS and value is not None:
+            if field in DIRECTIONS and value is not None:
                 yield f"{place}.{field}", f"{value}", f"{support.bearing} has its own stiffness: leave it away"
         if support.to is not None:
             yield f"{place}.to", support.to, "a rolling bearing rests on the ground: leave it away"

@@ -104,7 +104,7 @@ def _expanded_pair(spec: StageSpec) -> Stage:
     places |= {f"supports.{gear.name}": f"gears.{gear.name}.bearing" for gear in spec.gears}
     places |= {f"supports.{gear.name}.bearing": f"gears.{gear.name}.bearing.rolling" for gear in spec.gears}
     places |= {f"rotors.{wheel.name}.axis": "pair.center_distance", "engagements.mesh.backlash": "pair.backlash"}
-    stage._origin = Origin(spec, places, limits=spec.limits)
+    stage._origin = Origin(spec, places)
     return stage
 
 
@@ -147,8 +147,7 @@ def _expanded_set(spec: PlanetarySpec) -> Stage:
     places |= {f"bodies.{planets[k]}.eccentricity": f"set.planet_eccentricity.{k}" for k in own}
     places |= {f"rotors.{name}.axis": "set.center_distance" for name in (*planets, "ring")}
     places |= {f"engagements.sun_{name}.backlash": "set.backlash" for name in planets}
-    mounts, limits = spec.ring.mounts, spec.limits
-    stage._origin = Origin(spec, places, shared, mounts, limits, spec.set.load_sharing, missing)
+    stage._origin = Origin(spec, places, shared, missing)
     return stage
 
 

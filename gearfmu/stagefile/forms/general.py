@@ -160,15 +160,11 @@ class Origin:
     """The file of a pair or of a set, which a stage was expanded from; of a general stage nothing.
 
     form: the file's own tables; places: names there of tables and fields that have others in the stage; files: of
-    bodies that share one reduced body, its name; mounts: of the ring of a set; limits, load_sharing: of the stage as a
-    whole; missing: fields that it needs to move."""
+    bodies that share one reduced body, its name; missing: fields that it needs to move."""
 
     form: Form | None = None
     places: Mapping[str, str] = field(default_factory=dict)
     files: Mapping[str, str] = field(default_factory=dict)
-    mounts: MountsSpec | None = None
-    limits: Limits = ()
-    load_sharing: float = 1.0
     missing: tuple[Problem, ...] = ()
 
 
@@ -235,17 +231,20 @@ class Stage(LaterFields):
     @property
     def limits(self) -> Limits:
         """Torque and speed of the input of a pair or set; none of a general stage, whose engagements have their own."""
-        return self._origin.limits
+        form = self._origin.form
+        return () if form is None else form.limits
 
     @property
     def mounts(self) -> MountsSpec | None:
         """What holds the ring of a planetary set, patch by patch of its rim."""
-        return self._origin.mounts
+        form = self._origin.form
+        return form.ring.mounts if isinstance(form, PlanetarySpec) else None
 
     @property
     def load_sharing(self) -> float:
         """Torque that every mesh is made for, over its mean at the limit; 1 but for a set."""
-        return self._origin.load_sharing
+        form = self._origin.form
+        return form.set.load_sharing if isinstance(form, PlanetarySpec) else 1.0
 
     def require_motion(self) -> None:
         """SpecError with everything that a set needs to move and does not say, and for a housing that nothing holds."""

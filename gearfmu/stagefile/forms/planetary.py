@@ -13,6 +13,7 @@ from gearfmu.stagefile.tables.bodies import (
     Backlash,
     BodySpec,
     CenterDistance,
+    Counts,
     Eccentricity,
     Elements,
     ElementsTwo,
@@ -132,7 +133,7 @@ class RingSpec(Toothing):
     imported: RingImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
 
-class CarrierMeshSpec(Spec):
+class CarrierMeshSpec(Counts):
     """Element counts of one bolt's sector (20-node hexahedra; half of it, mirrored)."""
 
     around: ElementsTwo = entry("elements around the bolt towards bore and rim, each half side", 4)
@@ -143,14 +144,6 @@ class CarrierMeshSpec(Spec):
     neck: Elements = entry("elements in the gap between plate and seat", 4)
     length: Elements = entry("elements along the planet's seat", 4)
     scale: Annotated[float, Quantity("scale")] = entry("factor on all counts", 1.0)
-
-    def scaled(self, count: int, least: int = 1) -> int:
-        """`count` times the scale, rounded."""
-        return max(least, round(self.scale * count))
-
-    def growth(self, factor: float) -> float:
-        """Growth of neighbouring elements, so that a scaled mesh is graded over the same length."""
-        return factor ** (1 / self.scale)
 
 
 class CarrierSpec(Spec):

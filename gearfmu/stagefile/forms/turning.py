@@ -69,27 +69,20 @@ def _rolling(stage: Stage, mesh: EngagementSpec) -> dict[str, Fraction]:
 
 
 def solved(equations: list[tuple[dict[str, Fraction], Fraction]]) -> dict[str, Fraction]:
-    """The unknowns that linear equations (factors by name, right side) decide; elimination without rounding."""
-    rows: dict[str, tuple[dict[str, Fraction], Fraction]] = {}
+    """The unknowns that linear equations (factors by name, right side) decide; elimination without rounding. An
+    equation that contradicts those before it is left out."""
+    names = list(dict.fromkeys(name for factors, _ in equations for name in factors))
+    found: list[tuple[int, list[Fraction]]] = []  # column of 1 that no other row has, row with its right side
     for factors, right in equations:
-        left = {name: Fraction(factor) for name, factor in factors.items() if factor}
-        for name, (own, value) in rows.items():
-            if share := left.pop(name, None):
-                right -= share * value
-                for other, factor in own.items():
-                    left[other] = left.get(other, Fraction(0)) - share * factor
-        left = {name: factor for name, factor in left.items() if factor}
-        if not left:
-            continue
-        pivot, factor = next(iter(left.items()))
-        new = {name: value / factor for name, value in left.items() if name != pivot}, right / factor
-        for name, (own, value) in rows.items():
-            if share := own.pop(pivot, None):
-                for other, part in new[0].items():
-                    own[other] = own.get(other, Fraction(0)) - share * part
-                rows[name] = {other: part for other, part in own.items() if part}, value - share * new[1]
-        rows[pivot] = new
-    return {name: value for name, (own, value) in rows.items() if not own}
+        row = [*(Fraction(factors.get(name, 0)) for name in names), right]
+        for column, own in found:
+            row = [a - row[column] * b for a, b in zip(row, own, strict=True)]
+        pivot = next((k for k, factor in enumerate(row[:-1]) if factor), None)
+        if pivot is not None:
+            row = [value / row[pivot] for value in row]
+            found = [(k, [a - own[pivot] * b for a, b in zip(own, row, strict=True)]) for k, own in found]
+            found.append((pivot, row))
+    return {names[k]: row[-1] for k, row in found if sum(map(bool, row[:-1])) == 1}
 
 
 @dataclass(frozen=True)

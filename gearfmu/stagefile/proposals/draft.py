@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.reading.files import find_stage, put_at, read_layers
+from gearfmu.stagefile.reading.files import find_stage, put_at, read_layers, value_at
 
 LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
 LOAD_RULE = "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears"
@@ -63,10 +63,7 @@ class Draft:
 
     def at(self, place: str) -> Any:
         """The value or table at a place."""
-        found: Any = self.tables
-        for step in place.split("."):
-            found = found[step]
-        return found
+        return value_at(self.tables, place.split("."))
 
     def drop(self, place: str) -> None:
         """Take a field or table out."""
@@ -80,36 +77,36 @@ class Draft:
         """Places of assumed values that a reader should look at, with the reason."""
         return {place: mark for place, mark in self.marks.items() if mark.startswith(f"{self.word}: ")}
 
+    def put_proportions(self, gear: str, module: float, width: float) -> None:
+        """Tip edge and element count across the face of a gear of this module and face width (m), whose flanks are
+        nominal and whose body is meshed here."""
+        for part in ("tip_relief", "lead", "index_deviation", "import"):
+            self.drop(f"{gear}.{part}")
+        self.assume(f"{gear}.tip_edge_radius", millimetres(TIP_EDGE_PER_MODULE * module), "0.05 m_n")
+        across = max(self.at(f"{gear}.body.mesh")["width"], round(width / (_ELEMENT_WIDTH * module)))
+        self.assume(f"{gear}.body.mesh.width", across, "elements of at most 1.25 m_n")
+
+    def put_shafts(self, torques: dict[str, float]) -> None:
+        """Shafts and bores of a pair whose gears carry these torques (N·m) at most."""
+        for name, torque in torques.items():
+            stiffness = rounded_up(torque / _TWIST, 2)
+            self.assume(f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")
+            self.assume(f"ports.{name}.c", f"{rounded_up(_DAMPING * stiffness, 2):g} N*m*s/rad", "5 us times k")
+            self.assume(f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
+
+    def put_limit(self, field: str, known: tuple[float | None, str], usual: tuple[float, str]) -> float:
+        """Puts `torque_max` (N·m) or `speed_max` (rad/s), for which the model is made, and returns it: as known, with
+        its origin, else the usual one rounded up, with the rule behind it."""
+        value = known[0] or rounded_up(usual[0], 2)
+        origin = known[1] if known[0] else f"{self.word}: {usual[1]}"
+        self.put(field, f"{value:.10g} {'N*m' if field == 'torque_max' else 'rad/s'}", origin)
+        return value
+
     def _mark(self, place: tuple[str, ...], value: Any, origin: str) -> None:
         self.marks[".".join(place)] = origin
         if isinstance(value, dict):
             for key, inner in value.items():
                 self._mark((*place, key), inner, origin)
-
-
-def put_proportions(draft: Draft, gear: str, module: float, width: float) -> None:
-    """Tip edge and element count across the face of a gear of this module and face width (m)."""
-    draft.assume(f"{gear}.tip_edge_radius", millimetres(TIP_EDGE_PER_MODULE * module), "0.05 m_n")
-    across = max(draft.at(f"{gear}.body.mesh")["width"], round(width / (_ELEMENT_WIDTH * module)))
-    draft.assume(f"{gear}.body.mesh.width", across, "elements of at most 1.25 m_n")
-
-
-def put_shafts(draft: Draft, torques: dict[str, float]) -> None:
-    """Shafts and bores of a pair whose gears carry these torques (N·m) at most."""
-    for name, torque in torques.items():
-        stiffness = rounded_up(torque / _TWIST, 2)
-        draft.assume(f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")
-        draft.assume(f"ports.{name}.c", f"{rounded_up(_DAMPING * stiffness, 2):g} N*m*s/rad", "5 us times k")
-        draft.assume(f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
-
-
-def put_limit(draft: Draft, field: str, known: tuple[float | None, str], usual: tuple[float, str]) -> float:
-    """Puts `torque_max` (N·m) or `speed_max` (rad/s), for which the model is made, and returns it: as known, with its
-    origin, else the usual one rounded up, with the rule behind it."""
-    value = known[0] or rounded_up(usual[0], 2)
-    origin = known[1] if known[0] else f"{draft.word}: {usual[1]}"
-    draft.put(field, f"{value:.10g} {'N*m' if field == 'torque_max' else 'rad/s'}", origin)
-    return value
 
 
 def millimetres(value: float) -> str:

@@ -19,8 +19,8 @@ from gearfmu.errors import SpecError
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
 from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml
-from gearfmu.stagefile.reading.files import Layers, find_stage, put_at, read_layers
-from gearfmu.stagefile.stage import load_stage, named_files
+from gearfmu.stagefile.reading.files import Layers, files_of, find_stage, put_at, read_layers
+from gearfmu.stagefile.stage import load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
 _DESCRIPTION = "made like {like}; describe it here in one line"
@@ -84,7 +84,7 @@ def _target(name: str, folder: str | os.PathLike[str]) -> Path:
 def _whole(layers: Layers) -> dict[str, Any]:
     """What the file says, with the files that it names by their whole paths."""
     tables = deepcopy(layers.tables)
-    for field, _, path in named_files(layers):
+    for field, _, path in files_of(layers):
         put_at(tables, field, path.resolve().as_posix())
     return tables
 
@@ -99,7 +99,7 @@ def _renamed(source: Path, name: str, like: str) -> str:
     for key, value in values.items():
         text = re.sub(rf'^{key} = ".*"', f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
     layers = read_layers(source)
-    for field, named, path in named_files(layers):
+    for field, named, path in files_of(layers):
         if layers.holder(field) == source:
             key = field.rpartition(".")[2]
             text = text.replace(f'{key} = "{named}"', f'{key} = "{path.resolve().as_posix()}"')

@@ -20,14 +20,7 @@ from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, distance_of_shifts, flank_length
 from gearfmu.quantities import range_of, range_problems
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_down
-from gearfmu.stagefile.proposals.draft import (
-    BACKLASH_PER_MODULE,
-    STRIP_PER_MODULE,
-    Draft,
-    degrees,
-    millimetres,
-    put_proportions,
-)
+from gearfmu.stagefile.proposals.draft import BACKLASH_PER_MODULE, STRIP_PER_MODULE, Draft, degrees, millimetres
 from gearfmu.stagefile.proposals.new import free_target, write_drafted
 from gearfmu.stagefile.stage import load_stage
 
@@ -161,9 +154,7 @@ def begun(stage: str, wish: Wish, table: str, gears: tuple[str, ...]) -> Draft:
     draft.assume(f"{table}.backlash", millimetres(BACKLASH_PER_MODULE * rack.m), "2 % of the module")
     for gear in gears:
         draft.put(f"{gear}.face_width", millimetres(wish.width or 0.0), GIVEN)
-        put_proportions(draft, gear, rack.m, wish.width or 0.0)
-        for part in ("tip_relief", "lead"):
-            draft.drop(f"{gear}.{part}")
+        draft.put_proportions(gear, rack.m, wish.width or 0.0)
     return draft
 
 

@@ -8,15 +8,7 @@ from gearfmu.errors import SpecError
 from gearfmu.geometry.mesh import PairGeometry
 from gearfmu.geometry.shifts import OpenPair, Rack, distance_of_shifts, reach
 from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
-from gearfmu.stagefile.proposals.draft import (
-    LOAD_RULE,
-    PITCH_SPEED,
-    Draft,
-    millimetres,
-    put_limit,
-    put_shafts,
-    usual_torque,
-)
+from gearfmu.stagefile.proposals.draft import LOAD_RULE, PITCH_SPEED, Draft, millimetres, usual_torque
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,
     Wish,
@@ -57,12 +49,12 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     """Torque, speed, load patches and shafts."""
     pinion, wheel = geometry.gears
     ratio = wheel.z / pinion.z
-    torque = put_limit(draft, "torque_max", (wish.torque, GIVEN), (usual_torque(2 * pinion.r, ratio, width), LOAD_RULE))
-    put_limit(draft, "speed_max", (wish.speed, GIVEN), (PITCH_SPEED / pinion.r, "20 m/s at the reference circle"))
+    torque = draft.put_limit("torque_max", (wish.torque, GIVEN), (usual_torque(2 * pinion.r, ratio, width), LOAD_RULE))
+    draft.put_limit("speed_max", (wish.speed, GIVEN), (PITCH_SPEED / pinion.r, "20 m/s at the reference circle"))
     radius = geometry.largest_relative_radius()
     for name, gear in zip(NAMES, geometry.gears, strict=True):
         put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
-    put_shafts(draft, dict(zip(NAMES, (torque, torque * ratio), strict=True)))
+    draft.put_shafts(dict(zip(NAMES, (torque, torque * ratio), strict=True)))
 
 
 def reference_distance(rack: Rack, teeth: int) -> float:

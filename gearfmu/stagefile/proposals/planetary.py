@@ -11,7 +11,7 @@ from gearfmu.geometry.mesh import MOUNTS, RingMesh, least_apart, set_ratio
 from gearfmu.geometry.shifts import DEDENDUM, RING_FILLET, OpenPair, ring_of, ring_shortcomings, sum_of_shifts
 from gearfmu.quantities import range_of
 from gearfmu.stagefile.checks.gears import rounded_up
-from gearfmu.stagefile.proposals.draft import LOAD_RULE, PITCH_SPEED, Draft, millimetres, put_limit, usual_torque
+from gearfmu.stagefile.proposals.draft import LOAD_RULE, PITCH_SPEED, Draft, millimetres, usual_torque
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,
     Wish,
@@ -161,9 +161,9 @@ def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: Rin
     sun, planet = geometry.gears
     ratio, count = set_ratio(sun.z, mesh.ring.z), wish.planets or 1
     usual = usual_torque(2 * sun.r, planet.z / sun.z, width) * count / _SHARING[count] * ratio
-    torque = put_limit(draft, "torque_max", (wish.torque, GIVEN), (usual, LOAD_RULE))
+    torque = draft.put_limit("torque_max", (wish.torque, GIVEN), (usual, LOAD_RULE))
     speed = (PITCH_SPEED / sun.r / ratio, "20 m/s at the reference circle")
-    put_limit(draft, "speed_max", (wish.speed, GIVEN), speed)
+    draft.put_limit("speed_max", (wish.speed, GIVEN), speed)
     load = _SHARING[count] * torque / ratio / count / sun.r_b / width
     outer, inner = geometry.largest_relative_radius(), mesh.largest_relative_radius()
     put_patch(draft, "sun", sun, load, outer)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar, get_args
@@ -26,7 +26,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError, near_or_all
-from gearfmu.quantities import Range, range_of, to_si
+from gearfmu.quantities import Range, quantity_text, range_of, to_si
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -63,21 +63,26 @@ SpecType = TypeVar("SpecType", bound=Spec)
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """Annotation of a float field: the name of its range (`gearfmu.quantities`), which says unit and limits, and words
-    that may replace a number.
-
-    `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
-    plain number.
-    """
+class _Ranged:
+    """Annotation of a field: the name of its range (`gearfmu.quantities`)."""
 
     name: str
-    words: tuple[str, ...] = ()
 
     @property
     def range(self) -> Range:
         """Limits, SI unit and remedy."""
         return range_of(self.name)
+
+
+@dataclass(frozen=True)
+class Quantity(_Ranged):
+    """Annotation of a float field, whose range says unit and limits, and words that may replace a number.
+
+    `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
+    plain number.
+    """
+
+    words: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
@@ -122,15 +127,8 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Whole:
-    """Annotation of an integer field: the name of its range (`gearfmu.quantities`)."""
-
-    name: str
-
-    @property
-    def range(self) -> Range:
-        """Limits and remedy."""
-        return range_of(self.name)
+class Whole(_Ranged):
+    """Annotation of an integer field."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         return core_schema.no_info_after_validator_function(self._checked, handler(source))
@@ -315,3 +313,29 @@ def _inner_models(annotation: Any) -> list[type[BaseModel]]:
 def _shown(value: Any) -> str:
     text = f'"{value}"' if isinstance(value, str) else str(value)
     return text if len(text) <= 60 else f"{text[:57]}…"
+
+
+def shown(spec: BaseModel) -> dict[str, Any]:
+    """The fields of a spec as a person reads it: quantities as text with their units, in those of the drawing office;
+    parts that have names under them. What is not given is left out."""
+    found = {}
+    for name, field in type(spec).model_fields.items():
+        value = getattr(spec, name)
+        quantity = quantity_of(field)
+        if value is not None:
+            found[name] = _as_read(value, quantity.unit if quantity else "")
+    return found
+
+
+def _as_read(value: Any, unit: str) -> Any:
+    if isinstance(value, BaseModel):
+        return shown(value)
+    if isinstance(value, Mapping):
+        return {str(key): _as_read(item, unit) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        if value and all(isinstance(item, BaseModel) and hasattr(item, "name") for item in value):
+            return {item.name: _as_read(item, unit) for item in value}
+        return [_as_read(item, unit) for item in value]
+    if unit and isinstance(value, float):
+        return quantity_text(value, unit)
+    return value

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import types
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
@@ -67,6 +67,7 @@ def model_folder(stage: Any) -> Path:
     return Path(stage.source).parent
 
 
+FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
 _DEPTH = 8
 MISSING = object()
 
@@ -126,6 +127,25 @@ def read_layers(path: Path) -> Layers:
             remedy = f"there is no file {following}: write the path relative to this file"
             raise SpecError.of(current, "base", base, remedy)
         current = following
+
+
+def files_of(layers: Layers) -> list[tuple[str, str, Path]]:
+    """Field, text and path of every file that a stage file names for its bodies."""
+    found = ((field, table[key]) for table, key, field in named_files(layers.tables))
+    return [(field, name, layers.named(field, name)) for field, name in found if isinstance(name, str)]
+
+
+def named_files(tables: Any, field: str = "") -> Iterator[tuple[dict[str, Any], str, str]]:
+    """(table, key, field) of every name of a file in the tables of a stage, as its file has them or as they are
+    dumped."""
+    for key, value in tables.items() if isinstance(tables, dict) else enumerate(tables):
+        place = f"{field}.{key}" if field else str(key)
+        if key in ("import", "imported", "reduced") and isinstance(value, dict):
+            yield from ((value, name, f"{place}.{name}") for name in FILES if value.get(name))
+        elif key == "topography" and value:
+            yield tables, key, place
+        elif isinstance(value, (dict, list)):
+            yield from named_files(value, place)
 
 
 def merged_tables(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:

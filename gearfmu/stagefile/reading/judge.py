@@ -29,18 +29,15 @@ def as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
         except ValidationError as error:
             entries = error.errors(include_url=False)
         misspelt = [entry for entry in entries if entry["type"] == "extra_forbidden"]
-        others = [entry for entry in entries if entry["type"] != "extra_forbidden"]
-        if misspelt:
-            done = all([_rename(kind, tables, entry["loc"]) for entry in misspelt])
-        else:
-            done = all([_put_right(kind, tables, entry) for entry in others])
-        if not done:
+        change = _rename if misspelt else _put_right
+        if not all([change(kind, tables, entry) for entry in misspelt or entries]):
             return None
     return None
 
 
-def _rename(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | int, ...]) -> bool:
+def _rename(kind: type[SpecType], tables: dict[str, Any], entry: Any) -> bool:
     """Gives an unknown key the name that it nearly has, where nothing stands there; else takes it away."""
+    loc = entry["loc"]
     *way, key = raw_path(tables, loc)
     inside = value_at(tables, way)
     if not isinstance(inside, dict) or key not in inside:

@@ -8,7 +8,7 @@ positive; a *deviation* is positive where there is more material than nominal (I
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -232,7 +232,22 @@ class Material(Spec):
     density: Annotated[float, Quantity("density")] = entry("density")
 
 
-class MeshSpec(Spec):
+class Counts(Spec):
+    """Element counts of a mesh, which a field `scale` multiplies."""
+
+    if TYPE_CHECKING:
+        scale: float
+
+    def scaled(self, count: int, least: int = 1) -> int:
+        """`count` times the scale, rounded."""
+        return max(least, round(self.scale * count))
+
+    def growth(self, grading: float) -> float:
+        """Growth per element at this scale: scale 2 divides the elements of scale 1 within the same series."""
+        return float(grading ** (1 / self.scale))
+
+
+class MeshSpec(Counts):
     """Element counts of the sector mesh (20-node hexahedra; half a tooth) and how they are graded.
 
     The defaults are the counts on which the loaded transmission error of the shipped pair is converged to 1 %
@@ -251,14 +266,6 @@ class MeshSpec(Spec):
         "largest growth of elements from the root to the bore", 1.5
     )
     scale: Annotated[float, Quantity("scale")] = entry("factor on all counts; the gradings keep their shape", 1.0)
-
-    def scaled(self, count: int, least: int = 1) -> int:
-        """`count` times the scale, rounded."""
-        return max(least, round(self.scale * count))
-
-    def growth(self, grading: float) -> float:
-        """Growth per element at this scale: scale 2 divides the elements of scale 1 within the same series."""
-        return float(grading ** (1 / self.scale))
 
 
 class BodySpec(Spec):

@@ -271,6 +271,9 @@ AxialSpring = Annotated[float, Quantity("axial_stiffness", words=("rigid",))]
 TiltSpring = Annotated[float, Quantity("tilt_stiffness", words=("rigid",))]
 
 
+DIRECTIONS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}  # of x, y, z, rx, ry, rz
+
+
 class SupportSpec(LaterFields):
     """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
     free. A rolling bearing has its own stiffness."""

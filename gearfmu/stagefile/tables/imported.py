@@ -5,20 +5,17 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.reading.base import Quantity, Spec, Text, entry, refuse
-from gearfmu.stagefile.reading.files import Layers
+from gearfmu.stagefile.reading.files import FILES
 
 FlankTolerance = Annotated[float, Quantity("flank_tolerance")]
 SurfaceCoupling = Literal["averaging", "rigid"]
 ELSEWHERE = "finite elements made elsewhere; meshed here when the table is absent"
-FILES = ("file", "stiffness", "mass", "unknowns", "recovery", "recovered", "surface")
-
-Files = TypeVar("Files", bound="SourceSpec")
 
 
 class SourceSpec(Spec):
@@ -40,19 +37,12 @@ class SourceSpec(Spec):
     )
 
     @model_validator(mode="after")
-    def _both_matrices(self: Files) -> Files:
+    def _both_matrices(self) -> SourceSpec:
         if bool(self.stiffness) != bool(self.mass):
             raise refuse("stiffness and mass come together: give both files or none")
         if self.unknowns and not self.stiffness:
             raise refuse("unknowns sorts the rows of ready-made matrices: give stiffness and mass too")
         return self
-
-    def located(self: Files, layers: Layers, place: str) -> Files:
-        """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
-        section, "gears.pinion.import"."""
-        named = [field for field in FILES if getattr(self, field, "")]
-        files = {field: str(layers.named(f"{place}.{field}", getattr(self, field))) for field in named}
-        return self.model_copy(update=files)
 
 
 class FilesSpec(SourceSpec):
@@ -97,7 +87,7 @@ class CarrierImportSpec(FilesSpec):
 def import_inputs(spec: SourceSpec) -> dict[str, Any]:
     """What the import contributes to the hash of a body: its fields, with the SHA-256 of each file for its name.
 
-    spec : its files as they can be opened (`located`). SpecError for every file that is not there, by its field alone.
+    spec : its files as they can be opened. SpecError for every file that is not there, by its field alone.
     """
     values, problems = spec.model_dump(exclude_none=True), []
     for field in FILES:
