@@ -90,7 +90,7 @@ def measure(source: Source, recorded: str) -> dict[str, object]:
     stage = source.unit({"level": "rigid", "slices": 1} | drive.start())
     timed = Clocked(stage)
     unit = PyUnit(drive.partner(lambda torques: {}))
-    chosen = master("gs_mean", Cut(timed, unit, tuple(drive.ports), drive.signals))
+    chosen = master("gs_mean", Cut(timed, unit, drive.signals))
     recorder = Recorder(timed, unit, RECORDED[recorded], STEPS, drive.silent)
     chosen.begin(0.0)
     whole, inside, outside = run(chosen, recorder, timed)
@@ -113,20 +113,20 @@ def measure(source: Source, recorded: str) -> dict[str, object]:
 
 def parts(chosen: Any, stage: Any, empty: float, names: list[str]) -> dict[str, float]:
     """What unit, drivetrain and signals cost of a step, µs."""
-    exchange, ports, time = chosen.exchange, chosen.ports, STEPS * STEP
-    inputs = stage.resolve([f"{shaft}.{key}" for shaft in exchange.cut.shafts for key in KEYS])
-    mean, log = exchange.torque("tau_mean"), stage.log(names, 5 * STEPS)
-    values, tau = exchange.motion.copy(), stage.get(mean).tolist()
+    drive, time = chosen.drive, STEPS * STEP
+    inputs = stage.resolve([f"{shaft}.{key}" for shaft in drive.ports for key in KEYS])
+    mean, log = stage.resolve([f"{shaft}.tau_mean" for shaft in drive.ports]), stage.log(names, 5 * STEPS)
+    values, tau = chosen.motion.copy(), stage.get(mean).tolist()
     given = loop(lambda: stage.set(inputs, values))
 
     def drivetrain() -> None:
-        ports.ahead(time, STEP, exchange.motion)
-        ports.step(tau, time, STEP)
+        drive.ahead(time, STEP, chosen.motion)
+        drive.drive(tau, time, STEP)
 
     return {
         "unit_us": given + empty + loop(lambda: stage.get(mean).tolist()) + loop(log.take),
         "drivetrain_us": loop(drivetrain),
-        "signals_us": loop(lambda: exchange.send(time, STEP)) - given,
+        "signals_us": loop(lambda: chosen.send(time, STEP)) - given,
     }
 
 

@@ -79,11 +79,9 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
         if not coupled.recorder.count:
             raise
         outcome, message = getattr(error, "outcome", STOPPED), str(error)
-    facts, ports = coupled.facts(), coupled.master.ports
-    trace = coupled.recorder.trace({})
+    facts, trace, made_by = coupled.facts(), coupled.recorder.trace({}), coupled.master
     cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
-    exchanged = (ports.work, ports.throughput)
-    return Result(trace, outcome, message, cpu, cpu * share, *exchanged, coupled.master.order, facts, coupled.frames)
+    return Result(trace, outcome, message, cpu, cpu * share, *made_by.exchanged, made_by.order, facts, coupled.frames)
 
 
 SOLVER_FACTS = ("n_dyn", "h", "retried_steps", "steps", "status")

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -103,20 +103,13 @@ class Loaded:
 
 
 @dataclass
-class Exchanged:
-    """Energy that the loads got from the stage, signed sum and sum of magnitudes, J (as of `Ports`)."""
-
-    work: float = 0.0
-    throughput: float = 0.0
-
-
-@dataclass
 class TorqueMaster:
-    """Steps a loaded stage. foreseen: whether the torque is the mean of the step or that of its beginning."""
+    """Steps a loaded stage. foreseen: whether the torque is the mean of the step or that of its beginning; exchanged:
+    energy that the loads got from the stage, signed sum and sum of magnitudes, J."""
 
     cut: Loaded
     foreseen: bool = True
-    ports: Exchanged = field(default_factory=Exchanged)
+    exchanged: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         stage, names = self.cut.stage, list(self.cut.drive.laws)
@@ -146,19 +139,19 @@ class TorqueMaster:
         stage.step(time, h)
         given = drive.tau * (stage.get(self._phi) - start)
         drive.work = drive.work + given
-        self.ports.work -= float(given.sum())
-        self.ports.throughput += float(np.abs(given).sum())
+        work, throughput = self.exchanged
+        self.exchanged = work - float(given.sum()), throughput + float(np.abs(given).sum())
         self._speeds.append(stage.get(self._w).copy())
 
     def save(self) -> Any:
         """Torques, works and the last speeds."""
-        drive, ports = self.cut.drive, self.ports
-        return drive.tau.copy(), drive.work.copy(), tuple(self._speeds), ports.work, ports.throughput
+        drive = self.cut.drive
+        return drive.tau.copy(), drive.work.copy(), tuple(self._speeds), self.exchanged
 
     def restore(self, state: Any) -> None:
         """Back to a saved state."""
         drive = self.cut.drive
-        drive.tau, drive.work, speeds, self.ports.work, self.ports.throughput = state
+        drive.tau, drive.work, speeds, self.exchanged = state
         self._speeds = deque(speeds, maxlen=CARRIED_ON + 1)
 
     def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
