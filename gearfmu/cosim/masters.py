@@ -8,7 +8,7 @@ gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion o
 jacobi   The usual way of importers: all outputs are exchanged at the communication points and held. First order; second
          with `tau_next` held instead of `tau`.
 
-A stage under known torques (`Loaded`) has no drivetrain to exchange with: `TorqueMaster`.
+A stage under known torques (`ShaftLoads`) has no drivetrain to exchange with: `TorqueMaster`.
 
 Signals, which are known beforehand, reach the stage as value at the start and rate over the step.
 """
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.shaft_loads import Loaded, TorqueMaster
+from gearfmu.cosim.shaft_loads import ShaftLoads
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
@@ -32,24 +32,25 @@ RATE = "_rate"  # a signal's rate is the input of its name with this ending
 
 @dataclass(frozen=True)
 class Cut:
-    """Where two units meet: the stage's spring ports and the drivetrain's torque ports of the same names, and signals
-    that only the stage receives."""
+    """Where two units meet: the stage's spring ports and the drivetrain's torque ports of the same names, or torque
+    ports under loads; and signals that only the stage receives."""
 
     stage: Unit
-    drive: PyUnit
+    drive: PyUnit | ShaftLoads
     signals: tuple[tuple[str, Ramp], ...] = ()
 
 
 class _CutMaster:
-    """Both masters of a cut: how they begin, and what they send. order: of the scheme; motion: φ, w, a shaft by shaft,
-    as the stage gets them next."""
+    """Both masters of a drivetrain: how they begin, and what they send. order: of the scheme; motion: φ, w, a shaft by
+    shaft, as the stage gets them next."""
 
     order: int
 
     def __init__(self, cut: Cut) -> None:
+        assert isinstance(cut.drive, PyUnit), "loads have a master of their own"
         self.stage, self.drive = cut.stage, cut.drive
         self.signals = [signal for _, signal in cut.signals]
-        names = [f"{shaft}.{key}" for shaft in cut.drive.ports for key in KEYS]
+        names = [f"{shaft}.{key}" for shaft in self.drive.ports for key in KEYS]
         self._values = np.zeros(len(names) + 2 * len(cut.signals))
         self.motion, self._known = np.split(self._values, [len(names)])
         names += [name + ending for ending in ("", RATE) for name, _ in cut.signals]
@@ -59,11 +60,6 @@ class _CutMaster:
     def _torque(self, key: str) -> Any:
         """Handle of one torque output of every shaft."""
         return self.stage.resolve([f"{shaft}.{key}" for shaft in self.drive.ports])
-
-    @property
-    def exchanged(self) -> tuple[float, float]:
-        """J that the drivetrain got from the stage: signed sum, sum of magnitudes."""
-        return self.drive.state.work, self.drive.state.throughput
 
     def begin(self, time: float) -> None:
         """Initialise the drivetrain, then the stage at the drivetrain's motion."""
@@ -80,14 +76,6 @@ class _CutMaster:
             self._known[k] = first
             self._known[len(self.signals) + k] = (last - first) / h if h else 0.0
         self.stage.set(self._inputs, self._values)
-
-    def save(self) -> Any:
-        """State of the drivetrain."""
-        return self.drive.save()
-
-    def restore(self, state: Any) -> None:
-        """Back to a saved one."""
-        self.drive.restore(state)
 
 
 class GsMean(_CutMaster):
@@ -118,12 +106,41 @@ class Jacobi(_CutMaster):
         self.drive.drive(tau, time, h)
 
 
+class TorqueMaster:
+    """Steps a stage under loads. foreseen: whether the torque is the mean of the step or that of its beginning."""
+
+    def __init__(self, stage: Unit, loads: ShaftLoads, foreseen: bool) -> None:
+        self.stage, self.loads, self.foreseen, self.order = stage, loads, foreseen, 2 if foreseen else 1
+        self._tau, self._phi, self._w = (
+            stage.resolve([f"{name}.{key}" for name in loads.laws]) for key in ("tau", "phi", "w")
+        )
+
+    def begin(self, time: float) -> None:
+        """Initialise the stage at rest under the torques of the start."""
+        self.loads.hold(time)
+        self.stage.set(self._tau, self.loads.tau)
+        self.stage.initialize(time)
+
+    def step(self, time: float, h: float) -> None:
+        """One communication step."""
+        if self.foreseen:
+            self.loads.hold_mean(time, h)
+        else:
+            self.loads.hold(time)
+        self.stage.set(self._tau, self.loads.tau)
+        start = self.stage.get(self._phi).copy()
+        self.stage.step(time, h)
+        self.loads.count(self.stage.get(self._phi) - start, self.stage.get(self._w))
+
+
 Master = GsMean | Jacobi | TorqueMaster
 MASTERS: dict[str, type[GsMean] | type[Jacobi]] = {"gs_mean": GsMean, "jacobi": Jacobi}
 
 
-def master(name: str, cut: Cut | Loaded) -> Master:
+def master(name: str, cut: Cut) -> Master:
     """The master of that name over `cut`; raises CouplingError with the known names."""
     if name not in MASTERS:
         raise CouplingError(f"no master {name!r}; choose one of {', '.join(MASTERS)}")
-    return TorqueMaster(cut, name == "gs_mean") if isinstance(cut, Loaded) else MASTERS[name](cut)
+    if isinstance(cut.drive, ShaftLoads):
+        return TorqueMaster(cut.stage, cut.drive, name == "gs_mean")
+    return MASTERS[name](cut)

@@ -21,13 +21,12 @@ class State:
     mode: Mode
     torque: tuple[float, ...]  # of the ports, N·m, held over the step
     tau_mean: np.ndarray  # (d,) N·m, on the driven nodes
-    work: float  # J, given to the network through its ports: signed sum,
-    throughput: float  # and sum of magnitudes
+    exchanged: tuple[float, float]  # J, given to the network through its ports: signed sum, sum of magnitudes
     events: tuple[Event, ...]  # when a clutch locked or slipped, in order
 
     def copy(self) -> State:
         """The same values, from now on their own."""
-        return State(self.time, self.x, self.mode, self.torque, self.tau_mean, self.work, self.throughput, self.events)
+        return State(self.time, self.x, self.mode, self.torque, self.tau_mean, self.exchanged, self.events)
 
 
 class Table:

@@ -86,7 +86,7 @@ class PyUnit:
     def _start(self, time: float, torque: tuple[float, ...]) -> None:
         d, nodes = self.dynamics, self.network.nodes
         x = np.array([p.phi for p in nodes] + [p.w for p in nodes] + [0.0] * d.n_driven, dtype=float)
-        self.state = State(time, x, (0,) * d.n_clutches, torque, np.zeros(d.n_driven), 0.0, 0.0, ())
+        self.state = State(time, x, (0,) * d.n_clutches, torque, np.zeros(d.n_driven), (0.0, 0.0), ())
         if d.n_clutches:
             self.state.mode = initial_mode(d, x, self._inputs(time, x), self._capacity(time, time)[0])
 
@@ -143,6 +143,11 @@ class PyUnit:
         """Keeps these outputs at up to `points` times."""
         return NetworkLog(self._outputs, names, lambda: self.state)
 
+    @property
+    def exchanged(self) -> tuple[float, float]:
+        """J that came in through the ports: signed sum, sum of magnitudes."""
+        return self.state.exchanged
+
     # -- stepping ------------------------------------------------------------------------------------------------------
     def drive(self, torque: Sequence[float], time: float, h: float) -> None:
         """From `time` to time + h under these torques on the ports; counts their work."""
@@ -152,11 +157,12 @@ class PyUnit:
         else:
             self.hold(torque)
             self.step(time, h)
-        state = self.state
+        state, (work, throughput) = self.state, self.state.exchanged
         for tau, node in zip(state.torque, self._nodes, strict=True):
-            work = tau * (state.x.item(node) - before.item(node))
-            state.work += work
-            state.throughput += abs(work)
+            given = tau * (state.x.item(node) - before.item(node))
+            work += given
+            throughput += abs(given)
+        state.exchanged = work, throughput
 
     def _complete(self, torque: Sequence[float], time: float, h: float) -> None:
         """The step just foreseen, under these torques instead of the held ones."""

@@ -27,7 +27,7 @@ from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
 from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
+from gearfmu.cosim.shaft_loads import ShaftLoads, loads_drive
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
@@ -216,11 +216,11 @@ def _plan(scene: SceneSpec, drive: Drive) -> Plan:
     return Plan(coupling.master, coupling.step, scene.steps, scene.record, omit=drive.silent)
 
 
-def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel) -> Cut | Loaded:
+def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel) -> Cut:
     """stage: of the model."""
     if not callable(drive.partner):
         speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
-        return Loaded(stage, ShaftLoads(drive.partner), speeds)
+        return Cut(stage, ShaftLoads(drive.partner, speeds))
 
     def rest(torques: Mapping[str, float]) -> Mapping[str, float]:
         kernel = KernelUnit(model.blob, _parameters(scene, drive)).kernel

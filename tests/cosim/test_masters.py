@@ -30,7 +30,7 @@ def coupled(plant: Plant, name: str, h: float) -> tuple[np.ndarray, float]:
     for n in range(steps):
         chosen.step(n * h, h)
         log.take()
-    work, throughput = chosen.exchanged
+    work, throughput = chosen.drive.exchanged
     return log.rows(), (work + stage.work) / throughput
 
 

@@ -38,7 +38,7 @@ def driven(unit: PyUnit, h: float, steps: int) -> np.ndarray:
     for n in range(steps):
         unit.ahead(n * h, h, motion)
         unit.drive(torques(n), n * h, h)
-        rows.append([*motion, unit.state.work, unit.state.throughput])
+        rows.append([*motion, *unit.exchanged])
     return np.array(rows)
 
 
