@@ -23,7 +23,7 @@ from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_co
 from gearfmu.cosim.drive import Drive, car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
-from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
 from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
@@ -175,7 +175,7 @@ def stage_source(staged: Staged, unit: str, out_dir: str | Path | None) -> Itera
 
 def run_once(
     scene: SceneSpec,
-    source: UnitSource,
+    source: Source,
     progress: Progress | None = None,
     frames: FramePlan | None = None,
 ) -> Result:
@@ -190,7 +190,7 @@ def run_once(
         stage.close()
 
 
-def coupled_run(scene: SceneSpec, source: UnitSource) -> CoupledRun:
+def coupled_run(scene: SceneSpec, source: Source) -> CoupledRun:
     """A run of the scene that is stepped from outside; not begun."""
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))

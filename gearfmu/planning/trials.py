@@ -186,7 +186,7 @@ def _run(task: Task) -> Trial:
     step, meshes = scene.coupling.step, [mesh.name for mesh in model.stage.engagements]
     first, last = (round(t / step) for t in (task.window.start, task.window.end))
     at = max(1, round((task.window.start - task.window.settle) / step))
-    source = KeptSource(model, task.window.start)
+    source = KeptSource(model, settle=task.window.start)
     watched = [f"{mesh}.{key}" for mesh in meshes for key in MESH_CHANNELS]
     scene = _recording(scene, [*task.request.channels, *watched, *SOLVER])
     started = clock.process_time()
@@ -200,7 +200,7 @@ def _run(task: Task) -> Trial:
     run.take_over(before)
     trace = run.window(first, last)
     spent = clock.process_time() - started
-    return replace(_judged(task, trace, meshes, _price(task, source.made)), run=spent)
+    return replace(_judged(task, trace, meshes, _price(task, source.made[-1])), run=spent)
 
 
 def _price(task: Task, unit: Kept) -> Price:

@@ -17,7 +17,7 @@ import numpy as np
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.coupled import OK, Result
-from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
+from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit, Source
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, assemble
@@ -130,17 +130,16 @@ class Kept(KernelUnit):
         return (float(np.mean(medians)) - float(np.median(idle))) / self.interval
 
 
-@dataclass
-class KeptSource:
-    """A source of such units; `made` is the last."""
+@dataclass(frozen=True)
+class KeptSource(Source):
+    """A source of such units, which it keeps in `made`."""
 
-    model: StageModel
-    settle: float
-    made: Kept = field(init=False)
+    settle: float = 0.0
+    made: list[Kept] = field(default_factory=list)
 
     def unit(self, parameters: Mapping[str, float | bool | str]) -> Kept:
-        self.made = Kept(self.model.blob, parameters, self.settle)
-        return self.made
+        self.made.append(Kept(self.model.blob, parameters, self.settle))
+        return self.made[-1]
 
 
 def models_for(
@@ -155,8 +154,8 @@ def models_for(
 def recorded_run(scene: SceneSpec, model: StageModel) -> tuple[Result, Kept]:
     """A coupled run of the scene as it is, by the kernel, and its stage with its inputs; the state that a replay begins
     at is that after the scene's settling time. ModelError when the kernel refuses it, with the kernel's reason."""
-    source = KeptSource(model, scene.settle)
-    return run_once(scene, source), source.made
+    source = KeptSource(model, settle=scene.settle)
+    return run_once(scene, source), source.made[-1]
 
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
