@@ -65,7 +65,7 @@ def loop(call: Callable[[], object]) -> float:
 def empty_call(stage: Any) -> Callable[[], object]:
     """A call of the stage's library with nothing to do."""
     if isinstance(stage, FmuUnit):
-        return lambda: stage.read("Real", None, 0, None)
+        return lambda: stage._getters["Real"](stage._component, None, 0, None)
     handle = stage.resolve([])
     return lambda: stage.get(handle)
 

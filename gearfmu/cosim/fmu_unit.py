@@ -67,15 +67,16 @@ class _Group:
     references: Any  # ctypes array of value references
     values: Any  # address of the memory that the FMU reads or fills
     view: np.ndarray  # the same memory
-    places: np.ndarray | slice  # positions in the handle's buffer
+    places: np.ndarray  # positions in the handle's buffer
 
 
 @dataclass(frozen=True)
 class FmuHandle:
-    """Resolved variables and their buffer."""
+    """Resolved variables and their buffers; when all are Real, the one group's memory is the buffer."""
 
     groups: tuple[_Group, ...]
     buffer: np.ndarray
+    real: bool
 
 
 class FmuUnit:
@@ -168,33 +169,36 @@ class FmuUnit:
             raise CouplingError(
                 f"{self.path}: no variable {', '.join(unknown)}; take an FMU exported with the ports that this needs"
             )
-        groups = []
+        buffer, groups = np.zeros(len(names)), []
         for call, kind in TYPES.items():
             places = [k for k, name in enumerate(names) if KINDS.get(self.variables[name].type) == (call, kind)]
             if places:
-                view = np.zeros(len(places), dtype=np.dtype(kind))
-                numbers = [self.variables[names[k]].valueReference for k in places]
-                references, all_of_them = (fmi2ValueReference * len(places))(*numbers), len(places) == len(names)
-                own = slice(None) if all_of_them else np.array(places)
-                groups.append(_Group(call, references, c_void_p(view.ctypes.data), view, own))
-        return FmuHandle(tuple(groups), np.zeros(len(names)))
+                real = len(places) == len(names) and call == "Real"
+                view = buffer if real else np.zeros(len(places), dtype=np.dtype(kind))
+                references = (fmi2ValueReference * len(places))(
+                    *[self.variables[names[k]].valueReference for k in places]
+                )
+                groups.append(_Group(call, references, c_void_p(view.ctypes.data), view, np.array(places)))
+        return FmuHandle(tuple(groups), buffer, len(groups) == 1 and groups[0].view is buffer)
 
     def set(self, handle: FmuHandle, values: Sequence[float] | np.ndarray) -> None:
         """Set variables, one call a type. Raises FmuError when the FMU refuses a value."""
         handle.buffer[:] = values
         for group in handle.groups:
-            group.view[:] = handle.buffer[group.places]
+            if not handle.real:
+                group.view[:] = handle.buffer[group.places]
             setter = self._setters[group.call]
-            if setter(self._component, group.references, len(group.view), group.values) > fmi2Warning:
+            if setter(self._component, group.references, len(group.places), group.values) > fmi2Warning:
                 raise FmuError(f"{self.path}: fmi2Set{group.call} refused. {self._last_message()}")
 
     def get(self, handle: FmuHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer, one call a type."""
         for group in handle.groups:
             getter = self._getters[group.call]
-            if getter(self._component, group.references, len(group.view), group.values) > fmi2Warning:
+            if getter(self._component, group.references, len(group.places), group.values) > fmi2Warning:
                 raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
-            handle.buffer[group.places] = group.view
+            if not handle.real:
+                handle.buffer[group.places] = group.view
         return handle.buffer
 
     def log(self, names: Sequence[str], points: int) -> RowLog:

@@ -69,7 +69,8 @@ class PyUnit:
         self.network, self.dynamics, self.micro_step = network, Dynamics(network), micro_step
         d = self.dynamics
         self.ports = tuple(network.torque_ports)
-        self._nodes = np.array([d.node[node] for node in network.torque_ports.values()], dtype=int)
+        self._nodes = [d.node[node] for node in network.torque_ports.values()]
+        self._speeds = [d.n + node for node in self._nodes]
         self._loads = _loads(network, d.node)
         self._outputs = Outputs(d)
         self._z = np.zeros(d.states + 2 * d.inputs)
@@ -105,17 +106,17 @@ class PyUnit:
 
     def now(self, out: np.ndarray) -> None:
         """φ, w, a of the ports at present, under the held torques."""
-        state, m, speeds = self.state, self.dynamics.matrices(self.state.mode), self.dynamics.n + self._nodes
-        rows = np.hstack([m.a[speeds], m.b[speeds]])
-        out[0::3], out[1::3] = state.x[self._nodes], state.x[speeds]
+        state, m = self.state, self.dynamics.matrices(self.state.mode)
+        rows = np.hstack([m.a[self._speeds], m.b[self._speeds]])
+        out[0::3], out[1::3] = state.x[self._nodes], state.x[self._speeds]
         out[2::3] = np.dot(rows, np.concatenate([state.x, self._inputs(state.time, state.x)]))
 
     def ahead(self, time: float, h: float, out: np.ndarray) -> None:
         """φ, w of the ports at present, and the constant accelerations that end where the held torques lead in h s."""
         if self.dynamics.n_clutches or (self.micro_step and h > self.micro_step * (1.0 + 1e-9)):
-            saved, n = self.save(), self.dynamics.n
+            saved = self.save()
             self.step(time, h)
-            out[0::3], out[1::3] = saved.x[self._nodes], saved.x[n + self._nodes]
+            out[0::3], out[1::3] = saved.x[self._nodes], saved.x[self._speeds]
             out[2::3] = 2.0 * (self.state.x[self._nodes] - out[0::3] - out[1::3] * h) / h**2
             self.restore(saved)
             return
@@ -130,8 +131,8 @@ class PyUnit:
         """Rows that make φ, w and the acceleration ahead of [x, u at the start, u at the end]."""
         step, self._h = self.dynamics.transition(self.state.mode, h), h
         rows: np.ndarray = np.zeros((3 * len(self._nodes), step.shape[1]))
-        for k, node in enumerate(self._nodes):
-            rows[3 * k, node] = rows[3 * k + 1, self.dynamics.n + node] = 1.0
+        for k, (node, speed) in enumerate(zip(self._nodes, self._speeds, strict=True)):
+            rows[3 * k, node] = rows[3 * k + 1, speed] = 1.0
             rows[3 * k + 2] = 2.0 * (step[node] - rows[3 * k] - h * rows[3 * k + 1]) / h**2
         self._ahead = rows
 
