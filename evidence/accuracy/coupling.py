@@ -16,18 +16,19 @@ the latter, from the committed table.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evidence.tables import read_rows, told, write_rows
 from gearfmu.cosim.accuracy import Window, alternating, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Result
-from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.masters import Wiring
+from gearfmu.cosim.kernel_unit import KernelUnit, RowLog, Source
+from gearfmu.cosim.masters import KEYS, RATE
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.errors import CouplingError
 from gearfmu.files import written_whole
@@ -92,6 +93,68 @@ class Group:
 
 
 @dataclass(frozen=True)
+class Wiring:
+    """Connections of an importer: motion inputs of the stage, rates of its signals, and the torque output that jacobi
+    holds over a step ("tau" or "tau_next"). Start values of φ and w are given in any case; after them an input that is
+    not connected stays as it is."""
+
+    motion: tuple[str, ...] = KEYS
+    rates: bool = True
+    held: str = "tau"
+
+    def has(self, name: str) -> bool:
+        """Whether an input of the stage is connected."""
+        return self.rates if name.endswith(RATE) else name.rpartition(".")[2] in (*self.motion, "capacity")
+
+    def order(self, master: str) -> int:
+        """Of a master with these connections."""
+        return 2 if self.motion == KEYS and self.rates and (master == "gs_mean" or self.held == "tau_next") else 1
+
+
+class WiredUnit(KernelUnit):
+    """A stage as an importer with these connections steps it."""
+
+    def __init__(self, blob: bytes, parameters: Mapping[str, Any], wiring: Wiring) -> None:
+        super().__init__(blob, parameters)
+        self.wiring, self.begun = wiring, False
+
+    def initialize(self, time: float) -> None:
+        """From now on inputs that are not connected stay."""
+        super().initialize(time)
+        self.begun = True
+
+    def resolve(self, names: Sequence[str]) -> Any:
+        """The held torque in place of `tau`; a handle of inputs is their names."""
+        if all(self.kernel.variables[name].causality == "input" for name in names):
+            return names
+        held = f".{self.wiring.held}"
+        return super().resolve([name.removesuffix(".tau") + held if name.endswith(".tau") else name for name in names])
+
+    def log(self, names: Sequence[str], points: int) -> RowLog:
+        """Of these outputs themselves."""
+        return RowLog(partial(self.get, super().resolve(names)), len(names), points)
+
+    def set(self, handle: Any, values: Any) -> None:
+        """Connected inputs, before the start φ and w too."""
+        given = {n: v for n, v in zip(handle, values, strict=True) if self.wiring.has(n) or self._starts(n)}
+        super().set(super().resolve(list(given)), list(given.values()))
+
+    def _starts(self, name: str) -> bool:
+        return not self.begun and name.endswith((".phi", ".w"))
+
+
+@dataclass(frozen=True)
+class WiredSource(Source):
+    """A source of such units."""
+
+    wiring: Wiring = Wiring()
+
+    def unit(self, parameters: Mapping[str, Any]) -> WiredUnit:
+        """A fresh instance with these start values."""
+        return WiredUnit(self.model.blob, parameters, self.wiring)
+
+
+@dataclass(frozen=True)
 class Line:
     """A master and what is connected."""
 
@@ -140,7 +203,7 @@ def rows(group: Group, lines: tuple[Line, ...], steps: tuple[float, ...]) -> Ite
         sizes = (2.0 * group.h, *steps) if line in (GS, NEXT) else steps
         results: dict[float, Result] = {}
         for step in sizes:
-            results[step] = run_once(group.scene(line.master, step), source, wiring=line.wiring)
+            results[step] = run_once(group.scene(line.master, step), WiredSource(source.model, wiring=line.wiring))
         for step in sizes:
             yield row(group, line, results, step, reference)
 
@@ -162,7 +225,8 @@ def row(group: Group, line: Line, results: dict[float, Result], step: float, ref
         return found | dict.fromkeys(NUMBERS)
     true = distance(result.trace, reference, name, WHOLE)
     half = next((r for h, r in results.items() if abs(2 * h - step) < 1e-12 and r.outcome == OK), None)
-    estimate = coupling_errors(result.trace, half.trace, result.order, WHOLE)[name].rms if half else None
+    order = line.wiring.order(line.master)
+    estimate = coupling_errors(result.trace, half.trace, order, WHOLE)[name].rms if half else None
     return found | {
         "error_over_ac": true.over_ac,
         "error_over_std": true.over_std,

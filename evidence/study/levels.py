@@ -17,10 +17,11 @@ import numpy as np
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
 from gearfmu.scenefile.scene import load_scene
+from gearfmu.stage.assembly.levels import LEVELS
 from gearfmu.stage.run.trace import write_columns
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.norm import Signals
-from gearfmu.study.run import Job, default_rows
+from gearfmu.study.run import Job, study
 from gearfmu.study.table import Row
 
 
@@ -49,9 +50,10 @@ def main() -> None:
     parser.add_argument("--study", type=Path, default=Path(__file__).parent)
     chosen = parser.parse_args()
     for name in chosen.scenes:
-        found = default_rows(Job(load_scene(name), chosen.study))
-        bodies = fingerprint(found.model.body_hashes)
-        rows = [price(row, found.reference.signals, bodies) for row in found.rows]
+        found = study(Job(load_scene(name), chosen.study, defaults=True))
+        bodies, reference = fingerprint(found.model.body_hashes), found.references[found.scene.stage.slices]
+        levels = sorted(found.rows, key=lambda row: LEVELS.index(row.level))
+        rows = [price(row, reference.signals, bodies) for row in levels]
         path = levels_path(load_stage(found.scene.stage.name))
         table = [old for old in read_levels(path) if old["scene"] != name] + rows
         write_columns(path, {column: np.array([line[column] for line in table]) for column in COLUMNS})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from typing_extensions import Unpack
 
@@ -19,7 +18,7 @@ from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import Trace
 from gearfmu.sweeps.plan import plan as points_of
 from gearfmu.sweeps.run import sweep as run_sweep
-from gearfmu.sweeps.runners import in_this_process, on_cluster, on_this_machine
+from gearfmu.sweeps.runners import on_cluster, on_this_machine, runner_of
 from gearfmu.sweeps.table import SweepTable
 
 
@@ -50,7 +49,7 @@ def plan(
     model = stage_model(spec)
     asked = request(spec, model, outputs, band, budget, waveform)
     tell = how.get("tell") or (lambda text: None)
-    job = Job(spec, model, asked, _runner(on), force=tuple(how.get("may_drop", ())), tell=tell)
+    job = Job(spec, model, asked, runner_of(on), force=tuple(how.get("may_drop", ())), tell=tell)
     name = str(how.get("name") or (spec.name if isinstance(scene, SceneSpec) else scene))
     known = None if how.get("fresh") else kept_plan(job.identity)
     return known or keep_plan(make(job, name))
@@ -72,12 +71,6 @@ def run_plan(
     return run_planned(
         known, None if out is None else Path(out), progress, unit=unit if isinstance(unit, str) else Path(unit)
     )
-
-
-def _runner(on: object) -> Any:
-    if on is None or on == 1:
-        return in_this_process
-    return on_this_machine(on) if isinstance(on, int) else on_cluster(on)
 
 
 def sweep(

@@ -9,11 +9,10 @@ from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
 from gearfmu.quantities import in_range, range_of, to_si
-from gearfmu.scenefile.scene import Level
+from gearfmu.scenefile.scene import Contact, Integrator, Level
 from gearfmu.stagefile.tables.profile import Profile
 
 Quantity: TypeAlias = str | float  # "302 N*m", or the SI number
-Integrator: TypeAlias = Literal["dg4", "em", "rk45", "central"]
 Settings = TypedDict(
     "Settings",
     {
@@ -22,7 +21,7 @@ Settings = TypedDict(
         "h": float,
         "slices": int,
         "phi_reference": Literal["as_given", "unloaded"],
-        "contact": Literal["by_level", "line", "nodal"],
+        "contact": Contact,
         "backlash": float,
         "contact_damping": float,
         "contact_penalty": float,

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from gearfmu.stage import StageModel
 
 OF_INPUT = ("torque", "speed")  # starts that are no parameters
-PORT_KINDS = ("spring", "torque", "fixed")
 
 
 @click.command()
@@ -123,6 +122,8 @@ def validate(path: Path, as_json: bool) -> int:
 
 def port_kinds(texts: tuple[str, ...]) -> dict[str, str]:
     """{"pinion": "torque"} from ("pinion=torque",); a usage error for anything else."""
+    from gearfmu.api.models import PORT_KINDS
+
     found: dict[str, Any] = {}
     for text in texts:
         shaft, sign, kind = text.partition("=")

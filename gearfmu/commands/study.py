@@ -30,13 +30,14 @@ def study(scenes: tuple[str, ...], out: Path, quick: bool, jobs: int) -> None:
     from gearfmu.scenefile.scene import load_scene
     from gearfmu.study.run import Job
     from gearfmu.study.run import study as run_study
+    from gearfmu.sweeps.runners import runner_of
 
     specs = [load_scene(scene) for scene in scenes]
     for name in dict.fromkeys(spec.stage.name for spec in specs):
         bodies_for_motion(name)
     for spec in specs:
         with progress_bar(spec.name) as progress:
-            found = run_study(Job(spec, out, quick, workers=jobs), progress)
+            found = run_study(Job(spec, out, quick, runner=runner_of(jobs)), progress)
         click.echo(error_table(found.rows))
         for note in found.notes:
             click.echo(f"- {note}")

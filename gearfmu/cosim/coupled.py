@@ -15,7 +15,6 @@ import numpy as np
 from gearfmu.cosim.frames import FramePlan, FrameRecorder
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Master, master
-from gearfmu.cosim.shaft_loads import Loaded
 from gearfmu.cosim.units import Log, Recorded, Unit, Variable
 from gearfmu.errors import CouplingError, FmuError, ModelError, SimulationError
 from gearfmu.stage.run.trace import Channel, Trace
@@ -67,7 +66,7 @@ class Result:
         return None if work is None or not self.throughput else (self.work + work) / self.throughput
 
 
-def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
+def run_coupled(cut: Cut, plan: Plan) -> Result:
     """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good
     communication point. A failure before the first point is raised as it is."""
     timed = _Timed(cut.stage)
@@ -79,11 +78,9 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
         if not coupled.recorder.count:
             raise
         outcome, message = getattr(error, "outcome", STOPPED), str(error)
-    facts, ports = coupled.facts(), coupled.master.ports
-    trace = coupled.recorder.trace({})
+    facts, trace, order = coupled.facts(), coupled.recorder.trace({}), coupled.master.order
     cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
-    exchanged = (ports.work, ports.throughput)
-    return Result(trace, outcome, message, cpu, cpu * share, *exchanged, coupled.master.order, facts, coupled.frames)
+    return Result(trace, outcome, message, cpu, cpu * share, *cut.drive.exchanged, order, facts, coupled.frames)
 
 
 SOLVER_FACTS = ("n_dyn", "h", "retried_steps", "steps", "status")
@@ -106,18 +103,18 @@ class _Timed:
 
 @dataclass(frozen=True)
 class Saved:
-    """Where a coupled run stands: step number, state of the stage, of master and drivetrain."""
+    """Where a coupled run stands: step number, state of the stage, of the drivetrain."""
 
     at: int
     stage: Any
-    master: Any
+    drive: Any
 
 
 class CoupledRun:
     """A run that is stepped piece by piece: begun or taken over from another, saved and restored at communication
     points. `at`: number of the step that comes next."""
 
-    def __init__(self, cut: Cut | Loaded, plan: Plan) -> None:
+    def __init__(self, cut: Cut, plan: Plan) -> None:
         self.cut, self.plan, self.at = cut, plan, 0
         self.master: Master = master(plan.master, cut)
         self.new_recorder(plan.steps)
@@ -174,13 +171,13 @@ class CoupledRun:
 
     def save(self) -> Saved:
         """Everything but what is recorded."""
-        return Saved(self.at, self.cut.stage.save(), self.master.save())
+        return Saved(self.at, self.cut.stage.save(), self.cut.drive.save())
 
     def restore(self, saved: Saved) -> None:
         """Back to a point; what is recorded stays."""
         self.at = saved.at
         self.cut.stage.restore(saved.stage)
-        self.master.restore(saved.master)
+        self.cut.drive.restore(saved.drive)
 
     def take_over(self, other: CoupledRun) -> None:
         """Go on where another run of the same scene stands that has just made a step, its stage with other settings.
@@ -189,7 +186,7 @@ class CoupledRun:
         assert isinstance(stage, KernelUnit) and isinstance(old, KernelUnit), "FMUs take states of their own kind only"
         self.at = other.at
         stage.adopt(old)
-        self.master.restore(other.master.save())
+        self.cut.drive.restore(other.cut.drive.save())
 
     def facts(self) -> dict[str, float]:
         """Numbers about the run itself. After a failure those of the last good time: a failed step leaves the stage

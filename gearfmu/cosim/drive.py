@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
-from gearfmu.cosim.signals import Constant, Ramp, Signal
+from gearfmu.cosim.signals import Ramp
 from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad
@@ -43,7 +43,7 @@ class Drive:
     ports: Mapping[str, PortSpec]
     partner: Callable[[Rest], Network] | Loads
     start: Callable[[], dict[str, float]] = dict
-    signals: tuple[tuple[str, Signal], ...] = ()
+    signals: tuple[tuple[str, Ramp], ...] = ()
     silent: tuple[str, ...] = ()
     watched: tuple[str, ...] = ()
     frequencies: tuple[float, ...] = ()
@@ -66,6 +66,7 @@ def car_drive(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Drive:
             shafts.output: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
         }
         return Drive(ports, lambda rest: _car(scene, car, shafts), watched=("*",))
+    assert scene.clutch is not None, "a scene of a car has a clutch"
     start = {
         f"{shafts.input}.disc.w_start": scene.start.pinion_speed,
         f"{shafts.output}.disc.w_start": _wheel_speed(scene, shafts),
@@ -75,7 +76,7 @@ def car_drive(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Drive:
         {shafts.input: _clutch_chain(car), shafts.output: _final_drive_chain(car)},
         lambda rest: _car(scene, car, shafts),
         start.copy,
-        signals=((f"{shafts.input}.clutch.capacity", capacity(scene)),),
+        signals=((f"{shafts.input}.clutch.capacity", Ramp(scene.clutch.capacity)),),
         silent=(f"{shafts.output}.clutch.*", f"{shafts.output}.disc.*"),
     )
 
@@ -121,11 +122,6 @@ def _final_drive_chain(car: PassengerCar) -> PortSpec:
     return PortSpec(kind="spring", k=half_shafts.k, c=half_shafts.c, chain=chain)
 
 
-def capacity(scene: SceneSpec) -> Signal:
-    """Clutch capacity of the scene over time, N·m."""
-    return Ramp(scene.clutch.capacity) if scene.clutch else Constant(0.0)
-
-
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
     """Torque of a four-stroke four-cylinder engine, N·m, over the crank angle: mean and orders 2, 4, 6 (cosines, all
     at their maximum at angle zero)."""
@@ -159,7 +155,7 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     if car.chain_in_fmu:
         ports = {shafts.input: "engine", shafts.output: "wheels"}
         return Network((engine, *nodes), (tyres,), (), sources, torque_ports=ports)
-    assert scene.clutch is not None, "a car outside the stage has its clutch outside"
+    assert scene.clutch is not None, "a scene of a car has a clutch"
     secondary, disc, final_drive = (
         Inertia("secondary", car.secondary_inertia, w=engine_w),
         Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed),
@@ -169,7 +165,7 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     return Network(
         (engine, secondary, disc, final_drive, *nodes),
         (flywheel, _half_shafts(car), tyres),
-        (Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak),),
+        (Clutch("clutch", "secondary", "disc", Ramp(scene.clutch.capacity), scene.clutch.peak),),
         sources,
         torque_ports={shafts.input: "disc", shafts.output: "final_drive"},
     )

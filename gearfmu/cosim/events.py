@@ -1,4 +1,4 @@
-"""Events of a network: which part leaves its mode first, exactly when, and what mode follows."""
+"""Events of a network: which clutch leaves its mode first, exactly when, and what mode follows."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ from gearfmu.cosim.network import Dynamics, Mode
 MAX_SWEEPS = 500  # of the Gauss–Seidel iteration
 SLIP_TOLERANCE = 1e-12  # rad/s, for speeds up to about 1e3 rad/s some ten units in the last place
 TORQUE_TOLERANCE = 1e-10  # relative to the capacity plus 1 N·m
-GAP_TOLERANCE = 1e-15  # m or rad
 FRACTION_TOLERANCE = 1e-14  # of the micro-step, of the instant of an event
 
 
 class Event(NamedTuple):
-    """What happened when: `what` is "lock", "slip", "drive", "coast" or "open"."""
+    """What happened to a clutch, and when: `what` is "lock" or "slip"."""
 
     time: float
     part: str
@@ -37,61 +36,48 @@ class Attempt(NamedTuple):
 
 
 class Found(NamedTuple):
-    """First event of an attempted step: part by kind and index, fraction of the step, state, input and capacities
+    """First event of an attempted step: number of the clutch, fraction of the step, state, input and capacities
     there."""
 
-    kind: str
-    number: int
-    part: str
+    clutch: int
     fraction: float
     x: np.ndarray
     u: np.ndarray
     capacity: np.ndarray
 
-    def what(self, mode: Mode) -> str:
-        """The mode it led to, in words."""
-        if self.kind == "clutch":
-            return "lock" if mode[0][self.number] == 0 else "slip"
-        return {1: "drive", -1: "coast", 0: "open"}[mode[1][self.number]]
-
 
 def margins(dynamics: Dynamics, mode: Mode, x: np.ndarray, u: np.ndarray, capacity: np.ndarray) -> list[float]:
-    """How far every clutch, then every backlash, is from leaving its mode; negative when it has left it."""
-    m = dynamics.matrices(mode)
-    n_c, n_s = dynamics.n_clutches, len(dynamics.network.springs)
-    tail = m.c[-(n_s + 2 * n_c) :] @ x + m.d[-(n_s + 2 * n_c) :] @ u
-    extension, torque, slip = tail[:n_s], tail[n_s : n_s + n_c], tail[n_s + n_c :]
+    """How far every clutch is from leaving its mode; negative when it has left it."""
+    m, n_c = dynamics.matrices(mode), dynamics.n_clutches
+    torque, slip = np.split(m.c[-2 * n_c :] @ x + m.d[-2 * n_c :] @ u, 2)
     found = []
-    for k, sign in enumerate(mode[0]):
+    for k, sign in enumerate(mode):
         if sign:
             found.append(sign * slip[k] + SLIP_TOLERANCE)
         else:
             bound = dynamics.network.clutches[k].peak * capacity[k]
             found.append(bound - abs(torque[k]) + TORQUE_TOLERANCE * (1.0 + bound))
-    for k, sign in zip(dynamics.gaps, mode[1], strict=True):
-        s, far = extension[k], extension[k] + dynamics.network.springs[k].backlash
-        found.append((s if sign > 0 else -far if sign < 0 else min(-s, far)) + GAP_TOLERANCE)
     return found
 
 
 def first_event(dynamics: Dynamics, mode: Mode, attempt: Attempt) -> Found | None:
-    """The first part that leaves its mode in the attempted step, or None."""
+    """The first clutch that leaves its mode in the attempted step, or None."""
     start = margins(dynamics, mode, attempt.x0, attempt.u0, attempt.capacity0)
     end = margins(dynamics, mode, attempt.x1, attempt.u1, attempt.capacity1)
     broken = [k for k in range(len(start)) if start[k] < 0]
     if broken:
-        return _found(dynamics, broken[0], 0.0, attempt, attempt.x0)
+        return Found(broken[0], 0.0, attempt.x0, *_between(attempt, 0.0))
     left = [k for k in range(len(end)) if end[k] < 0]
     if not left:
         return None
-    fraction, part = min((_instant(dynamics, mode, attempt, k), k) for k in left)
-    return _found(dynamics, part, fraction, attempt, _state_at(dynamics, mode, attempt, fraction))
+    fraction, clutch = min((_instant(dynamics, mode, attempt, k), k) for k in left)
+    return Found(clutch, fraction, _state_at(dynamics, mode, attempt, fraction), *_between(attempt, fraction))
 
 
-def _instant(dynamics: Dynamics, mode: Mode, attempt: Attempt, part: int) -> float:
+def _instant(dynamics: Dynamics, mode: Mode, attempt: Attempt, clutch: int) -> float:
     def margin(fraction: float) -> float:
         x = _state_at(dynamics, mode, attempt, fraction)
-        return margins(dynamics, mode, x, *_between(attempt, fraction))[part]
+        return margins(dynamics, mode, x, *_between(attempt, fraction))[clutch]
 
     return float(brentq(margin, 0.0, 1.0, xtol=FRACTION_TOLERANCE))
 
@@ -110,34 +96,21 @@ def _between(attempt: Attempt, fraction: float) -> tuple[np.ndarray, np.ndarray]
     return u, attempt.capacity0 + fraction * (attempt.capacity1 - attempt.capacity0)
 
 
-def _found(dynamics: Dynamics, part: int, fraction: float, attempt: Attempt, x: np.ndarray) -> Found:
-    n_c, network = dynamics.n_clutches, dynamics.network
-    is_clutch = part < n_c
-    index = part if is_clutch else part - n_c
-    name = network.clutches[index].name if is_clutch else network.springs[dynamics.gaps[index]].name
-    return Found("clutch" if is_clutch else "gap", index, name, fraction, x, *_between(attempt, fraction))
-
-
 def switch(dynamics: Dynamics, mode: Mode, found: Found, x: np.ndarray) -> Mode:
     """Mode after the event; slips of the clutches that meet there are set to exactly zero in `x`, keeping the
     momentum."""
-    signs, gaps = list(mode[0]), list(mode[1])
-    if found.kind == "gap":
-        s = float(dynamics.extension[dynamics.gaps[found.number]] @ x[: dynamics.n])
-        backlash = dynamics.network.springs[dynamics.gaps[found.number]].backlash
-        gaps[found.number] = 0 if gaps[found.number] else (1 if s > -0.5 * backlash else -1)
-        return tuple(signs), tuple(gaps)
+    signs, clutch = list(mode), found.clutch
     at_rest = [k for k, sign in enumerate(signs) if sign == 0]
-    if signs[found.number] == 0:
-        at_rest.remove(found.number)
+    if signs[clutch] == 0:
+        at_rest.remove(clutch)
         m = dynamics.matrices(mode)
-        row = len(m.c) - 2 * dynamics.n_clutches + found.number
-        signs[found.number] = 1 if m.c[row] @ found.x + m.d[row] @ found.u > 0 else -1  # by the torque that held it
-        _stop(dynamics, x, [found.number, *at_rest])
+        row = len(m.c) - 2 * dynamics.n_clutches + clutch
+        signs[clutch] = 1 if m.c[row] @ found.x + m.d[row] @ found.u > 0 else -1  # by the torque that held it
+        _stop(dynamics, x, [clutch, *at_rest])
     else:
-        at_rest.append(found.number)
+        at_rest.append(clutch)
         _stop(dynamics, x, at_rest)
-    return resolve(dynamics, (tuple(signs), tuple(gaps)), sorted(at_rest), x, found.u, found.capacity)
+    return resolve(dynamics, tuple(signs), sorted(at_rest), x, found.u, found.capacity)
 
 
 def _stop(dynamics: Dynamics, x: np.ndarray, clutches: list[int]) -> None:
@@ -156,11 +129,11 @@ def resolve(
     Sticking clutches hold up to peak·capacity; one that starts to slip transmits its capacity, which may break the
     next one loose.
     """
-    n, n_c, signs, rest = dynamics.n, dynamics.n_clutches, list(mode[0]), list(at_rest)
+    n, signs, rest = dynamics.n, list(mode), list(at_rest)
     while rest:
-        free = tuple(1 if k in rest else sign for k, sign in enumerate(signs)), mode[1]
+        free = tuple(1 if k in rest else sign for k, sign in enumerate(signs))
         torque = np.array([0.0 if k in rest else sign * capacity[k] for k, sign in enumerate(signs)])
-        m, v = dynamics.matrices(free), np.concatenate([u[:n], torque, u[n + n_c :]])
+        m, v = dynamics.matrices(free), np.concatenate([u[:n], torque])
         acceleration = (m.a @ x + m.b @ v)[n : 2 * n]
         rows = dynamics.slip[rest]
         delassus, wanted = rows * dynamics.inverse_inertia @ rows.T, rows @ acceleration
@@ -172,20 +145,14 @@ def resolve(
         if not loose.any():
             break
         rest = [k for k, is_loose in zip(rest, loose, strict=True) if not is_loose]
-    return tuple(signs), mode[1]
+    return tuple(signs)
 
 
 def initial_mode(dynamics: Dynamics, x: np.ndarray, u: np.ndarray, capacity: np.ndarray) -> Mode:
-    """Mode of a state from nothing but the state: gaps by extension, clutches by slip, then `resolve` for those
-    without slip."""
-    gaps = []
-    for k in dynamics.gaps:
-        s, backlash = float(dynamics.extension[k] @ x[: dynamics.n]), dynamics.network.springs[k].backlash
-        gaps.append(1 if s > 0 else -1 if s < -backlash else 0)
+    """Mode of a state from nothing but the state: by slip, then `resolve` for the clutches without slip."""
     slips = dynamics.slip @ x[dynamics.n : 2 * dynamics.n]
     signs = tuple(0 if abs(s) <= SLIP_TOLERANCE else 1 if s > 0 else -1 for s in slips)
-    at_rest = [k for k, sign in enumerate(signs) if sign == 0]
-    return resolve(dynamics, (signs, tuple(gaps)), at_rest, x, u, capacity)
+    return resolve(dynamics, signs, [k for k, sign in enumerate(signs) if sign == 0], x, u, capacity)
 
 
 def sticking_torques(delassus: np.ndarray, slip_acceleration: np.ndarray, bound: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -132,18 +132,9 @@ class KernelUnit:
         """Nothing to free: Python owns the memory."""
 
 
-class UnitSource(Protocol):
-    """A source of the stage of a run: its model, and a fresh unit of it with these start values."""
-
-    @property
-    def model(self) -> StageModel: ...
-
-    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit: ...
-
-
 @dataclass(frozen=True)
 class Source:
-    """The kernel itself (fmu_path None) or an FMU; the model it was made from."""
+    """A source of the stage of a run: the kernel itself (fmu_path None) or an FMU; the model it was made from."""
 
     model: StageModel
     fmu_path: Path | None = None

@@ -1,16 +1,12 @@
-"""A torsional network: inertias, driven nodes, springs with backlash, clutches, torque sources and ports. It is
-linear between events, with one set of matrices for each mode, and its states are propagated exactly by matrix
-exponentials.
+"""A torsional network: inertias, nodes of constant speed, springs, clutches, torque sources and ports. It is linear
+between events, with one set of matrices for each mode, and its states are propagated exactly by matrix exponentials.
 
 State   x = [φ (n), w (n), impulse on every driven node (d)]
-Input   u = [torque on every node (n), capacity·sign of every slipping clutch (c), acceleration of every driven node
-(d), 1]
-Mode    (clutch signs, gap signs): clutch 0 sticks, ±1 slips with that sign of the slip; gap +1 drive flanks, −1 coast
-flanks, 0 open.
+Input   u = [torque on every node (n), capacity·sign of every slipping clutch (c)]
+Mode    a sign for every clutch: 0 sticks, ±1 slips with that sign of the slip.
 
-With W = M⁻¹ − M⁻¹DᵀG⁻¹DM⁻¹, G = DM⁻¹Dᵀ and D the slip rows of the sticking clutches, the accelerations are W f + (1 −
-M⁻¹DᵀG⁻¹D) E a and the sticking torques G⁻¹D (M⁻¹ f + E a) (Lagrange multipliers; f: all other torques, E a:
-prescribed accelerations, where M⁻¹ = 0).
+With W = M⁻¹ − M⁻¹DᵀG⁻¹DM⁻¹, G = DM⁻¹Dᵀ and D the slip rows of the sticking clutches, the accelerations are W f and the
+sticking torques G⁻¹D M⁻¹ f (Lagrange multipliers; f: all other torques; M⁻¹ = 0 at driven nodes).
 """
 
 from __future__ import annotations
@@ -22,7 +18,7 @@ from functools import cache, lru_cache
 import numpy as np
 from scipy.linalg import expm
 
-from gearfmu.cosim.signals import Signal
+from gearfmu.cosim.signals import Ramp
 
 
 @dataclass(frozen=True)
@@ -37,7 +33,7 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Driven:
-    """A node whose motion is prescribed: by a motion port, else by its constant speed w, rad/s."""
+    """A node that turns at the constant speed w, rad/s, whatever the torque on it."""
 
     name: str
     phi: float = 0.0
@@ -48,16 +44,13 @@ class Driven:
 class Spring:
     """Spring k and damper c on the extension s = Σ factor·φ of the nodes in `on`.
 
-    Torque on a node = −factor·(k·e + c·ds/dt), e = s outside the dead zone [−backlash, 0], measured from its near
-    end. The damper acts always. Factors 1 and −1: a shaft, k in N·m/rad. Radii: a gear pair, k in N/m; its drive
-    flanks touch at s = 0, its coast flanks at −backlash.
+    Torque on a node = −factor·(k·s + c·ds/dt). Factors 1 and −1: a shaft, k in N·m/rad. Radii: a gear pair, k in N/m.
     """
 
     name: str
     on: Mapping[str, float]
     k: float
     c: float = 0.0
-    backlash: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ class Clutch:
     name: str
     a: str
     b: str
-    capacity: Signal
+    capacity: Ramp
     peak: float = 1.0
 
 
@@ -85,18 +78,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Network:
-    """The whole network. `torque_ports`: port → node (torque in, motion out; a driven node yields to no torque).
-    `motion_ports`: port → driven node (motion in, torque out)."""
+    """The whole network. `torque_ports`: port → node (torque in, motion out; a driven node yields to no torque)."""
 
     nodes: tuple[Inertia | Driven, ...]
     springs: tuple[Spring, ...] = ()
     clutches: tuple[Clutch, ...] = ()
     sources: tuple[Source, ...] = ()
     torque_ports: Mapping[str, str] = field(default_factory=dict)
-    motion_ports: Mapping[str, str] = field(default_factory=dict)
 
 
-Mode = tuple[tuple[int, ...], tuple[int, ...]]
+Mode = tuple[int, ...]
 CACHE_SIZE = 512  # transitions kept; a run uses one or two step sizes and a handful of modes
 
 
@@ -128,9 +119,7 @@ class Dynamics:
         for row, clutch in zip(self.slip, network.clutches, strict=True):
             row[self.node[clutch.a]] += 1.0
             row[self.node[clutch.b]] -= 1.0
-        self.gaps = [k for k, spring in enumerate(network.springs) if spring.backlash > 0]
-        self.states = 2 * self.n + self.n_driven
-        self.inputs = self.n + self.n_clutches + self.n_driven + 1
+        self.states, self.inputs = 2 * self.n + self.n_driven, self.n + self.n_clutches
         self.output_names = _output_names(network)
         self.matrices = cache(self._build)  # of one mode
         self.transition = lru_cache(maxsize=CACHE_SIZE)(self.transition_once)  # kept; at an event it is used once
@@ -146,29 +135,13 @@ class Dynamics:
         ramp = e[:, nx + nu :]
         return np.ascontiguousarray(np.hstack([e[:, :nx], e[:, nx : nx + nu] - ramp, ramp]))
 
-    def spring_forces(self, gap_signs: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Spring torques k·e + c·ds/dt as rows (springs, states) on x and constants (springs,)."""
-        rows, constant = np.zeros((len(self.network.springs), self.states)), np.zeros(len(self.network.springs))
-        signs = dict(zip(self.gaps, gap_signs, strict=True))
-        for k, spring in enumerate(self.network.springs):
-            sign = signs.get(k, 1)
-            rows[k, : self.n] = self.extension[k] * (spring.k if sign else 0.0)
-            rows[k, self.n : 2 * self.n] = self.extension[k] * spring.c
-            constant[k] = spring.k * spring.backlash if sign < 0 else 0.0
-        return rows, constant
-
     def _build(self, mode: Mode) -> ModeMatrices:
         n, nx, nu = self.n, self.states, self.inputs
-        clutch_signs, gap_signs = mode
-        spring_x, spring_1 = self.spring_forces(gap_signs)
-        f_x, f_u = -self.extension.T @ spring_x, np.zeros((n, nu))
-        f_u[:, :n] = np.eye(n)
-        slipping = np.array([s != 0 for s in clutch_signs], dtype=bool)
-        f_u[:, n : n + self.n_clutches] = -self.slip.T * slipping
-        f_u[:, -1] = -self.extension.T @ spring_1
-        prescribed = np.zeros((n, nu))
-        prescribed[self.driven, n + self.n_clutches + np.arange(self.n_driven)] = 1.0
-        free_x, free_u = self.inverse_inertia[:, None] * f_x, self.inverse_inertia[:, None] * f_u + prescribed
+        k, c = (np.array([getattr(spring, name) for spring in self.network.springs])[:, None] for name in "kc")
+        spring = np.hstack([self.extension * k, self.extension * c, np.zeros((len(k), self.n_driven))])
+        slipping = np.array(mode, dtype=bool)
+        f_x, f_u = -self.extension.T @ spring, np.hstack([np.eye(n), -self.slip.T * slipping])
+        free_x, free_u = self.inverse_inertia[:, None] * f_x, self.inverse_inertia[:, None] * f_u
         stick_x, stick_u = self._stick_torques(slipping, free_x, free_u)
         clutch_to_node = -self.inverse_inertia[:, None] * self.slip.T
         acc_x, acc_u = free_x + clutch_to_node @ stick_x, free_u + clutch_to_node @ stick_u
@@ -176,8 +149,8 @@ class Dynamics:
         a, b = np.zeros((nx, nx)), np.zeros((nx, nu))
         a[:n, n : 2 * n] = np.eye(n)
         a[n : 2 * n], b[n : 2 * n], a[2 * n :], b[2 * n :] = acc_x, acc_u, on_x, on_u
-        stick_u[:, n : n + self.n_clutches] += np.diag(slipping.astype(float))
-        return ModeMatrices(a, b, *self._outputs(a, b, (spring_x, spring_1), (stick_x, stick_u)))
+        stick_u[:, n:] += np.diag(slipping.astype(float))
+        return ModeMatrices(a, b, *self._outputs(a, b, spring, (stick_x, stick_u)))
 
     def _stick_torques(
         self, slipping: np.ndarray, free_x: np.ndarray, free_u: np.ndarray
@@ -191,16 +164,14 @@ class Dynamics:
         return stick_x, stick_u
 
     def _outputs(
-        self, a: np.ndarray, b: np.ndarray, spring: tuple[np.ndarray, np.ndarray], clutch: tuple[np.ndarray, np.ndarray]
+        self, a: np.ndarray, b: np.ndarray, spring: np.ndarray, clutch: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
         n, nx, nu = self.n, self.states, self.inputs
-        springs, clutches = len(spring[0]), self.n_clutches
-        spring_u, extension, slip = np.zeros((springs, nu)), np.zeros((springs, nx)), np.zeros((clutches, nx))
-        spring_u[:, -1], extension[:, :n], slip[:, n : 2 * n] = spring[1], self.extension, self.slip
-        c = np.vstack([np.eye(2 * n, nx), a[n:], spring[0], extension, clutch[0], slip])
-        rest = [b[n:], spring_u, np.zeros_like(spring_u), clutch[1], np.zeros((clutches, nu))]
-        d = np.vstack([np.zeros((2 * n, nu)), *rest])
-        return c, d
+        extension, slip = np.zeros_like(spring), np.zeros((self.n_clutches, nx))
+        extension[:, :n], slip[:, n : 2 * n] = self.extension, self.slip
+        c = np.vstack([np.eye(2 * n, nx), a[n:], spring, extension, clutch[0], slip])
+        rest = [b[n:], np.zeros((2 * len(spring), nu)), clutch[1], np.zeros((self.n_clutches, nu))]
+        return c, np.vstack([np.zeros((2 * n, nu)), *rest])
 
 
 def _output_names(network: Network) -> dict[str, int]:

@@ -19,15 +19,14 @@ class State:
     time: float
     x: np.ndarray  # (states,)
     mode: Mode
-    torque: tuple[float, ...]  # of the torque ports, N·m, held over the step
-    motion: np.ndarray  # (d, 3) φ, w, a of the driven nodes at the start of the step
-    tau_mean: np.ndarray  # (d,) N·m
-    work: float  # J, of the motion ports on the network since the start
-    events: tuple[Event, ...]  # when a clutch locked or slipped, or a backlash closed or opened, in order
+    torque: tuple[float, ...]  # of the ports, N·m, held over the step
+    tau_mean: np.ndarray  # (d,) N·m, on the driven nodes
+    exchanged: tuple[float, float]  # J, given to the network through its ports: signed sum, sum of magnitudes
+    events: tuple[Event, ...]  # when a clutch locked or slipped, in order
 
     def copy(self) -> State:
         """The same values, from now on their own."""
-        return State(self.time, self.x, self.mode, self.torque, self.motion, self.tau_mean, self.work, self.events)
+        return State(self.time, self.x, self.mode, self.torque, self.tau_mean, self.exchanged, self.events)
 
 
 class Table:
@@ -58,14 +57,8 @@ class Outputs:
         names = dict(dynamics.output_names) | {name: self.linear + k for k, name in enumerate(special)}
         for port, node in network.torque_ports.items():
             names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("phi", "w", "a")}
-        for port, node in network.motion_ports.items():
-            names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("tau", "tau_mean")}
         self.position = names
         self._special: dict[int, Special] = dict(enumerate(special.values(), start=self.linear))
-
-    def special(self, place: int, state: State) -> float:
-        """Value of an output that is not linear."""
-        return float(self._special[place](Table(self.dynamics, [state]))[0])
 
     def values(self, places: Sequence[int], states: Sequence[State]) -> np.ndarray:
         """(k, places) values at k states."""
@@ -84,7 +77,7 @@ class Outputs:
         return found
 
     def _inputs(self, table: Table) -> np.ndarray:
-        """(k, inputs) u at the states: port torques and sources, capacities of slipping clutches, accelerations, 1."""
+        """(k, inputs) u at the states: port torques and sources, capacities of slipping clutches."""
         d, network, states = self.dynamics, self.dynamics.network, table.states
         u = np.zeros((len(states), d.inputs))
         torque = np.array([state.torque for state in states]).reshape(len(states), -1)
@@ -94,20 +87,17 @@ class Outputs:
             u[:, d.node[source.node]] += table.sources[source.name]
         for k, clutch in enumerate(network.clutches):
             u[:, d.n + k] = [
-                state.mode[0][k] * max(clutch.capacity.ends(state.time, state.time)[0], 0.0) for state in states
+                state.mode[k] * max(clutch.capacity.ends(state.time, state.time)[0], 0.0) for state in states
             ]
-        if d.n_driven:
-            u[:, d.n + d.n_clutches : -1] = [state.motion[:, 2] for state in states]
-        u[:, -1] = 1.0
         return u
 
     def _special_outputs(self) -> dict[str, Special]:
         network, d = self.dynamics.network, self.dynamics
         driven, clutches = [network.nodes[node].name for node in d.driven], [part.name for part in network.clutches]
         found = {f"{name}.tau_mean": _of_states(lambda s, k: s.tau_mean[k], k) for k, name in enumerate(driven)}
-        found |= {f"{name}.locked": _of_states(lambda s, k: s.mode[0][k] == 0, k) for k, name in enumerate(clutches)}
+        found |= {f"{name}.locked": _of_states(lambda s, k: s.mode[k] == 0, k) for k, name in enumerate(clutches)}
         found |= {f"{source.name}.tau": partial(_of_source, source.name) for source in network.sources}
-        return found | {"energy.work": _of_states(lambda s, k: s.work), "energy.stored": self.energy}
+        return found | {"energy.stored": self.energy}
 
     def energy(self, table: Table) -> np.ndarray:
         """(k,) kinetic energy of the inertias and potential energy of the springs, J."""
@@ -117,9 +107,7 @@ class Outputs:
             if m > 0:
                 energy += 0.5 * x[:, d.n + k] ** 2 / m
         for row, spring in zip(d.extension, d.network.springs, strict=True):
-            s = _combined(row, x)
-            stretched = np.where(s > 0, s, np.minimum(s + spring.backlash, 0.0)) if spring.backlash else s
-            energy += 0.5 * spring.k * stretched**2
+            energy += 0.5 * spring.k * _combined(row, x) ** 2
         return energy
 
 
@@ -148,7 +136,7 @@ def _combined(row: np.ndarray, table: np.ndarray) -> np.ndarray:
     return total
 
 
-def _of_states(read: Callable[[State, int], float], k: int = 0) -> Special:
+def _of_states(read: Callable[[State, int], float], k: int) -> Special:
     """What is read off a state alone, of its k-th part."""
     return lambda table: np.array([read(state, k) for state in table.states])
 

@@ -23,11 +23,11 @@ from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_co
 from gearfmu.cosim.drive import Drive, car_drive, rig_drive
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.given_fmu import fitted, of_scene
-from gearfmu.cosim.kernel_unit import KernelUnit, Source, UnitSource
-from gearfmu.cosim.masters import Cut, Wiring
+from gearfmu.cosim.kernel_unit import KernelUnit, Source
+from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.parts import parts_drive
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, loads_drive
+from gearfmu.cosim.shaft_loads import ShaftLoads, loads_drive
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
@@ -44,7 +44,6 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import meshings, require_driven, shafts_of
 from gearfmu.stagefile.stage import load_stage
 
-WHOLE = Wiring()
 OF_FRAMES = ("scene", "description", "stage", "level", "fmu_path")  # of a run's meta, in that of its frames
 
 
@@ -177,27 +176,26 @@ def stage_source(staged: Staged, unit: str, out_dir: str | Path | None) -> Itera
 
 def run_once(
     scene: SceneSpec,
-    source: UnitSource,
+    source: Source,
     progress: Progress | None = None,
-    wiring: Wiring = WHOLE,
     frames: FramePlan | None = None,
 ) -> Result:
-    """One run of the scene with fresh units; wiring: what of the stage is connected; frames: of moving gears, from a
-    model that observes them, as `stage_model` makes it."""
+    """One run of the scene with fresh units; frames: of moving gears, from a model that observes them, as `stage_model`
+    makes it."""
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
     try:
         plan = replace(_plan(scene, drive), progress=progress, frames=frames)
-        return run_coupled(_cut(scene, drive, stage, source.model, wiring), plan)
+        return run_coupled(_cut(scene, drive, stage, source.model), plan)
     finally:
         stage.close()
 
 
-def coupled_run(scene: SceneSpec, source: UnitSource) -> CoupledRun:
+def coupled_run(scene: SceneSpec, source: Source) -> CoupledRun:
     """A run of the scene that is stepped from outside; not begun."""
     drive = drive_of(scene, source.model.stage)
     stage = source.unit(_parameters(scene, drive))
-    return CoupledRun(_cut(scene, drive, stage, source.model, WHOLE), _plan(scene, drive))
+    return CoupledRun(_cut(scene, drive, stage, source.model), _plan(scene, drive))
 
 
 def _parameters(scene: SceneSpec, drive: Drive) -> dict[str, float | str]:
@@ -219,19 +217,18 @@ def _plan(scene: SceneSpec, drive: Drive) -> Plan:
     return Plan(coupling.master, coupling.step, scene.steps, scene.record, omit=drive.silent)
 
 
-def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel, wiring: Wiring) -> Cut | Loaded:
+def _cut(scene: SceneSpec, drive: Drive, stage: Unit, model: StageModel) -> Cut:
     """stage: of the model."""
     if not callable(drive.partner):
         speeds = {name.removesuffix(".w_start"): speed for name, speed in drive.start().items()}
-        return Loaded(stage, ShaftLoads(drive.partner), speeds)
+        return Cut(stage, ShaftLoads(drive.partner, speeds))
 
     def rest(torques: Mapping[str, float]) -> Mapping[str, float]:
         kernel = KernelUnit(model.blob, _parameters(scene, drive)).kernel
         kernel.prepare()
         return kernel.rest(torques)
 
-    drivetrain = PyUnit(drive.partner(rest), scene.coupling.micro_step or None)
-    return Cut(stage, drivetrain, tuple(drive.ports), drive.signals, wiring)
+    return Cut(stage, PyUnit(drive.partner(rest), scene.coupling.micro_step or None), drive.signals)
 
 
 def verified(

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ import numpy as np
 from gearfmu.cosim.drive import Drive, Loads, frequencies_of
 from gearfmu.cosim.kernel_unit import RowLog
 from gearfmu.cosim.signals import Ramp
-from gearfmu.cosim.units import Unit, Variable
+from gearfmu.cosim.units import Variable
 from gearfmu.errors import Problem, SpecError
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.scenefile.shaft_loads import ShaftLoad
@@ -70,15 +70,17 @@ class Law:
 
 
 class ShaftLoads:
-    """The torques of a run and their work, as a recorder reads them.
+    """The torques of a run in place of a drivetrain, and their work.
 
-    tau (k,) N·m: mean over the last communication step, at the start that of the start; work (k,) J: given to the
-    stage since the start.
+    start : speed (rad/s) of every loaded shaft at the start. tau (k,) N·m: mean over the last communication step, at
+    the start that of the start; work (k,) J: given to the stage since the start; exchanged : energy that the loads got
+    from the stage, signed sum and sum of magnitudes, J; speeds : the last ones, (k,) each.
     """
 
-    def __init__(self, loads: Mapping[str, ShaftLoad]) -> None:
+    def __init__(self, loads: Mapping[str, ShaftLoad], start: Mapping[str, float]) -> None:
         self.laws = {name: Law(load) for name, load in loads.items()}
-        self.tau, self.work = np.zeros(len(loads)), np.zeros(len(loads))
+        self.tau, self.work, self.exchanged = np.zeros(len(loads)), np.zeros(len(loads)), (0.0, 0.0)
+        self.speeds = deque([np.array([start[name] for name in loads])], maxlen=CARRIED_ON + 1)
 
     def outputs(self) -> dict[str, Variable]:
         """`<shaft>.tau` and `<shaft>.work`."""
@@ -91,79 +93,34 @@ class ShaftLoads:
         places = [known.index(name) for name in names]
         return RowLog(lambda: np.concatenate([self.tau, self.work])[places], len(names), points)
 
+    def hold(self, time: float) -> None:
+        """The torques of `time` at the last speeds."""
+        self.tau = self._each("at", (time,), self.speeds[-1])
 
-@dataclass(frozen=True)
-class Loaded:
-    """A stage with torque ports under these loads: what `Cut` is to a stage in a drivetrain. start: speed (rad/s) of
-    every loaded shaft at the start."""
+    def hold_mean(self, time: float, h: float) -> None:
+        """The mean torques from `time` over h s."""
+        change = (self.speeds[-1] - self.speeds[0]) / max(1, len(self.speeds) - 1)
+        self.tau = self._each("mean", (time, h), self.speeds[-1] + 0.5 * change)
 
-    stage: Unit
-    drive: ShaftLoads
-    start: Mapping[str, float]
+    def count(self, turned: np.ndarray, speeds: np.ndarray) -> None:
+        """After a step in which the shafts turned by so much, rad: their speeds, rad/s."""
+        given, (work, throughput) = self.tau * turned, self.exchanged
+        self.work = self.work + given
+        self.exchanged = work - float(given.sum()), throughput + float(np.abs(given).sum())
+        self.speeds.append(speeds.copy())
 
-
-@dataclass
-class Exchanged:
-    """Energy that the loads got from the stage, signed sum and sum of magnitudes, J (as of `Ports`)."""
-
-    work: float = 0.0
-    throughput: float = 0.0
-
-
-@dataclass
-class TorqueMaster:
-    """Steps a loaded stage. foreseen: whether the torque is the mean of the step or that of its beginning."""
-
-    cut: Loaded
-    foreseen: bool = True
-    ports: Exchanged = field(default_factory=Exchanged)
-
-    def __post_init__(self) -> None:
-        stage, names = self.cut.stage, list(self.cut.drive.laws)
-        self.order = 2 if self.foreseen else 1
-        self._tau: Any = stage.resolve([f"{name}.tau" for name in names])
-        self._phi: Any = stage.resolve([f"{name}.phi" for name in names])
-        self._w: Any = stage.resolve([f"{name}.w" for name in names])
-        start = np.array([self.cut.start[name] for name in names])
-        self._speeds = deque([start], maxlen=CARRIED_ON + 1)
-
-    def begin(self, time: float) -> None:
-        """Initialise the stage at rest under the torques of the start."""
-        drive = self.cut.drive
-        drive.tau = self._each("at", (time,), self._speeds[-1])
-        self.cut.stage.set(self._tau, drive.tau)
-        self.cut.stage.initialize(time)
-
-    def step(self, time: float, h: float) -> None:
-        """One communication step."""
-        stage, drive = self.cut.stage, self.cut.drive
-        now, change = self._speeds[-1], (self._speeds[-1] - self._speeds[0]) / max(1, len(self._speeds) - 1)
-        drive.tau = (
-            self._each("mean", (time, h), now + 0.5 * change) if self.foreseen else self._each("at", (time,), now)
-        )
-        stage.set(self._tau, drive.tau)
-        start = stage.get(self._phi).copy()
-        stage.step(time, h)
-        given = drive.tau * (stage.get(self._phi) - start)
-        drive.work = drive.work + given
-        self.ports.work -= float(given.sum())
-        self.ports.throughput += float(np.abs(given).sum())
-        self._speeds.append(stage.get(self._w).copy())
+    def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
+        laws = zip(self.laws.values(), speeds.tolist(), strict=True)
+        return np.array([getattr(law, what)(*when, w) for law, w in laws])
 
     def save(self) -> Any:
         """Torques, works and the last speeds."""
-        drive, ports = self.cut.drive, self.ports
-        return drive.tau.copy(), drive.work.copy(), tuple(self._speeds), ports.work, ports.throughput
+        return self.tau, self.work, self.exchanged, tuple(self.speeds)
 
     def restore(self, state: Any) -> None:
         """Back to a saved state."""
-        drive = self.cut.drive
-        drive.tau, drive.work, speeds, self.ports.work, self.ports.throughput = state
-        self._speeds = deque(speeds, maxlen=CARRIED_ON + 1)
-
-    def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
-        laws = zip(self.cut.drive.laws.values(), speeds.tolist(), strict=True)
-        return np.array([getattr(law, what)(*when, w) for law, w in laws])
+        self.tau, self.work, self.exchanged, speeds = state
+        self.speeds = deque(speeds, maxlen=CARRIED_ON + 1)
 
 
 def loads_drive(scene: SceneSpec, loads: Loads, stage: Stage, input_port: str) -> Drive:

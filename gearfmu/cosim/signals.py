@@ -6,25 +6,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 TIME_NOISE = 1e-9  # s: two times closer than this are one (communication points carry rounding noise)
-
-
-class Signal(Protocol):
-    """A function of time, asked for its two ends over an interval: right limit at `t0`, left limit at `t1`."""
-
-    def ends(self, t0: float, t1: float) -> tuple[float, float]: ...
-
-
-@dataclass(frozen=True)
-class Constant:
-    """The same value at all times."""
-
-    value: float
-
-    def ends(self, t0: float, t1: float) -> tuple[float, float]:
-        return self.value, self.value
 
 
 @dataclass(frozen=True)
@@ -41,6 +24,7 @@ class Ramp:
         return [time for time, _ in self.points]
 
     def ends(self, t0: float, t1: float) -> tuple[float, float]:
+        """Right limit at t0, left limit at t1 (s)."""
         return self._limit(t0 + TIME_NOISE, t0, bisect_right), self._limit(t1 - TIME_NOISE, t1, bisect_left)
 
     def _limit(self, near: float, time: float, bisect: Callable) -> float:

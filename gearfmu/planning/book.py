@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from typing import Any
 from gearfmu.errors import Problem, SpecError
 from gearfmu.files import write_text
 from gearfmu.planning.choice import Choice
-from gearfmu.stagefile.reading.base import read_toml
+from gearfmu.stagefile.reading.base import read_toml, toml_value
 
 FORMAT = 1
 HEAD = """# Made by `gearfmu plan`: what each segment of a scene is run with for an error budget, and why.
@@ -130,7 +129,7 @@ def _segment(raw: Mapping[str, Any]) -> Segment:
 def _toml(table: Mapping[str, Any], prefix: str = "") -> list[str]:
     """Lines of a table: plain values, then tables, then lists of tables."""
     plain = {k: v for k, v in table.items() if not isinstance(v, dict) and not _tables(v)}
-    found = [f"{key} = {_value(value)}" for key, value in plain.items()]
+    found = [f"{key} = {toml_value(value)}" for key, value in plain.items()]
     for key, value in table.items():
         if isinstance(value, dict):
             found += ["", f"[{prefix}{key}]", *_toml(value, f"{prefix}{key}.")]
@@ -142,14 +141,6 @@ def _toml(table: Mapping[str, Any], prefix: str = "") -> list[str]:
 
 def _tables(value: object) -> bool:
     return isinstance(value, (list, tuple)) and bool(value) and isinstance(value[0], dict)
-
-
-def _value(value: object) -> str:
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    if isinstance(value, float):
-        return "nan" if math.isnan(value) else str(value)
-    return json.dumps(value, ensure_ascii=False)
 
 
 def kept_plan(identity: str) -> Plan | None:

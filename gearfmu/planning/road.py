@@ -37,12 +37,6 @@ class Road:
         run.begin()
         return run
 
-    def close(self, run: CoupledRun) -> None:
-        """Free the stage of a run."""
-        unit = run.cut.stage
-        assert isinstance(unit, (FmuUnit, KernelUnit)), "of the sources that were named"
-        unit.close()
-
     def keep(self, run: CoupledRun) -> Saved:
         """State of a run, for `again`."""
         saved = run.save()

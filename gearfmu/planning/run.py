@@ -163,12 +163,12 @@ class _Runner:
                     break
             self._rest()
         finally:
-            self.road.close(run)
+            run.cut.stage.close()
         return self.done
 
     def _change(self, run: CoupledRun, choice: Choice) -> CoupledRun:
         """On with another choice from the end of the last leg, which the run may have left."""
-        self.road.close(run)
+        run.cut.stage.close()
         if self._before is None:
             run = self.road.begin(choice)
         else:

@@ -8,14 +8,14 @@ process; the trial takes its state over (`CoupledRun.take_over`), settles, and i
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun
-from gearfmu.cosim.kernel_unit import KernelUnit, Source
+from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import coupled_run, stage_model
 from gearfmu.errors import GearfmuError
 from gearfmu.planning.choice import Choice
@@ -30,8 +30,6 @@ from gearfmu.sweeps.runners import Lost, Runner
 
 BASE_STEPS = 400  # communication steps of which prices are made
 LOOKED_AT = 0.01  # s of processor time of a replay
-CHUNK = 50  # communication steps whose median time stands for all: what another process takes away does not count
-IDLE_CALLS = 20  # timed one by one; the median counts
 PILOT_LEVEL, PILOT_STEP = "fast", 5e-6  # s
 MESH_CHANNELS = ("open_time", "force_drive", "force_coast", "te")
 SOLVER = ("solver.status", "energy.residual")
@@ -127,34 +125,6 @@ def pilot_choice(scene: SceneSpec) -> Choice:
     return Choice(PILOT_LEVEL, fitting(scene.coupling.step, PILOT_STEP), scene.stage.slices, off)
 
 
-class _Timed(Kept):
-    """Keeps its inputs and how long every communication step took, s."""
-
-    def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
-        super().__init__(blob, parameters, settle)
-        self.took: list[float] = []
-
-    def step(self, time: float, h: float) -> None:
-        self.note(time, h)
-        started = clock.perf_counter()
-        KernelUnit.step(self, time, h)
-        self.took.append(clock.perf_counter() - started)
-
-    def realtime(self, step: float) -> float:
-        """Seconds of the stage per simulated second from the first kept state on: medians of chunks, less what a call
-        takes."""
-        idle = float(np.median([self._idle() for _ in range(IDLE_CALLS)]))
-        took = np.array(self.took[max(self.first, 0) :])
-        medians = [float(np.median(part)) for part in np.array_split(took, max(1, took.size // CHUNK))]
-        return (float(np.mean(medians)) - idle) / step
-
-    def _idle(self) -> float:
-        """s of a call that is refused at the door."""
-        started = clock.perf_counter()
-        self.kernel.try_step(0.0, float("nan"))
-        return clock.perf_counter() - started
-
-
 _known: dict[str, tuple[SceneSpec, StageModel]] = {}
 
 
@@ -216,7 +186,7 @@ def _run(task: Task) -> Trial:
     step, meshes = scene.coupling.step, [mesh.name for mesh in model.stage.engagements]
     first, last = (round(t / step) for t in (task.window.start, task.window.end))
     at = max(1, round((task.window.start - task.window.settle) / step))
-    source = KeptSource(model, task.window.start, _Timed)
+    source = KeptSource(model, settle=task.window.start)
     watched = [f"{mesh}.{key}" for mesh in meshes for key in MESH_CHANNELS]
     scene = _recording(scene, [*task.request.channels, *watched, *SOLVER])
     started = clock.process_time()
@@ -230,14 +200,13 @@ def _run(task: Task) -> Trial:
     run.take_over(before)
     trace = run.window(first, last)
     spent = clock.process_time() - started
-    return replace(_judged(task, trace, meshes, _price(task, source.made)), run=spent)
+    return replace(_judged(task, trace, meshes, _price(task, source.made[-1])), run=spent)
 
 
-def _price(task: Task, unit: _Timed) -> Price:
+def _price(task: Task, unit: Kept) -> Price:
     """By replay of the first BASE_STEPS of the window, or as the run itself was timed."""
-    step = scene_and_model(task.scene)[0].coupling.step
     if not task.priced:
-        realtime = unit.realtime(step)
+        realtime = unit.realtime()
         return Price(realtime, realtime / _base_realtime(task.scene))
     recording = unit.recording()
     short = replace(recording, values=recording.values[: recording.first + BASE_STEPS])

@@ -12,13 +12,12 @@ import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
 
 import numpy as np
 
 from gearfmu.body import Body, load_bodies
 from gearfmu.cosim.coupled import OK, Result
-from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
+from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit, Source
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stage import StageModel, assemble
@@ -29,6 +28,8 @@ from gearfmu.stagefile.stage import load_stage
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed together
+MEDIAN_OF = 50  # communication steps whose median time stands for all: what another process takes away does not count
+IDLE_CALLS = 20  # timed one by one; the median counts
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
 LONGEST_PASS = 2.0  # s of processor time
 
@@ -86,13 +87,15 @@ class Price:
 
 
 class Kept(KernelUnit):
-    """A kernel unit that keeps its inputs, and its state at the first step at or after `settle`."""
+    """A kernel unit that keeps its inputs, its state at the first step at or after `settle`, and how long every step
+    took."""
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
         super().__init__(blob, parameters)
         self.blob, self.parameters, self.settle, self.interval = blob, dict(parameters), settle, 0.0
         self.now: dict[str, float] = {}
         self.rows: list[list[float]] = []
+        self.took: list[float] = []  # s
         self.before, self.first, self.state = 0, -1, b""
 
     def set(self, handle: KernelHandle, values: Sequence[float] | np.ndarray) -> None:
@@ -100,38 +103,43 @@ class Kept(KernelUnit):
         super().set(handle, values)
 
     def step(self, time: float, h: float) -> None:
-        self.note(time, h)
-        super().step(time, h)
-
-    def note(self, time: float, h: float) -> None:
-        """Keep the inputs of the step that comes, and the state before it where replays begin."""
         if not self.rows:
             self.before, self.interval = round(time / h), h
         if self.first < 0 and time >= self.settle * (1.0 - 1e-12):
             self.first, self.state = len(self.rows), self.save()
         self.rows.append(list(self.now.values()))
+        started = clock.perf_counter()
+        super().step(time, h)
+        self.took.append(clock.perf_counter() - started)
 
     def recording(self) -> Recording:
         """Recording of this unit."""
         known = (self.blob, self.parameters, tuple(self.now), np.array(self.rows), self.interval)
         return Recording(*known, max(self.first, 0), self.state, self.before)
 
+    def realtime(self) -> float:
+        """Seconds of the stage per simulated second from the first kept state on: medians of chunks, less the time of
+        a call that the kernel refuses at its door."""
+        took = np.array(self.took[max(self.first, 0) :])
+        medians = [float(np.median(part)) for part in np.array_split(took, max(1, took.size // MEDIAN_OF))]
+        idle = []
+        for _ in range(IDLE_CALLS):
+            started = clock.perf_counter()
+            self.kernel.try_step(0.0, float("nan"))
+            idle.append(clock.perf_counter() - started)
+        return (float(np.mean(medians)) - float(np.median(idle))) / self.interval
 
-AnyKept = TypeVar("AnyKept", bound=Kept)
 
+@dataclass(frozen=True)
+class KeptSource(Source):
+    """A source of such units, which it keeps in `made`."""
 
-@dataclass
-class KeptSource(Generic[AnyKept]):
-    """A Source whose units are of this kind; `made` is the last."""
+    settle: float = 0.0
+    made: list[Kept] = field(default_factory=list)
 
-    model: StageModel
-    settle: float
-    kind: type[AnyKept]
-    made: AnyKept = field(init=False)
-
-    def unit(self, parameters: Mapping[str, float | bool | str]) -> AnyKept:
-        self.made = self.kind(self.model.blob, parameters, self.settle)
-        return self.made
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> Kept:
+        self.made.append(Kept(self.model.blob, parameters, self.settle))
+        return self.made[-1]
 
 
 def models_for(
@@ -146,8 +154,8 @@ def models_for(
 def recorded_run(scene: SceneSpec, model: StageModel) -> tuple[Result, Kept]:
     """A coupled run of the scene as it is, by the kernel, and its stage with its inputs; the state that a replay begins
     at is that after the scene's settling time. ModelError when the kernel refuses it, with the kernel's reason."""
-    source = KeptSource(model, scene.settle, Kept)
-    return run_once(scene, source), source.made
+    source = KeptSource(model, settle=scene.settle)
+    return run_once(scene, source), source.made[-1]
 
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:

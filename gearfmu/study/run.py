@@ -6,16 +6,15 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 
 from gearfmu.cosim.coupled import OK
-from gearfmu.errors import ModelError
+from gearfmu.errors import GearfmuError, ModelError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
 from gearfmu.scenefile.scene import SceneSpec
@@ -26,6 +25,7 @@ from gearfmu.study.ladder import base_point, points, window
 from gearfmu.study.norm import band_error, errors, lock_time
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
 from gearfmu.study.table import KeptTable, ReferenceRow, Row, TransientRow
+from gearfmu.sweeps.runners import Lost, Runner, in_this_process
 
 FORMAT = 2  # of what is kept: a study of another format is measured anew
 Progress = Callable[..., None]
@@ -33,36 +33,26 @@ Progress = Callable[..., None]
 
 @dataclass(frozen=True)
 class Study:
-    """A finished study of one scene: its rows, what they are measured against, and sentences about them."""
-
-    scene: SceneSpec
-    rows: tuple[Row, ...]
-    references: tuple[ReferenceRow, ...]
-    transients: tuple[TransientRow, ...]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Defaults:
-    """The levels at their default steps with the scene's slices: rows from rigid to full, and what they are measured
-    against."""
+    """A finished study of one scene: its rows, what they are measured against by number of slices, and sentences about
+    them."""
 
     scene: SceneSpec
     model: StageModel
     rows: tuple[Row, ...]
-    reference: Reference
+    references: Mapping[int, Reference]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Job:
     """A scene, the folder for the files, quick: few points on a short window, defaults: only the default step of each
-    level with the scene's slices, workers: processes."""
+    level with the scene's slices, runner: who computes."""
 
     scene: SceneSpec
     out: Path
     quick: bool = False
     defaults: bool = False
-    workers: int = 1
+    runner: Runner = in_this_process
 
     @property
     def window(self) -> SceneSpec:
@@ -88,7 +78,7 @@ def _price_of(text: str, point: Point) -> tuple[Run, Price] | str:
     return replace(run, recording=None), paired_price(run, base)
 
 
-def _reference_of(text: str, slices: int, quick: bool) -> Reference:
+def _reference_of(text: str, quick: bool, slices: int) -> Reference:
     scene, model, _ = _bench(text)
     return make_reference(scene, model, slices, quick)
 
@@ -105,14 +95,6 @@ def study(job: Job, progress: Progress | None = None) -> Study:
     SpecError or BodyError when the scene cannot be run.
     """
     return _Study(job, progress or (lambda fraction, text="": None)).go()
-
-
-def default_rows(job: Job, progress: Progress | None = None) -> Defaults:
-    """The rows of the levels at their default steps from the folder of a study, measured where they are missing."""
-    work = _Study(replace(job, defaults=True), progress or (lambda fraction, text="": None))
-    found, slices = work.go(), work.scene.stage.slices
-    at_default = [next(row for row in found.rows if _is_at(row, point)) for point in work.wanted()]
-    return Defaults(work.scene, work.model, tuple(at_default), work.references([slices])[slices])
 
 
 class _Study:
@@ -138,12 +120,12 @@ class _Study:
         missing = [point for point in wanted if not any(_is_at(row, point) for row in known)]
         self._write_facts()
         references = self.references(slices)
-        for done, (point, found) in enumerate(self._each(_price_of, missing)):
+        for done, (point, found) in enumerate(self._each(partial(_price_of, self.text), missing)):
             self.tell((done + 1) / (len(missing) + 1), f"{point.level} {point.integrator}, {point.slices} slices")
             self._keep(point, found, references[point.slices])
-        kinds = (Row, ReferenceRow, TransientRow)
-        rows, against, transients = (tuple(self.tables[kind].of(self.scene.name)) for kind in kinds)
-        return Study(self.scene, rows, against, transients, tuple(self.said))
+        known = self.tables[Row].of(self.scene.name)
+        rows = tuple(row for row in known if any(_is_at(row, point) for point in wanted))
+        return Study(self.scene, self.model, rows, references, tuple(self.said))
 
     def wanted(self) -> list[Point]:
         """Points with their default steps as numbers, each once."""
@@ -164,7 +146,7 @@ class _Study:
         kept = {count: kept_reference(path, self.identity) for count, path in paths.items()}
         found = {count: reference for count, reference in kept.items() if reference is not None}
         missing = [count for count in slices if count not in found]
-        for count, reference in self._each(_reference_of, missing, self.job.quick):
+        for count, reference in self._each(partial(_reference_of, self.text, self.job.quick), missing):
             found[count] = reference
             keep_reference(reference, paths[count], self.identity)
         table = self.tables[ReferenceRow]
@@ -174,17 +156,13 @@ class _Study:
             table.add(ReferenceRow(self.scene.name, count, r.h, r.n_dyn, *moved, r.reached))
         return found
 
-    def _each(self, work: Callable, items: list, *more: object) -> Iterator[tuple]:
-        """(item, work(scene, item, …)) as they are done, in this process or in several."""
-        if self.job.workers <= 1 or len(items) <= 1:
-            for item in items:
-                self.tell(None, str(item) if isinstance(item, int) else item.level)
-                yield item, work(self.text, item, *more)
-            return
-        with ProcessPoolExecutor(self.job.workers) as pool:
-            waiting = {pool.submit(work, self.text, item, *more): item for item in items}
-            for future in as_completed(waiting):
-                yield waiting[future], future.result()
+    def _each(self, work: Callable, items: list) -> Iterator[tuple]:
+        """(item, work(item)) as they are done."""
+        self.tell(None, "references" if items and isinstance(items[0], int) else "points")
+        for number, found in self.job.runner(work, items):
+            if isinstance(found, Lost):
+                raise GearfmuError(f"{self.scene.name}: {found.message}")
+            yield items[number], found
 
     def _keep(self, point: Point, found: tuple[Run, Price] | str, reference: Reference) -> None:
         where = f"{point.level}, {point.slices} slices"

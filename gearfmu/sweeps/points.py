@@ -37,13 +37,15 @@ class Variant:
 
 @dataclass(frozen=True)
 class Task:
-    """A point for a worker. subject, what, values: of the plan; traces: whether the trace comes back; program: what
-    `program` says where the sweep began."""
+    """A point for a worker. subject, what, values: of the plan; variant: of its stage; identity: fingerprint of all
+    that decides its numbers; traces: whether the trace comes back; program: what `program` says where the sweep
+    began."""
 
     subject: str
     what: str
     values: Mapping[str, Any]
     variant: Variant
+    identity: str
     traces: bool
     program: str
 

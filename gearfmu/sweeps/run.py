@@ -5,9 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,15 +25,6 @@ JOURNAL, TRACES, BODIES = "points.jsonl", "traces", "bodies"
 Progress = Callable[..., None]
 
 
-@dataclass(frozen=True)
-class _Point:
-    """A point, its variant of the stage, and the fingerprint of all that decides its numbers."""
-
-    values: Mapping[str, Any]
-    variant: Variant
-    identity: str
-
-
 def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress: Progress | None = None) -> SweepTable:
     """Compute the points that are not yet in the folder `out`; returns all.
 
@@ -44,13 +34,12 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
     """
     told = progress or (lambda fraction, text="": None)
     journal = Journal(out / JOURNAL)
-    points = _points(plan, out)
-    _prepare([p for p in points if isinstance(p, _Point)], runner, told)
+    points = _points(plan, out, traces)
+    _prepare([p for p in points if isinstance(p, Task)], runner, told)
     outcomes: list[Outcome | None] = [_kept(p, journal, out, traces) for p in points]
-    open_ = [(n, p) for n, p in enumerate(points) if outcomes[n] is None and isinstance(p, _Point)]
-    tasks = [Task(str(plan.subject), plan.what, p.values, p.variant, traces, program()) for _, p in open_]
+    open_ = [(n, p) for n, p in enumerate(points) if outcomes[n] is None and isinstance(p, Task)]
     failed, done = sum(known is not None and known.name != OK for known in outcomes), len(points) - len(open_)
-    for number, result in runner(compute, tasks):
+    for number, result in runner(compute, [point for _, point in open_]):
         (n, point), outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
         outcomes[n] = _keep(point, outcome, journal, out)
         failed, done = failed + (outcome.name != OK), done + 1
@@ -58,11 +47,11 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
     return _table(plan, points, [o for o in outcomes if o is not None], out)
 
 
-def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
+def _points(plan: Plan, out: Path, traces: bool) -> list[Task | Outcome]:
     """Every point, or why its stage or scene is refused."""
     variants: dict[Variant, tuple[Variant, str]] = {}
     fitting: dict[tuple[str, ...], bool] = {}
-    found: list[_Point | Outcome] = []
+    found: list[Task | Outcome] = []
     for values in plan.points:
         try:
             stage, others = split(plan.what, values)
@@ -72,7 +61,7 @@ def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
             variant, fingerprint = variants[asked]
             of_rest = load_scene(plan.subject, others).hash if plan.what == RUN else others
             parts = [FORMAT, plan.what, of_rest, fingerprint, program()]
-            found.append(_Point(values, variant, _digest(parts)))
+            found.append(Task(str(plan.subject), plan.what, values, variant, _digest(parts), traces, program()))
         except GearfmuError as error:
             found.append(Outcome(type(error).__name__, str(error)))
     return found
@@ -102,7 +91,7 @@ def _fit(spec: Stage, folder: str | None) -> bool:
     return True
 
 
-def _prepare(points: list[_Point], runner: Runner, told: Progress) -> None:
+def _prepare(points: list[Task], runner: Runner, told: Progress) -> None:
     """Make missing bodies, a variant a task; BodyError where that fails."""
     variants = {(v.folder or v.file): v for v in (point.variant for point in points)}
     missing = [variant for variant in variants.values() if not _fit(variant.spec(), variant.folder)]
@@ -114,7 +103,7 @@ def _prepare(points: list[_Point], runner: Runner, told: Progress) -> None:
         raise BodyError("\n".join(problems))
 
 
-def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) -> Outcome | None:
+def _kept(point: Task | Outcome, journal: Journal, out: Path, traces: bool) -> Outcome | None:
     """Known outcome of a point: refused ones, and those of the journal that need not be computed again."""
     if isinstance(point, Outcome):
         return point
@@ -124,7 +113,7 @@ def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) ->
     return known
 
 
-def _keep(point: _Point, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
+def _keep(point: Task, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
     """The outcome without its trace, which is now in a file, noted in the journal."""
     if outcome.trace is not None:
         outcome.trace.save(out / trace_name(point.identity))
@@ -137,11 +126,11 @@ def trace_name(identity: str) -> str:
     return f"{TRACES}/{identity[:16]}.h5"
 
 
-def _table(plan: Plan, points: list[_Point | Outcome], outcomes: list[Outcome], out: Path) -> SweepTable:
+def _table(plan: Plan, points: list[Task | Outcome], outcomes: list[Outcome], out: Path) -> SweepTable:
     keys = {key: column_name(key, plan.unit(key)) for key in plan.points[0]}
     columns = {"point": np.arange(len(outcomes))}
     columns |= {name: column([plan.number(key, p[key]) for p in plan.points]) for key, name in keys.items()}
-    files = [trace_name(p.identity) if isinstance(p, _Point) else "" for p in points]
+    files = [trace_name(p.identity) if isinstance(p, Task) else "" for p in points]
     columns["outcome"] = column([outcome.name for outcome in outcomes])
     columns["message"] = column([outcome.message for outcome in outcomes])
     columns["trace"] = column([name if name and (out / name).is_file() else "" for name in files])

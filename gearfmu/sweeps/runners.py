@@ -42,6 +42,13 @@ def in_this_process(function: Callable[[Any], Any], arguments: Sequence[object])
         yield number, function(argument)
 
 
+def runner_of(on: object) -> Runner:
+    """The Runner of a number of processes, this one for 1 and None; else that of a dask cluster (`on_cluster`)."""
+    if on is None or on == 1:
+        return in_this_process
+    return on_this_machine(on) if isinstance(on, int) else on_cluster(on)
+
+
 def on_this_machine(workers: int | None = None) -> Runner:
     """A Runner with so many processes of this machine, one a core when None. They are Python processes of their own
     (`worker.py`), so that scripts need no `if __name__ == "__main__":`; one that dies is replaced and its argument

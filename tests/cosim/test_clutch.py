@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from analytic_stage import Smooth, energy_of
+from analytic_stage import Smooth, energy_of, values
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gearfmu.cosim.events import sticking_torques
 from gearfmu.cosim.network import Clutch, Inertia, Network, Source, Spring
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.signals import Constant, Ramp
+from gearfmu.cosim.signals import Ramp
 
 J1, J2 = 0.2, 0.7
 
@@ -29,6 +29,10 @@ def two_inertias(capacity, torque=lambda t, phi, w: 0.0, w1=0.0, w2=0.0, peak=1.
     return unit
 
 
+def constant(capacity: float) -> Ramp:
+    return Ramp(((0.0, capacity),))
+
+
 def advance(unit: PyUnit, h: float, steps: int) -> None:
     for n in range(steps):
         unit.step(n * h, h)
@@ -38,13 +42,13 @@ def advance(unit: PyUnit, h: float, steps: int) -> None:
 def test_constant_capacity_locks_at_the_closed_form_instant(slip):
     """Lock after Δw / (T (1/J1 + 1/J2)), at the speed of conserved momentum; then T_stick = T_drive J2 / (J1 + J2)."""
     capacity, drive = 40.0, 7.0
-    unit = two_inertias(Constant(capacity), lambda t, phi, w: drive, w1=slip)
+    unit = two_inertias(constant(capacity), lambda t, phi, w: drive, w1=slip)
     sign = math.copysign(1.0, slip)
     instant = abs(slip) / (capacity * (1 / J1 + 1 / J2) - sign * drive / J1)
     advance(unit, 1e-2, 100)
     assert [(event.part, event.what) for event in unit.state.events] == [("clutch", "lock")]
     assert unit.state.events[0].time == pytest.approx(instant, abs=1e-13)
-    speed, slip_now, torque, locked = unit.get(unit.resolve(["a.w", "clutch.slip", "clutch.tau", "clutch.locked"]))
+    speed, slip_now, torque, locked = values(unit, ["a.w", "clutch.slip", "clutch.tau", "clutch.locked"])
     assert speed == pytest.approx((J1 * slip + drive * 1.0) / (J1 + J2), abs=1e-11)
     assert abs(slip_now) < 1e-13 and locked == 1.0
     assert torque == pytest.approx(drive * J2 / (J1 + J2), abs=1e-12)
@@ -62,19 +66,19 @@ def test_capacity_ramp_locks_at_the_closed_form_instant():
 def test_breaks_loose_when_the_sticking_torque_exceeds_the_static_capacity(peak):
     """Drive torque r t: sticks until r t J2/(J1+J2) = peak·T; afterwards J2 accelerates with T."""
     rate, capacity = 200.0, 25.0
-    unit = two_inertias(Constant(capacity), lambda t, phi, w: rate * t, peak=peak)
+    unit = two_inertias(constant(capacity), lambda t, phi, w: rate * t, peak=peak)
     advance(unit, 7e-3, 50)
     instant = peak * capacity * (J1 + J2) / (J2 * rate)
     assert [event.what for event in unit.state.events] == ["slip"]
     rounding = 1e-10  # TORQUE_TOLERANCE over the rate of the torque
     assert unit.state.events[0].time == pytest.approx(instant, abs=rounding)
     expected = 0.5 * rate * instant**2 / (J1 + J2) + capacity / J2 * (0.35 - instant)
-    assert unit.get(unit.resolve(["b.w"]))[0] == pytest.approx(expected, abs=1e-8)
+    assert values(unit, ["b.w"])[0] == pytest.approx(expected, abs=1e-8)
 
 
 def test_sticks_through_a_reversal_of_torque_and_slips_both_ways():
     """±60 N·m, 1 Hz, against 30 N·m: slips forward, sticks, slips backward, as often as the drive turns over."""
-    unit = two_inertias(Constant(30.0), lambda t, phi, w: 60.0 * math.sin(2 * math.pi * t))
+    unit = two_inertias(constant(30.0), lambda t, phi, w: 60.0 * math.sin(2 * math.pi * t))
     advance(unit, 1e-3, 3000)
     assert [event.what for event in unit.state.events] == ["slip", "lock"] * 5 + ["slip"]
     loose = [event.time for event in unit.state.events[::2]]
@@ -103,20 +107,21 @@ def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
     network = Network(
         tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
         springs=(Spring("spring", {"a": 1.0, "d": -1.0}, stiffness),),
-        clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], Constant(c)) for k, c in enumerate(capacities)),
+        clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], constant(c)) for k, c in enumerate(capacities)),
     )
     unit = PyUnit(network, micro_step=5e-5)
     unit.initialize(0.0)
-    handle = unit.resolve(["energy.stored", *(f"{name}.w" for name in names), *(f"clutch{k}.tau" for k in range(3))])
+    log = unit.log(["energy.stored", *(f"{name}.w" for name in names), *(f"clutch{k}.tau" for k in range(3))], 40)
     inertias = np.array([node.inertia for node in network.nodes])
     energy, momentum, scale = energy_of(unit), inertias @ speeds, 1.0 + np.abs(inertias * speeds).sum()
     for n in range(40):
         unit.step(n * 1e-3, 1e-3)
-        values = unit.get(handle)
-        assert values[0] <= energy * (1 + 1e-10) + 1e-12
-        assert abs(inertias @ values[1:5] - momentum) < 1e-10 * scale
-        assert np.all(np.abs(values[5:]) <= np.array(capacities) * (1 + 1e-9) + 1e-9)
-        energy = values[0]
+        log.take()
+    for row in log.rows():
+        assert row[0] <= energy * (1 + 1e-10) + 1e-12
+        assert abs(inertias @ row[1:5] - momentum) < 1e-10 * scale
+        assert np.all(np.abs(row[5:]) <= np.array(capacities) * (1 + 1e-9) + 1e-9)
+        energy = row[0]
 
 
 @settings(max_examples=100)
@@ -144,7 +149,7 @@ def test_a_smooth_capacity_converges_with_second_order():
     def final(h):
         unit = two_inertias(Smooth(lambda t: 30.0 * (1 + math.sin(9 * t))), w1=400.0)
         advance(unit, h, round(0.2 / h))
-        return unit.get(unit.resolve(["a.w"]))[0]
+        return values(unit, ["a.w"])[0]
 
     exact = 400.0 - 30.0 * (0.2 + (1 - math.cos(1.8)) / 9) / J1
     errors = [abs(final(h) - exact) for h in (0.04, 0.02, 0.01)]

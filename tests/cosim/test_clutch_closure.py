@@ -7,13 +7,12 @@ from functools import lru_cache
 
 import pytest
 
-from evidence.accuracy.coupling import Distance, distance
+from evidence.accuracy.coupling import Distance, WiredSource, Wiring, distance
 from gearfmu.cosim.accuracy import Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Result
-from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.scenefile.scene import load_scene
+from gearfmu.stage import StageModel
 
 pytestmark = pytest.mark.full
 H, WHOLE = 5e-6, Window(0.0, steady=False)
@@ -25,14 +24,14 @@ def run(master: str, step: float, wiring: Wiring = ALL, chain: bool = True) -> R
     """The scene at level fast and an internal step of 5 µs, which every communication step here is a multiple of."""
     changes = {"stage.level": "fast", "stage.h": H, "coupling.master": master, "coupling.step": step}
     scene = load_scene("clutch_closure", changes | {"record": [torque(chain)], "passenger_car.chain_in_fmu": chain})
-    result = run_once(scene, source(chain), wiring=wiring)
+    result = run_once(scene, WiredSource(model(chain), wiring=wiring))
     assert result.outcome == OK
     return result
 
 
 @lru_cache(maxsize=2)
-def source(chain: bool) -> Source:
-    return Source(stage_model(load_scene("clutch_closure", {"passenger_car.chain_in_fmu": chain})))
+def model(chain: bool) -> StageModel:
+    return stage_model(load_scene("clutch_closure", {"passenger_car.chain_in_fmu": chain}))
 
 
 def torque(chain: bool) -> str:

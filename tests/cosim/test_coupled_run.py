@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic_stage import Plant
+from analytic_stage import Plant, Stage
 
 from gearfmu.cosim.accuracy import Window, alternating, coupling_errors, rms
 from gearfmu.cosim.coupled import OK, Plan, run_coupled
@@ -19,8 +19,8 @@ CLOSURE = Plant(chain=True, capacity=Ramp(((0.0, 0.0), (0.05, 250.0))), engine_w
 DURATION = 0.08
 
 
-def cut(stage: PyUnit | None = None) -> Cut:
-    return Cut(stage or PyUnit(CLOSURE.stage(), CLOSURE.micro_step), PyUnit(CLOSURE.drive()), ("pinion", "wheel"))
+def cut(stage: Stage | None = None) -> Cut:
+    return Cut(stage or Stage(CLOSURE), PyUnit(CLOSURE.drive()))
 
 
 def plan(name: str = "gs_mean", h: float = 2e-4, **more) -> Plan:
@@ -32,7 +32,7 @@ def test_everything_is_recorded_at_every_point_with_unit_and_description():
     result = run_coupled(cut(), plan(progress=told.append))
     trace = result.trace
     assert result.outcome == OK and trace.time.size == 401 and trace.time[-1] == pytest.approx(DURATION, abs=1e-15)
-    assert trace.channels["pinion.tau"].unit == "N.m" and trace.channels["clutch.locked"].values.dtype == np.int64
+    assert trace.channels["input.tau"].unit == "N.m" and trace.channels["clutch.locked"].values.dtype == np.int64
     assert "drive.engine.w" in trace and "engine" in trace.channels["drive.engine.w"].description
     assert told[-1] == 1.0 and all(b > a for a, b in zip(told, told[1:], strict=False)) and result.cpu_s > 0.0
 
@@ -56,19 +56,20 @@ def test_richardson_predicts_the_true_coupling_error(name, low, high):
     estimate = coupling_errors(coarse.trace, fine.trace, coarse.order, Window(0.0, steady=False))["input.tau"].relative
     unit = PyUnit(CLOSURE.monolithic(), CLOSURE.micro_step)
     unit.initialize(0.0)
-    handle, rows = unit.resolve(["input.tau"]), []
+    log = unit.log(["input.tau"], 401)
     for n in range(401):
-        rows.append(unit.get(handle)[0])
+        log.take()
         unit.step(n * 2e-4, 2e-4)
-    true = rms(coarse.trace["input.tau"] - rows) / rms(alternating(np.array(rows), 2e-4, steady=False))
+    whole = log.rows()[:, 0]
+    true = rms(coarse.trace["input.tau"] - whole) / rms(alternating(whole, 2e-4, steady=False))
     assert low < estimate / true < high, (estimate, true)
 
 
-class Failing(PyUnit):
+class Failing(Stage):
     """The stage, until it gives up in the step from 20 ms."""
 
     def __init__(self, error: Exception) -> None:
-        super().__init__(CLOSURE.stage(), CLOSURE.micro_step)
+        super().__init__(CLOSURE)
         self.error = error
 
     def step(self, time: float, h: float) -> None:

@@ -12,8 +12,9 @@ from scipy.linalg import expm
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import Plan, Result, run_coupled
+from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.scene_run import in_drivetrain
-from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
+from gearfmu.cosim.shaft_loads import Law, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import SpecError
 from gearfmu.scenefile.scene import load_scene
@@ -115,7 +116,7 @@ class Rotor:
 
 
 def speed_at_the_end(steps: int, name: str, load: ShaftLoad, duration: float = 0.02, w: float = 100.0) -> Result:
-    cut = Loaded(Rotor(w), ShaftLoads({"shaft": load}), {"shaft": w})
+    cut = Cut(Rotor(w), ShaftLoads({"shaft": load}, {"shaft": w}))
     return run_coupled(cut, Plan(name, duration / steps, steps))
 
 
@@ -161,7 +162,7 @@ def test_a_brake_does_not_feed_a_resonance_beyond_half_the_sampling_rate() -> No
     """A brake of 0.44 N·m·s/rad at 20 µs, a resonance of the bore at 33 kHz with 0.4 % of damping. With the change of
     the last step alone carried on the resonance grows, by a factor of 9 in this run."""
     load = ShaftLoad(proportional={"torque": -0.44, "speed": 1.0}, constant=0.44 * 100.0)
-    cut = Loaded(Resonator(100.0), ShaftLoads({"shaft": load}), {"shaft": 100.0})
+    cut = Cut(Resonator(100.0), ShaftLoads({"shaft": load}, {"shaft": 100.0}))
     cut.stage.swing[1] = 1.0
     run_coupled(cut, Plan("gs_mean", 20e-6, 500))
     assert np.abs(cut.stage.swing[1]) < 0.1

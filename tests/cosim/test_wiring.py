@@ -7,11 +7,11 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from evidence.accuracy.coupling import WiredSource, Wiring
 from gearfmu import fmu
 from gearfmu.cosim.accuracy import rms
 from gearfmu.cosim.fmu_unit import FmuUnit
-from gearfmu.cosim.kernel_unit import KernelUnit, Source
-from gearfmu.cosim.masters import Wiring
+from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.scene_run import drive_of, run_once, stage_model
 from gearfmu.errors import CouplingError, ModelError
 from gearfmu.scenefile.scene import load_scene
@@ -111,7 +111,7 @@ def errors(model: StageModel, master: str, wiring: Wiring, steps: tuple[float, .
         changes = {"duration": 0.02, "record": [TORQUE], "clutch.capacity": [["0 s", "0 N*m"], ["10 ms", "250 N*m"]]}
         changes |= {"stage.level": "rigid", "stage.slices": 1, "stage.h": H}
         changes |= {"coupling.master": master, "coupling.step": step}
-        return run_once(load_scene("clutch_closure", changes), Source(model), wiring=wiring).trace
+        return run_once(load_scene("clutch_closure", changes), WiredSource(model, wiring=wiring)).trace
 
     reference = trace("gs_mean", H, Wiring())[TORQUE]
     return np.array([rms(trace(master, step, wiring)[TORQUE] - reference[:: round(step / H)]) for step in steps])

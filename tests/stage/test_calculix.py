@@ -94,8 +94,7 @@ def beside(model: StageModel, table: str) -> Iterator[tuple[np.ndarray, np.ndarr
     """Our and CalculiX's transmission errors (µm) of every torque of a table at all positions of the pitch."""
     theirs = {float(torque): np.array(curve) for torque, curve in TE[table].items()}
     ours = loaded_te(model, list(theirs), POSITIONS, **HELD)
-    for here, there in zip(1e6 * ours.te, theirs.values(), strict=True):
-        yield here, there
+    yield from zip(1e6 * ours.te, theirs.values(), strict=True)
 
 
 def test_transmission_error_over_one_pitch(plain: StageModel) -> None:

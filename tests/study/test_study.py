@@ -16,6 +16,7 @@ from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.run import Job, study
 from gearfmu.study.table import ReferenceRow, Row, read_rows, write_rows
+from gearfmu.sweeps.runners import on_this_machine
 
 COLUMNS = (
     "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
@@ -68,7 +69,7 @@ def test_rows_of_another_kernel_are_measured_anew(scene: SceneSpec, tmp_path: Pa
     write_rows(tmp_path / "study.csv", Row, [other, ROW])
     (tmp_path / "study.json").write_text(json.dumps({scene.name: {"identity": "of before"}}))
     short = scene.model_copy(update={"duration": 3e-3, "settle": 1e-3})
-    rows = study(Job(short, tmp_path, defaults=True, workers=2)).rows
+    rows = study(Job(short, tmp_path, defaults=True, runner=on_this_machine(2))).rows
     assert len(rows) == 4 and all(row.te_error < 1.0 for row in rows)
     assert ROW in read_rows(tmp_path / "study.csv", Row), "rows of other scenes stay"
 

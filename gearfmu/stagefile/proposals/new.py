@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 from gearfmu.errors import SpecError
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.planetary import PlanetarySpec
-from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml
+from gearfmu.stagefile.reading.base import fields_by_key, model_of_table, quantity_of, read_toml, toml_value
 from gearfmu.stagefile.reading.files import Layers, files_of, find_stage, put_at, read_layers
 from gearfmu.stagefile.stage import load_stage
 
@@ -167,7 +167,7 @@ def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str
 def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
     quantity = quantity_of(field)
     unit = quantity.unit if quantity else ""
-    text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
+    text = f"{key} = {toml_value(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
     meaning = field.description or ""
     choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
     if len(choices) > 1:
@@ -179,13 +179,4 @@ def _default(field: FieldInfo, unit: str) -> str:
     if field.is_required() or field.default is None:
         return f'"… {unit}"' if unit else "…"
     default = field.default
-    return json.dumps(f"{default:g} {unit}") if unit and isinstance(default, float) else _toml(default)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        entries = ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items())
-        return f"{{ {entries} }}" if entries else "{}"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool, int)) else repr(value)
+    return json.dumps(f"{default:g} {unit}") if unit and isinstance(default, float) else toml_value(default)

@@ -6,6 +6,7 @@ it may also be the SI number.
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -166,6 +167,16 @@ def named_tables(tables: object, **common: object) -> object:
     return {
         name: common | table | {"name": name} if isinstance(table, dict) else table for name, table in tables.items()
     }
+
+
+def toml_value(value: Any) -> str:
+    """A value as TOML writes it; a dictionary as an inline table."""
+    if isinstance(value, dict):
+        entries = ", ".join(f"{json.dumps(str(key))} = {toml_value(item)}" for key, item in value.items())
+        return f"{{ {entries} }}" if entries else "{}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(toml_value(item) for item in value)}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool, int)) else repr(value)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
