@@ -13,23 +13,15 @@ import numpy as np
 from gearfmu.files import write_text
 from gearfmu.report import metrics, page, sections
 from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
-from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded
+from gearfmu.report.kinds import averaging, force_channels
+from gearfmu.report.mesh_cycle import BINS, HARMONICS, mean_cycle, with_harmonics
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import minus, plain, shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.plots_nvh import (
-    SHOWN_TO,
-    averaging,
-    force_channels,
-    octave_table,
-    segment,
-    spectrum_curve,
-    spectrum_of,
-)
+from gearfmu.report.plots_nvh import SHOWN_TO, octave_table, segment, spectrum_curve, spectrum_of
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
 from gearfmu.stage.run.te import mesh_harmonics
-from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import write_columns
 
 ORDERS = 6
@@ -156,31 +148,19 @@ def _padded(values: np.ndarray, size: int) -> np.ndarray:
 
 def _mesh_cycle(compared: Sequence[Compared], mesh: str) -> Plot | None:
     """Mean transmission error over the mesh cycle and its harmonics."""
-    found: dict[str, np.ndarray] = {}
-    for own in compared:
-        stage, part = own.run.stage, own.run.part
-        engagement = None if stage is None else next((e for e in stage.engagements if e.name == mesh), None)
-        if stage is None or engagement is None or f"{mesh}.te" not in part:
-            continue
-        position = position_of(part, stage, engagement)
-        mean = None if position is None else folded(position, 1e6 * part[f"{mesh}.te"])
-        if mean is not None:
-            found[own.label] = mean
+    found = {own.label: mean for own in compared if (mean := mean_cycle(own.run, mesh)) is not None}
     if len(found) < 2:
         return None
-    x, orders = (np.arange(BINS) + 0.5) / BINS, np.arange(1.0, HARMONICS + 1)
+    x, label = (np.arange(BINS) + 0.5) / BINS, "transmission error in µm, without its mean"
     lines = {label: mesh_harmonics(mean[None], HARMONICS)[0] for label, mean in found.items()}
     curves = tuple(Curve(x, mean - mean.mean(), label, "µm") for label, mean in found.items())
-    bars = tuple(Curve(orders, line, label, "µm rms", "bars") for label, line in lines.items())
-    panels = (
-        Panel("transmission error in µm, without its mean", curves, height=230, x_label="position in pitches"),
-        Panel("harmonics in µm, rms", bars, height=230, x_label="harmonic of the mesh"),
-    )
+    panel = Panel(label, curves, height=230, x_label="position in pitches")
     told = "; ".join(f"{label} {np.ptp(mean):.3g} µm" for label, mean in found.items())
     caption = f"Mean over all mesh cycles of each run's window. Peak to peak: {told}."
-    columns = {"harmonic": orders} | {f"{label}_[um rms]": line for label, line in lines.items()}
+    columns = {"harmonic": np.arange(1.0, HARMONICS + 1)}
+    columns |= {f"{label}_[um rms]": line for label, line in lines.items()}
     title = of_mesh(compared[0].run.trace, mesh, "Mesh cycle")
-    return Plot(f"{mesh}_cycle", title, caption, Chart(panels, across=2), columns)
+    return Plot(f"{mesh}_cycle", title, caption, with_harmonics(panel, lines), columns)
 
 
 def _common(compared: Sequence[Compared]) -> list[str]:
@@ -256,7 +236,7 @@ def _orders(compared: Sequence[Compared], mesh: str) -> Plot | None:
 def _octaves(compared: Sequence[Compared]) -> list[str]:
     """Octave bands of the first run, and what the others change in dB."""
     try:
-        tables = [octave_table(own.run.trace, own.run.window) for own in compared]
+        tables = [octave_table(own.run) for own in compared]
     except MetricsError:
         return []
     rows = [row for table in tables for row in table.values()]

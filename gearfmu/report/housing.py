@@ -13,11 +13,12 @@ from gearfmu.errors import GearfmuError
 from gearfmu.modes.paths import paths_of
 from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, level_limits, over_time
+from gearfmu.report.kinds import ACCELERATIONS, SENSOR, loudest_sensors, sensors
 from gearfmu.report.metrics import MetricsError, level, sample_step, undo_mean
-from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, heat_of
+from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.run import Run
 from gearfmu.report.runup import RunUp
-from gearfmu.report.signals import GEAR_SPEED, Window
+from gearfmu.report.signals import GEAR_SPEED
 from gearfmu.sound import BANDS, SoundError, SoundPower, bands_of, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
 from gearfmu.stage.run.sound import Heard, housing_body, radiated_power
@@ -33,26 +34,21 @@ SHOWN_DB = 60
 
 def figures(run: Run) -> list[Callable[[], Plot | None]]:
     """What makes the chapter; nothing where no sensor of a housing moves."""
-    trace, window, names = run.trace, run.window, sensors(run.trace)
+    names = sensors(run.trace)
     if not names:
         return []
-    found: list[Callable[[], Plot | None]] = [partial(accelerations, trace, window)]
+    found: list[Callable[[], Plot | None]] = [partial(accelerations, run)]
     if run.run_up is None:
-        found.append(partial(plots_nvh.spectra, trace, window, run.angles, names, ACCELERATIONS))
-        loud = plots_nvh.loudest_sensors(trace)
-        found += [partial(plots_nvh.cuts, trace, own, loud, ACCELERATIONS) for own in run.angles.items()]
+        found.append(partial(plots_nvh.spectra, run, names, ACCELERATIONS))
+        loud = loudest_sensors(run.trace)
+        found += [partial(plots_nvh.cuts, run, mesh, loud, ACCELERATIONS) for mesh in run.angles]
     sounding = partial(sound, run) if run.run_up is None else partial(sound_over_speed, run.run_up, run)
-    return [*found, partial(transfer_paths, run), partial(mounts, trace), sounding]
+    return [*found, partial(transfer_paths, run), partial(mounts, run.trace), sounding]
 
 
-def sensors(trace: Trace) -> list[str]:
-    """Channels of the sensors of a housing that moves, in the trace's order."""
-    return [name for name in trace.channels if name.startswith(SENSOR) and np.any(trace[name])]
-
-
-def accelerations(trace: Trace, window: Window) -> Plot:
-    """Third octaves of every sensor's accelerations over a window, their averaging over the step taken out."""
-    part, names = trace.window(window.start, window.end), sensors(trace)
+def accelerations(run: Run) -> Plot:
+    """Third octaves of every sensor's accelerations over the window, their averaging over the step taken out."""
+    part, window, names = run.part, run.window, sensors(run.trace)
     try:
         pieces = segments(part.time, np.stack([part[name] for name in names], axis=1), moved=False)
     except SoundError as error:
@@ -128,7 +124,7 @@ def sound_over_speed(up: RunUp, run: Run) -> Plot:
 def transfer_paths(run: Run) -> Plot:
     """Share of every bearing direction at the loudest sensor, in its loudest third octave and in all."""
     stage, bodies = _at_hand(run, "Transfer paths")
-    loudest = max(plots_nvh.loudest_sensors(run.trace), key=lambda name: float(np.std(run.trace[name])))
+    loudest = max(loudest_sensors(run.trace), key=lambda name: float(np.std(run.trace[name])))
     try:
         found = paths_of(run.trace, stage, bodies, loudest, run.window.start)
     except GearfmuError as error:

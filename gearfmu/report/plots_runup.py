@@ -6,9 +6,10 @@ import numpy as np
 
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits
+from gearfmu.report.kinds import Kind
 from gearfmu.report.names import shown
 from gearfmu.report.plots import RPM
-from gearfmu.report.plots_nvh import Kind, heat_of
+from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.runup import RunUp, Signal
 
 SHOWN_DB = 60
