@@ -30,7 +30,7 @@ def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
     made, missing = [], []
     for maker in _figures(run, gears):
         try:
-            if (plot := maker()) is not None:
+            if (plot := maker()) is not None and not plot.empty:
                 made.append(plot)
         except MetricsError as error:
             missing.append(str(error))

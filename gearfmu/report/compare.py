@@ -123,7 +123,7 @@ def _plots(runs: Runs) -> list[Plot]:
     names = [mesh for mesh in meshes(first.trace) if all(mesh in meshes(own.trace) for own in runs.values())]
     found = [plot for mesh in names for plot in (_mesh_cycle(runs, mesh), _orders(runs, mesh))]
     found += [_spectra(runs), *[_over_time(runs, mesh) for mesh in names]]
-    return [plot for plot in found if isinstance(plot.picture, Chart) and plot.picture.panels]
+    return [plot for plot in found if not plot.empty]
 
 
 def _over_time(runs: Runs, mesh: str) -> Plot:

@@ -13,8 +13,8 @@ from gearfmu.errors import GearfmuError
 from gearfmu.modes.paths import paths_of
 from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, level_limits, over_time
-from gearfmu.report.kinds import ACCELERATIONS, SENSOR, loudest_sensors, sensors
-from gearfmu.report.metrics import MetricsError, level, sample_step, undo_mean
+from gearfmu.report.kinds import ACCELERATIONS, SENSOR, by_part, loudest_sensors, sensors
+from gearfmu.report.metrics import MetricsError, sample_step, undo_mean
 from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.run import Run
 from gearfmu.report.runup import RunUp
@@ -56,26 +56,23 @@ def accelerations(run: Run) -> Plot:
     squares = 0.5 * (np.abs(pieces.velocity) ** 2).mean(axis=0)
     squares = undo_mean(np.sqrt(squares.T), pieces.frequency, sample_step(part.time)) ** 2
     bands = bands_of(pieces.frequency)
-    levels = level(np.sqrt(third_octaves(pieces.frequency, squares, bands)), ACCELERATIONS.reference)
-    panels = []
-    for sensor in dict.fromkeys(name.rsplit(".", 1)[0] for name in names):
-        own = {name: levels[i] for i, name in enumerate(names) if name.startswith(f"{sensor}.")}
-        panels.append(_bars(own, bands, f"{sensor.removeprefix(SENSOR)}: {ACCELERATIONS.label}", ACCELERATIONS.label))
+    rows, unit = ACCELERATIONS.level(np.sqrt(third_octaves(pieces.frequency, squares, bands))), ACCELERATIONS.label
+    levels = dict(zip(names, rows, strict=True))
+    panels = [
+        _bars({name: levels[name] for name in own}, bands, f"{own[0].split('.')[1]}: {unit}", unit)
+        for own in by_part(names)
+    ]
     caption = f"Accelerations in third octaves (IEC 61260-1), from {window.start:.3f} s to {window.end:.3f} s "
     caption += f"({window.reason}); 120 dB are 1 m/s² rms. Lines {pieces.frequency[1]:.3g} Hz apart."
-    columns = {"third_octave_[Hz]": bands} | {f"{n}_[{ACCELERATIONS.label}]": levels[i] for i, n in enumerate(names)}
+    columns = {"third_octave_[Hz]": bands} | {f"{name}_[{unit}]": own for name, own in levels.items()}
     chart = Chart(tuple(panels), "third octave in Hz", f"{NAME}_octaves")
     return Plot(f"{NAME}_octaves", "Accelerations of the housing", caption, chart, columns)
 
 
-def mounts(trace: Trace) -> Plot | None:
-    """Forces of the housing on the ground over time; None without mounts."""
+def mounts(trace: Trace) -> Plot:
+    """Forces of the housing on the ground over time."""
     names = [n for n in trace.channels if n.startswith(MOUNT) and n.split(".")[-1] in ("fx", "fy", "fz")]
-    feet = dict.fromkeys(name.split(".")[1] for name in names)
-    if not feet:
-        return None
-    groups = {foot: [name for name in names if name.startswith(f"{MOUNT}{foot}.")] for foot in feet}
-    panels = [Panel(f"{foot}: force in N", plots.channels(trace, own)) for foot, own in groups.items()]
+    panels = [Panel(f"{own[0].split('.')[1]}: force in N", plots.channels(trace, own)) for own in by_part(names)]
     caption = "Force of the housing on the ground, along the axes of the stage."
     return Plot(f"{NAME}_mounts", "Forces of the mounts", caption, over_time(panels), plots.columns(trace, names))
 
@@ -132,14 +129,12 @@ def transfer_paths(run: Run) -> Plot:
     alone, joint = found.octaves()
     band = float(nominal(found.bands[[joint.sum(axis=0).argmax()]])[0])
     shares = {"all third octaves": 100 * found.share(), f"third octave {band:g} Hz": 100 * found.share(band)}
-    caption = (
-        f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one below 0 "
+    caption = f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one "
+    caption += (
+        "below 0 makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
     )
-    caption += "makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
-    columns = {"third_octave_[Hz]": found.bands} | {
-        f"{name}_[{ACCELERATIONS.label}]": level(np.sqrt(own), ACCELERATIONS.reference)
-        for name, own in zip(found.names, alone, strict=True)
-    }
+    rows = zip(found.names, ACCELERATIONS.level(np.sqrt(alone)), strict=True)
+    columns = {"third_octave_[Hz]": found.bands} | {f"{name}_[{ACCELERATIONS.label}]": own for name, own in rows}
     panels = tuple(_by_bearing(f"{words}: share in %", found.names, own) for words, own in shares.items())
     chart = Chart(panels, "bearing", f"{NAME}_paths")
     return Plot(f"{NAME}_paths", f"Transfer paths to {found.sensor.removeprefix(SENSOR)}", caption, chart, columns)
