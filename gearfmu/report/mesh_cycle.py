@@ -13,7 +13,6 @@ from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, Window, drive_side
-from gearfmu.stage.assembly.meshes import EXTERNAL, kind_of
 from gearfmu.stage.run.flank_loads import FlankLoads
 from gearfmu.stage.run.te import mesh_harmonics
 from gearfmu.stage.run.touching import position_of
@@ -112,10 +111,8 @@ def contact_pattern(run: Run, mesh: str) -> Plot | None:
     rolls = np.linspace(pressed.min(), pressed.max(), ROLLS)
     z = np.linspace(-500, 500, WIDTHS) * loads.face_width
     load = over_width(1e-3 * loads.line_load(rolls), 1e3 * loads.width, z)
-    sense = 1 if kind_of(pair) == EXTERNAL else -1
-    other = sense * (pair.length - rolls) if sense > 0 else rolls + pair.length
     top, half, panels = float(load.max()), 500 * loads.face_width, []
-    for gear, geometry, own in zip(engagement.gears, pair.gears, (rolls, other), strict=True):
+    for gear, geometry, own in zip(engagement.gears, pair.gears, (rolls, pair.opposite(rolls)), strict=True):
         diameter = 2e3 * involute.radius_at_roll(np.maximum(own, 0.0), geometry.r_b)
         order = np.argsort(diameter)
         heat = Heat(z, diameter[order], load[order], 0.0, top, "N/mm", "steel")

@@ -23,7 +23,7 @@ from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
-from gearfmu.stage.assembly.meshes import direction_of, kind_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage
@@ -254,7 +254,7 @@ def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
         a, b = (stage.rotor_of(name) for name in mesh.gears)
         behind = np.mean(turned[b], axis=0) if b in turned else np.zeros(FRAMES)
         recede = sum(_recede(made[name], mesh.name, own) for name, own in zip(mesh.gears, pair.gears, strict=True))
-        ratio = kind_of(pair) * pair.gears[1].r_b / pair.gears[0].r_b
+        ratio = pair.side * pair.gears[1].r_b / pair.gears[0].r_b
         turned.setdefault(a, []).append(recede / pair.gears[0].r_b - ratio * behind)
     for name, body in made.items():
         if (own := turned.get(stage.rotor_of(name))) is not None:
