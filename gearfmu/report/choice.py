@@ -24,16 +24,21 @@ from gearfmu.stage.run.deformation import DeformationError
 Maker: TypeAlias = Callable[[], "Plot | None"]
 
 
-def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
-    """Every figure the run allows, and in words why others are not there."""
+def chosen_plots(run: Run) -> tuple[dict[str, list[Plot]], list[str]]:
+    """Every figure the run allows, by chapter ("time", "speed", "frequency", "housing"), and in words why others are
+    not there."""
     gears, gaps = deformed_gears(run)
-    made, missing = [], []
-    for maker in _figures(run, gears):
-        try:
-            if (plot := maker()) is not None and not plot.empty:
-                made.append(plot)
-        except MetricsError as error:
-            missing.append(str(error))
+    made: dict[str, list[Plot]] = {}
+    missing = []
+    makers = {"time": _over_time(run, gears), **_over_speed_or_frequency(run), "housing": housing.figures(run)}
+    for chapter, own in makers.items():
+        made[chapter] = []
+        for maker in own:
+            try:
+                if (plot := maker()) is not None and not plot.empty:
+                    made[chapter].append(plot)
+            except MetricsError as error:
+                missing.append(str(error))
     if not run.angles and run.planets is None:
         missing.append("No mesh orders: the trace has no gear speed or no tooth numbers.")
     return made, [*gaps, *run.statics[1], *dict.fromkeys(missing)]
@@ -65,21 +70,18 @@ def turning(run: Run) -> View | None:
     return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), run.detail(forces[0]), recorded)
 
 
-def _figures(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
-    """All figures: of a pair or train mesh by mesh, of a set its planets side by side. gears: to be drawn deformed."""
+def _over_time(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
+    """Of a pair or train mesh by mesh, of a set its planets side by side. gears: to be drawn deformed."""
     trace, own = run.trace, run.planets
     makers: list[Maker] = [partial(plots.torque_and_slip, trace)]
     makers.append(partial(plots.speeds, trace, own.rotors if own else ()))
-    over_frequency: list[Maker]
     if own is None:
-        for mesh in meshes(trace):
-            makers += [partial(plots.mesh_force_and_error, trace, mesh, part) for part in (None, run.detail(mesh))]
-        over_frequency = [partial(plots_nvh.spectra, run, force_channels(trace), FORCES)]
+        details = [(mesh, part) for mesh in meshes(trace) for part in (None, run.detail(mesh))]
+        makers += [partial(plots.mesh_force_and_error, trace, *detail) for detail in details]
     else:
         makers += [partial(planets.forces, trace, own, part) for part in (None, run.detail(""))]
         makers += [partial(make, run, own) for make in (planets.planets, planets.sharing)]
         makers.append(partial(plots.pin_forces, trace, own.planets))
-        over_frequency = [partial(plots_nvh.spectra_by_central, run, own)]
     makers += [partial(plots.bearing_forces, trace, own is not None), partial(plots.axial_and_tilting, trace)]
     if run.stage is not None:
         kinds = (mesh_cycle.transmission_error, mesh_cycle.contact_pattern)
@@ -87,9 +89,17 @@ def _figures(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
     if run.deformation is not None:
         of_gears = [partial(kind, run.deformation) for kind in (drawn.pictures, drawn.film)]
         makers += [partial(kind, gear, trace, run.stage) for gear in gears for kind in of_gears]
-    makers += [partial(plots.energy, trace)] if own else []
-    makers += over_frequency if run.run_up is None else [partial(make, run.run_up) for make in plots_runup.FIGURES]
-    if own is None:
-        makers += [partial(plots_nvh.order_cuts, run, mesh) for mesh in run.angles]
-        makers += [partial(plots_nvh.force_spectrogram, run)] if run.run_up is None else []
-    return makers + housing.figures(run)
+    return makers + ([partial(plots.energy, trace)] if own else [])
+
+
+def _over_speed_or_frequency(run: Run) -> dict[str, list[Maker]]:
+    """Orders over the speed of a run-up instead of spectra; in either case the orders of meshes along the run."""
+    cuts: list[Maker] = []
+    if run.planets is None:
+        cuts = [partial(plots_nvh.order_cuts, run, mesh) for mesh in run.angles]
+    if run.run_up is not None:
+        return {"speed": [partial(make, run.run_up) for make in plots_runup.FIGURES], "frequency": cuts}
+    if run.planets is not None:
+        return {"speed": [], "frequency": [partial(plots_nvh.spectra_by_central, run, run.planets)]}
+    spectra = partial(plots_nvh.spectra, run, force_channels(run.trace), FORCES)
+    return {"speed": [], "frequency": [spectra, *cuts, partial(plots_nvh.force_spectrogram, run)]}
