@@ -29,7 +29,6 @@ NAME = "housing"  # what the names of its figures begin with
 MOUNT = "mount."
 PATCHES = 300  # boundary elements where none are stored: seconds
 POWER = "dB re 1 pW"
-SHOWN_DB = 60
 
 
 def figures(run: Run) -> list[Callable[[], Plot | None]]:
@@ -102,8 +101,7 @@ def sound_over_speed(up: RunUp, run: Run) -> Plot:
     curves = tuple(Curve(speed, own, name, POWER) for name, own in levels.items())
     kept = (found.frequency > 0) & (found.frequency <= BANDS[1])
     lines = power_level(found.power[:, kept]).T
-    top = 5 * np.ceil(lines.max() / 5)
-    heat = heat_of(speed, found.frequency[kept] / 1e3, lines, (top - SHOWN_DB, top), f"{POWER} a line")
+    heat = heat_of(speed, found.frequency[kept] / 1e3, lines, lines.max(), f"{POWER} a line")
     panels = (
         Panel(POWER, curves, limits=level_limits(curves)),
         Panel("frequency in kHz", heat=heat, height=300, limits=(0.0, BANDS[1] / 1e3)),

@@ -40,8 +40,8 @@ HOUSING_TONE = 1.75
 class Drawn:
     """A gear in the view. points (P, 3) m, `teeth` equal sectors of them one after the other; quads (Q, 4) of the first
     sector and whether a point is the next sector's; angle, x, y (F,), z; contacts by mesh: (3, F, C) tooth, roll (m),
-    force (N, negative on flank 1); unit: displacement (2, R, P, 3) m/N under unit loads on the flanks 0 and 1 of tooth
-    0 at rolls (R,); frames (G, P, 3) m at `times` (G,) where the deformation was recorded."""
+    force (N, negative on flank 1); loads: rolls (R,) and displacement (2, R, P, 3) m/N under unit loads there on the
+    flanks 0 and 1 of tooth 0; recorded: times (G,) and frames (G, P, 3) m where the deformation was recorded."""
 
     name: str
     points: np.ndarray
@@ -51,10 +51,8 @@ class Drawn:
     angle: np.ndarray
     place: tuple[np.ndarray, np.ndarray, float]
     contacts: dict[str, np.ndarray] = field(default_factory=dict)
-    rolls: np.ndarray | None = None
-    unit: np.ndarray | None = None
-    times: np.ndarray | None = None
-    frames: np.ndarray | None = None
+    loads: tuple[np.ndarray, np.ndarray] | None = None
+    recorded: tuple[np.ndarray, np.ndarray] | None = None
     extra: np.ndarray | None = None  # (F,) rad: turn per unit of enlargement that keeps loaded flanks together
     tone: float = 0.0  # of a shaft, carrier or housing, drawn rigid: brightness; 0 of a gear
     inside: bool = False  # of a housing: only faces whose inner side is seen, so that it hides no gear
@@ -127,7 +125,8 @@ class _Course:
         place = x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about), float(own.bodies[name])
         points, surface = np.asarray(picture.points, float), np.asarray(picture.quads, int)
         angle = self._known(self.stage.rotor_of(name)) + phase
-        return Drawn(name, points, *_first_sector(len(points), surface, teeth), teeth, angle, place)
+        sector = _first_sector(len(points), surface, teeth)
+        return Drawn(name, points, *sector, teeth, angle, place, loads=_unit_loads(picture))
 
     def _known(self, rotor: str | None) -> np.ndarray:
         angle = self.angle(rotor)
@@ -149,7 +148,7 @@ def moving_view(
     made = {name: course.gear(name, bodies[name], phases[name]) for name in gears}
     for mesh in stage.engagements:
         if f"{mesh.name}.force" in trace and set(mesh.gears) <= set(made):
-            _load(course, mesh, [made[name] for name in mesh.gears], bodies)
+            _load(course, mesh, [made[name] for name in mesh.gears])
     for gear, times in recorded:
         if gear.name in made:
             _record(made[gear.name], gear, times, window)
@@ -194,7 +193,7 @@ def _first_sector(points: int, quads: np.ndarray, teeth: int) -> tuple[np.ndarra
     return first % size, (first // size == 1).astype(np.int8)
 
 
-def _load(course: _Course, mesh: EngagementSpec, gears: Sequence[Drawn], bodies: Mapping[str, Body]) -> None:
+def _load(course: _Course, mesh: EngagementSpec, gears: Sequence[Drawn]) -> None:
     """Add the tooth pairs in contact of an engagement to its two gears."""
     stage, trace, count = course.stage, course.trace, course.time.size
     pair, force = mesh_shape(stage, mesh), np.interp(course.time, trace.time, trace[f"{mesh.name}.force"])
@@ -208,10 +207,6 @@ def _load(course: _Course, mesh: EngagementSpec, gears: Sequence[Drawn], bodies:
                 own[:, i, c] = number, at, force[i] / len(contacts)
     for gear, own in zip(gears, found, strict=True):
         gear.contacts[mesh.name] = own
-        if gear.unit is None:
-            picture = bodies[gear.name].picture
-            assert picture is not None
-            gear.rolls, gear.unit = _unit_loads(picture)
 
 
 def _unit_loads(display: Picture) -> tuple[np.ndarray, np.ndarray]:
@@ -239,8 +234,8 @@ def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[fl
     points, quads = gear.surface
     body.points, body.teeth = points @ back, gear.body.toothed.teeth
     body.quads, body.ahead = _first_sector(len(points), quads, body.teeth)
-    body.times, body.frames = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
-    body.contacts, body.unit, body.rolls = {}, None, None
+    body.recorded = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
+    body.contacts, body.loads = {}, None
 
 
 def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
@@ -263,13 +258,13 @@ def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
 
 def _recede(body: Drawn, mesh: str, geometry: ReferenceGear) -> np.ndarray:
     """(F,) m, signed as the force: how far the loaded flanks of a gear yield at their contacts, mean over them."""
-    if body.unit is None or body.rolls is None or mesh not in body.contacts:
+    if body.loads is None or mesh not in body.contacts:
         return np.zeros(FRAMES)
-    known = zip(body.unit[0], body.rolls, strict=True)
-    yields = np.array([_yield(body.points, unit, geometry, roll) for unit, roll in known])
+    rolls, (first, _) = body.loads
+    yields = np.array([_yield(body.points, unit, geometry, roll) for unit, roll in zip(first, rolls, strict=True)])
     _, roll, force = body.contacts[mesh]
     count = np.maximum((force != 0).sum(axis=1), 1)
-    return np.asarray((force * np.interp(roll, body.rolls, yields)).sum(axis=1) / count)
+    return np.asarray((force * np.interp(roll, rolls, yields)).sum(axis=1) / count)
 
 
 def _yield(points: np.ndarray, unit: np.ndarray, geometry: ReferenceGear, roll: float) -> float:
@@ -282,11 +277,12 @@ def _yield(points: np.ndarray, unit: np.ndarray, geometry: ReferenceGear, roll: 
 
 def _largest(body: Drawn) -> float:
     """Largest displacement (m) at any frame."""
-    if body.frames is not None:
-        return float(np.linalg.norm(body.frames, axis=2).max())
-    if body.unit is None or body.rolls is None:
+    if body.recorded is not None:
+        return float(np.linalg.norm(body.recorded[1], axis=2).max())
+    if body.loads is None:
         return 0.0
-    size, rolls = np.linalg.norm(body.unit, axis=3).max(axis=(0, 2)), body.rolls
+    rolls, unit = body.loads
+    size = np.linalg.norm(unit, axis=3).max(axis=(0, 2))
     found = (float(np.abs(np.interp(roll, rolls, size) * f).max()) for _, roll, f in body.contacts.values())
     return max(found, default=0.0)
 
@@ -314,14 +310,16 @@ def _numbers(body: Drawn, pack: Pack) -> dict[str, Any]:
     }  # fmt: skip
     if body.extra is not None:
         found["extra"] = pack.add(body.extra)
-    if body.frames is not None and body.times is not None:
-        scale = float(np.abs(body.frames).max()) / STEPS or 1.0
-        frames = np.rint(body.frames / scale).astype(np.int8)
-        found |= {"times": pack.add(body.times), "frames": pack.add_raw(frames.ravel()), "step": scale}
-    elif body.unit is not None and body.rolls is not None:
-        scale = float(np.abs(body.unit).max()) / STEPS
-        unit = np.rint(body.unit / scale).astype(np.int8)
-        found |= {"rolls": pack.add(body.rolls), "unit": pack.add_raw(unit.ravel()), "step": scale}
+    if body.recorded is not None:
+        times, frames = body.recorded
+        scale = float(np.abs(frames).max()) / STEPS or 1.0
+        steps = np.rint(frames / scale).astype(np.int8)
+        found |= {"times": pack.add(times), "frames": pack.add_raw(steps.ravel()), "step": scale}
+    elif body.loads is not None and body.contacts:
+        rolls, unit = body.loads
+        scale = float(np.abs(unit).max()) / STEPS
+        steps = np.rint(unit / scale).astype(np.int8)
+        found |= {"rolls": pack.add(rolls), "unit": pack.add_raw(steps.ravel()), "step": scale}
         found["contacts"] = [
             {
                 "tooth": pack.add_raw(tooth.astype(np.int32).ravel()), "most": CONTACTS,

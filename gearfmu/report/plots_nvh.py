@@ -15,7 +15,7 @@ from gearfmu.report.run import Run
 from gearfmu.report.signals import GEAR_SPEED, PlanetSet, bearings, mesh_speed, meshes, on_mounts, recorded, steady
 from gearfmu.stage.run.trace import Trace
 
-RANGE_DB = 90
+RANGE_DB, SHOWN_DB = 90, 60  # of maps over time, over speed
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 LOOKS = ("dashed", "dotted")  # of the orders of one mesh and the next
@@ -158,9 +158,9 @@ def force_spectrogram(run: Run) -> Plot | None:
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
     values, limit = metrics.level(picture_data.amplitude), _top(trace)
-    top, time = float(np.ceil(values.max() / 5) * 5), picture_data.time + trace.time[0]
-    shown_to = picture_data.frequency <= limit
-    heat = heat_of(time, picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T, (top - RANGE_DB, top))
+    time, shown_to = picture_data.time + trace.time[0], picture_data.frequency <= limit
+    kept = picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T
+    heat = heat_of(time, *kept, values.max(), span=RANGE_DB)
     looks = {mesh: LOOKS[k % len(LOOKS)] for k, mesh in enumerate(run.angles)}
     rays = [curve for mesh, look in looks.items() for curve in _order_curves(run, mesh, look, limit)]
     limits = (float(time[0]), float(time[-1]))
@@ -209,13 +209,14 @@ def sampling_warning(trace: Trace) -> str | None:
 
 
 def heat_of(
-    x: np.ndarray, y: np.ndarray, levels: np.ndarray, limits: tuple[float, float], unit: str = "dB re 1 N"
+    x: np.ndarray, y: np.ndarray, levels: np.ndarray, top: float, unit: str = "dB re 1 N", span: float = SHOWN_DB
 ) -> Heat:
-    """A map of levels (Y, X) dB over ascending or descending x (X,) and y (Y,): of neighbours beyond MOST_COLUMNS and
-    MOST_ROWS the largest, so that no line is lost."""
+    """A map of levels (Y, X) dB over ascending or descending x (X,) and y (Y,), shown from `top`, rounded up to 5 dB,
+    `span` down: of neighbours beyond MOST_COLUMNS and MOST_ROWS the largest, so that no line is lost."""
+    top = float(np.ceil(top / 5) * 5)
     levels, x = _largest_of(levels.T, x, MOST_COLUMNS)
     levels, y = _largest_of(levels.T, y, MOST_ROWS)
-    return Heat(x, y, levels, *limits, unit)
+    return Heat(x, y, levels, top - span, top, unit)
 
 
 def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
