@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from PIL import Image
 
+from gearfmu.geometry.plane import direction
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
 from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, embedded, png, round_scale, styled
@@ -35,14 +36,15 @@ MICRO = 1e6
 
 @dataclass(frozen=True)
 class _Face:
-    """What is seen of a gear along its axis: quadrilaterals (Q, 4) that face the eye, and whether a carrier's turning
-    neighbours are marked: (N, F) angles and the distance (m) and radius (m) of their centres."""
+    """What is seen of a gear along its axis: quadrilaterals (Q, 4) that face the eye, and marks of a carrier's turning
+    neighbours: centres (N, F, 2) and radius, m."""
 
     gear: DeformedGear
     quads: np.ndarray
     scale: float
     norm: Normalize
-    neighbours: tuple[np.ndarray, float, float] | None
+    neighbours: np.ndarray
+    radius: float
 
 
 def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
@@ -111,24 +113,24 @@ def _face(
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     facing = quads[normal[:, 2] > 1e-3 * np.linalg.norm(normal, axis=1)]
     scale, norm = round_scale(SHOWN * diameter / most), Normalize(0, MICRO * most)
-    return _Face(gear, facing, scale, norm, _neighbours(deformation.time, gear.name, *run)), moved
+    return _Face(gear, facing, scale, norm, *_neighbours(deformation.time, gear.name, *run)), moved
 
 
-def _neighbours(
-    time: np.ndarray, gear: str, trace: Trace, stage: Stage | None
-) -> tuple[np.ndarray, float, float] | None:
-    """Angles (planets, F) of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's."""
+def _neighbours(time: np.ndarray, gear: str, trace: Trace, stage: Stage | None) -> tuple[np.ndarray, float]:
+    """Centres (N, F, 2) m of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's
+    angle, and the radius (m) of their tips; of other gears none."""
+    none = np.zeros((0, time.size, 2)), 0.0
     if stage is None or not stage.rotors[stage.rotor_of(gear)].stands:
-        return None
+        return none
     meshes = [mesh for mesh in stage.engagements if mesh.gears[1] == gear]
     carrier = stage.rotors[stage.rotor_of(gear)].carried_by
     if not meshes or carrier is None or carrier + GEAR_PHI not in trace:
-        return None
+        return none
     turned = np.interp(time, trace.time, trace[carrier + GEAR_PHI])
     centres = np.array([mesh_axes(stage, mesh)[0] for mesh in meshes])
     planet = next(body for body in stage.gears if body.name == meshes[0].gears[0])
     angles = np.arctan2(centres[:, 1], centres[:, 0])[:, None] + turned
-    return angles, float(np.hypot(*centres[0])), float(planet.tip_diameter) / 2
+    return float(np.hypot(*centres[0])) * direction(angles), float(planet.tip_diameter) / 2
 
 
 def _draw(axis: Axes, face: _Face, frame: int, moved: np.ndarray) -> None:
@@ -142,10 +144,8 @@ def _draw(axis: Axes, face: _Face, frame: int, moved: np.ndarray) -> None:
         PolyCollection(list(drawn[face.quads[depth]]), facecolors=colours[depth], edgecolors=colours[depth], lw=0.25)
     )
     axis.add_patch(Circle((0, 0), edge, fill=False, ec=MUTED, lw=0.7, ls=(0, (4, 3))))
-    for angle in face.neighbours[0][:, frame] if face.neighbours is not None else ():
-        _, distance, radius = face.neighbours  # type: ignore[misc]
-        centre = (distance * math.cos(angle), distance * math.sin(angle))
-        axis.add_patch(Circle(centre, radius, fill=False, ec=MUTED, lw=0.8))
+    for centre in face.neighbours[:, frame]:
+        axis.add_patch(Circle(tuple(centre), face.radius, fill=False, ec=MUTED, lw=0.8))
         axis.plot(*centre, ".", color=MUTED, ms=3)
     most = edge * (1 + 2.4 * SHOWN)
     axis.set(xlim=(-most, most), ylim=(-most, most), aspect="equal")
@@ -161,7 +161,7 @@ def _bar(figure: Figure, axes: list[Axes], face: _Face, shrink: float) -> None:
 def _caption(face: _Face, moved: Sequence[np.ndarray]) -> str:
     largest = ", ".join(f"{MICRO * np.linalg.norm(u, axis=1).max():.3g}" for u in moved)
     marks = ""
-    if face.neighbours is not None:
+    if len(face.neighbours):
         marks = " Thin circles: tip circles of the planets. What holds the ring is spread evenly round its rim."
     return (
         f"Seen along the axis, elastic displacement enlarged {face.scale:g} times, coloured by its magnitude; largest: "
