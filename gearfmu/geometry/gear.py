@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +42,7 @@ class ReferenceGear:
     alpha: float
     x: float
     beta: float = field(default=0.0, kw_only=True)
+    solid: ClassVar[int] = 1  # -1 of a ring, whose flanks bound a space
 
     @property
     def m_t(self) -> float:
@@ -95,6 +97,10 @@ class ReferenceGear:
     def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
         """Points (..., 2) in m of the flank of tooth 0, in a ring of space 0."""
         return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Unit normals (..., 2) out of the material in the transverse section, of a ring into space 0."""
+        return self.solid * involute.flank_normal(roll, self.r_b, self.psi_b, sg)
 
     def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
         """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
@@ -236,10 +242,6 @@ class GearGeometry(ReferenceGear):
         roll = self.s_tip - self.tip_edge
         return self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b)
 
-    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Unit normals (..., 2) out of tooth 0 in the transverse section."""
-        return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
 
 @lru_cache(maxsize=64)
 def _crossing(gear: GearGeometry) -> float:
@@ -280,6 +282,7 @@ class InternalGearGeometry(ReferenceGear):
     r_rim: float
     tip_edge: float
     fillet: float
+    solid = -1
 
     @property
     def s_a(self) -> float:
@@ -314,29 +317,24 @@ class InternalGearGeometry(ReferenceGear):
         roll = self.s_tip + self.tip_edge
         return self.half_pitch - (self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
 
-    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Unit normals (..., 2) out of the ring's material, into space 0."""
-        return -involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
     def fillet_point(self, share: ArrayLike) -> np.ndarray:
         """Points (..., 2) in m of the fillet of flank sg = +1 at shares 0 (form point) … 1 (root circle) of its arc."""
         radius, angle = self.fillet_centre
         centre = radius * np.array([math.cos(angle), math.sin(angle)])
-        start = -self.flank_normal(self.s_form)
-        begin, turn = math.atan2(start[1], start[0]), self._fillet_turn
-        towards = begin + np.asarray(share, float) * turn
+        towards = self._fillet_begin + np.asarray(share, float) * (angle - self._fillet_begin)
         return centre + self.fillet * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
 
     @property
-    def _fillet_turn(self) -> float:
-        """Angle (rad, negative) of the fillet's arc from the flank's normal to the radial direction."""
-        start = -self.flank_normal(self.s_form)
-        return self.fillet_centre[1] - math.atan2(start[1], start[0])
+    def _fillet_begin(self) -> float:
+        """Direction (rad) from the fillet's centre to its form point: against the flank's normal out of the ring. The
+        arc turns from there to the radial direction."""
+        x, y = -self.flank_normal(self.s_form)
+        return math.atan2(y, x)
 
     @property
     def fillet_length(self) -> float:
         """Length of one fillet, m."""
-        return abs(self._fillet_turn) * self.fillet
+        return abs(self.fillet_centre[1] - self._fillet_begin) * self.fillet
 
 
 def _signed_root(radius: float, r_b: float) -> float:

@@ -96,6 +96,15 @@ class GearMesh:
         return self.gears[0].overlap_ratio(face_width)
 
     @property
+    def nominal_backlash(self) -> float:
+        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give: space
+        of gear 1 less tooth of gear 0."""
+        inv_w = float(involute.inv(self.alpha_wt))
+        tooth, facing = (gear.z * (gear.psi_b - inv_w) for gear in self.gears)
+        space = math.pi - facing if self.side > 0 else facing
+        return 2 * self.a / (self.gears[1].z + self.side * self.gears[0].z) * (space - tooth)
+
+    @property
     def normal_backlash(self) -> float:
         """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
         return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
@@ -129,13 +138,6 @@ class PairGeometry(GearMesh):
         return self.gears[gear].s_tip - self.base_pitch
 
     @property
-    def nominal_backlash(self) -> float:
-        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
-        inv_w = float(involute.inv(self.alpha_wt))
-        thickness = [2 * r_w * (gear.psi_b - inv_w) for r_w, gear in zip(self.r_w, self.gears, strict=True)]
-        return 2 * math.pi * self.r_w[0] / self.gears[0].z - sum(thickness)
-
-    @property
     def wheel_phase(self) -> float:
         """Angle (rad) of the wheel's frame at which the nominal drive flanks touch while the pinion's tooth 0 is on +x.
 
@@ -144,15 +146,6 @@ class PairGeometry(GearMesh):
         ratio = self.gears[0].r_b / self.gears[1].r_b
         inv_w = float(involute.inv(self.alpha_wt))
         return math.pi - self.gears[1].psi_b + inv_w * (1 + ratio) - self.gears[0].psi_b * ratio
-
-    @property
-    def zero_backlash_center_distance(self) -> float:
-        """Centre distance (m) at which the nominal teeth would have no backlash."""
-        first, second = self.gears
-        inv_w = float(involute.inv(first.alpha_t)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (
-            first.z + second.z
-        )
-        return (first.r_b + second.r_b) / math.cos(involute.inverse_inv(max(inv_w, 0.0)))
 
 
 def mount_spaces(teeth: int, points: int) -> list[int]:
@@ -228,13 +221,6 @@ class RingMesh(GearMesh):
         inv_w = float(involute.inv(self.alpha_wt))
         ratio = self.planet.z / self.ring.z
         return ratio * (planet_turn - inv_w) - (ring_turn - inv_w)
-
-    @property
-    def nominal_backlash(self) -> float:
-        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
-        inv_w = float(involute.inv(self.alpha_wt))
-        pitch = self.a / (self.ring.z - self.planet.z)
-        return 2 * pitch * (self.ring.z * (self.ring.psi_b - inv_w) - self.planet.z * (self.planet.psi_b - inv_w))
 
 
 @dataclass(frozen=True)
