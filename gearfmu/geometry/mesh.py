@@ -96,15 +96,6 @@ class GearMesh:
         return self.gears[0].overlap_ratio(face_width)
 
     @property
-    def nominal_backlash(self) -> float:
-        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give: space
-        of gear 1 less tooth of gear 0."""
-        inv_w = float(involute.inv(self.alpha_wt))
-        tooth, facing = (gear.z * (gear.psi_b - inv_w) for gear in self.gears)
-        space = math.pi - facing if self.side > 0 else facing
-        return 2 * self.a / (self.gears[1].z + self.side * self.gears[0].z) * (space - tooth)
-
-    @property
     def normal_backlash(self) -> float:
         """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
         return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
@@ -136,6 +127,13 @@ class PairGeometry(GearMesh):
     def inner_single_contact(self, gear: int) -> float:
         """Roll (m) on `gear` (0 or 1) of its inner point of single contact."""
         return self.gears[gear].s_tip - self.base_pitch
+
+    @property
+    def nominal_backlash(self) -> float:
+        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
+        inv_w = float(involute.inv(self.alpha_wt))
+        thickness = [2 * r_w * (gear.psi_b - inv_w) for r_w, gear in zip(self.r_w, self.gears, strict=True)]
+        return 2 * math.pi * self.r_w[0] / self.gears[0].z - sum(thickness)
 
     @property
     def wheel_phase(self) -> float:
@@ -221,6 +219,13 @@ class RingMesh(GearMesh):
         inv_w = float(involute.inv(self.alpha_wt))
         ratio = self.planet.z / self.ring.z
         return ratio * (planet_turn - inv_w) - (ring_turn - inv_w)
+
+    @property
+    def nominal_backlash(self) -> float:
+        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
+        inv_w = float(involute.inv(self.alpha_wt))
+        pitch = self.a / (self.ring.z - self.planet.z)
+        return 2 * pitch * (self.ring.z * (self.ring.psi_b - inv_w) - self.planet.z * (self.planet.psi_b - inv_w))
 
 
 @dataclass(frozen=True)
