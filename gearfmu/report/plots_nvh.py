@@ -55,10 +55,8 @@ def spectra_by_central(run: Run, own: PlanetSet) -> Plot:
         else "Mesh orders are not marked: the speed is not steady."
     )
     data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in found.items()}
-    panels = [
-        _levels({name: found[name] for name in group}, _top(part), marks, FORCES, of) for of, group in groups.items()
-    ]
-    return Plot("spectrum", FORCES.spectra, caption, _over_frequency(panels, _top(part)), data)
+    parts = [(of, {name: found[name] for name in group}) for of, group in groups.items()]
+    return Plot("spectrum", FORCES.spectra, caption, _over_frequency(parts, _top(part), marks, FORCES), data)
 
 
 def _side_marks(mesh_frequency: float, passing: float, top: float) -> list[Mark]:
@@ -78,7 +76,7 @@ def spectra(run: Run, names: Sequence[str], kind: Kind) -> Plot | None:
     own = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
     found = {mesh: _order_marks(run, mesh, _top(part)) for mesh in run.angles}
     marked, marks = [mesh for mesh in found if found[mesh]], [mark for own in found.values() for mark in own]
-    panels = [_levels({name: own[name] for name in group}, _top(part), marks, kind) for group in by_part(names)]
+    groups = [("", {name: own[name] for name in group}) for group in by_part(names)]
     first = next(iter(own.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
@@ -94,7 +92,7 @@ def spectra(run: Run, names: Sequence[str], kind: Kind) -> Plot | None:
     for name, spectrum in own.items():
         data[f"{name}_rms_[{kind.unit}]"] = spectrum.amplitude
         data[f"{name}_[{kind.label}]"] = kind.level(spectrum.amplitude)
-    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, _over_frequency(panels, _top(part)), data)
+    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, _over_frequency(groups, _top(part), marks, kind), data)
 
 
 def order_cuts(run: Run, mesh: str) -> Plot | None:
@@ -228,21 +226,19 @@ def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarr
     return np.fmax.reduceat(levels, starts, axis=0), np.add.reduceat(at, starts) / counts
 
 
-def _levels(
-    spectra: Mapping[str, metrics.Spectrum], top: float, marks: Sequence[Mark], kind: Kind, of: str = ""
-) -> Panel:
-    """A panel of levels over frequency (kHz) up to `top` (Hz)."""
-    curves = tuple(spectrum_curve(name, own, top, kind) for name, own in spectra.items())
-    return Panel(f"{of}level in {kind.label}", curves, marks=tuple(marks), limits=level_limits(curves))
-
-
 def _top(part: Trace) -> float:
     """The highest frequency that is shown, Hz."""
     return min(SHOWN_TO, 0.5 / metrics.sample_step(part.time))
 
 
-def _over_frequency(panels: Sequence[Panel], top: float) -> Chart:
-    """Panels of `_levels` below one another."""
+def _over_frequency(
+    groups: Sequence[tuple[str, Mapping[str, metrics.Spectrum]]], top: float, marks: Sequence[Mark], kind: Kind
+) -> Chart:
+    """Levels over frequency (kHz) up to `top` (Hz), one panel for each group: what it is of, spectra by channel."""
+    panels = []
+    for of, found in groups:
+        curves = tuple(spectrum_curve(name, own, top, kind) for name, own in found.items())
+        panels.append(Panel(f"{of}level in {kind.label}", curves, marks=tuple(marks), limits=level_limits(curves)))
     return Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
 
 
