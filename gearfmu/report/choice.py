@@ -87,8 +87,8 @@ def _over_time(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
         kinds = (mesh_cycle.transmission_error, mesh_cycle.contact_pattern)
         makers += [partial(kind, run, mesh) for kind in kinds for mesh in run.shown_meshes]
     if run.deformation is not None:
-        of_gears = [partial(kind, run.deformation) for kind in (drawn.pictures, drawn.film)]
-        makers += [partial(kind, gear, trace, run.stage) for gear in gears for kind in of_gears]
+        views = [partial(view, run, run.deformation) for view in (drawn.pictures, drawn.film)]
+        makers += [partial(view, gear) for gear in gears for view in views]
     return makers + ([partial(plots.energy, trace)] if own else [])
 
 

@@ -21,12 +21,11 @@ from PIL import Image
 from gearfmu.geometry.plane import direction
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
+from gearfmu.report.run import Run
 from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, embedded, png, round_scale, styled
 from gearfmu.stage.assembly.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.touching import GEAR_PHI
-from gearfmu.stage.run.trace import Trace
-from gearfmu.stagefile.forms.general import Stage
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn
 IN_A_ROW = 3
@@ -47,12 +46,12 @@ class _Face:
     radius: float
 
 
-def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
-    """The gear at the times of the pictures, side by side; None without one. stage: for the marks of planets."""
+def pictures(run: Run, deformation: Deformation, gear: DeformedGear) -> Plot | None:
+    """The gear at the times of the pictures, side by side; None without one."""
     chosen = list(deformation.pictures)
     if not chosen:
         return None
-    face, moved = _face(deformation, gear, chosen, (trace, stage))
+    face, moved = _face(run, deformation.time, gear, chosen)
     rows = math.ceil(len(chosen) / IN_A_ROW)
     with styled():
         width = WIDTH / min(len(chosen), IN_A_ROW)
@@ -69,12 +68,12 @@ def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: 
     return Plot(f"deformation_{gear.name}", title, _caption(face, moved), image, _columns(deformation, gear, chosen))
 
 
-def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
+def film(run: Run, deformation: Deformation, gear: DeformedGear) -> Plot | None:
     """The frames of the film as one animated PNG; None with fewer than two."""
     chosen = list(deformation.film)
     if len(chosen) < 2:
         return None
-    face, moved = _face(deformation, gear, chosen, (trace, stage))
+    face, moved = _face(run, deformation.time, gear, chosen)
     with styled():
         figure = Figure(figsize=(6.4, 7.1), layout="constrained", dpi=FILM_DPI)
         canvas, axis = FigureCanvasAgg(figure), figure.subplots()
@@ -101,9 +100,7 @@ def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stag
     return Plot(f"deformation_{gear.name}_film", title, caption, _animated(images), columns)
 
 
-def _face(
-    deformation: Deformation, gear: DeformedGear, frames: Sequence[int], run: tuple[Trace, Stage | None]
-) -> tuple[_Face, list[np.ndarray]]:
+def _face(run: Run, time: np.ndarray, gear: DeformedGear, frames: Sequence[int]) -> tuple[_Face, list[np.ndarray]]:
     """What the frames have in common, and their elastic displacements."""
     points, quads = gear.surface
     moved = [gear.elastic(frame) for frame in frames]
@@ -113,13 +110,13 @@ def _face(
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     facing = quads[normal[:, 2] > 1e-3 * np.linalg.norm(normal, axis=1)]
     scale, norm = round_scale(SHOWN * diameter / most), Normalize(0, MICRO * most)
-    return _Face(gear, facing, scale, norm, *_neighbours(deformation.time, gear.name, *run)), moved
+    return _Face(gear, facing, scale, norm, *_neighbours(run, time, gear.name)), moved
 
 
-def _neighbours(time: np.ndarray, gear: str, trace: Trace, stage: Stage | None) -> tuple[np.ndarray, float]:
+def _neighbours(run: Run, time: np.ndarray, gear: str) -> tuple[np.ndarray, float]:
     """Centres (N, F, 2) m of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's
     angle, and the radius (m) of their tips; of other gears none."""
-    none = np.zeros((0, time.size, 2)), 0.0
+    trace, stage, none = run.trace, run.stage, (np.zeros((0, time.size, 2)), 0.0)
     if stage is None or not stage.rotors[stage.rotor_of(gear)].stands:
         return none
     meshes = [mesh for mesh in stage.engagements if mesh.gears[1] == gear]

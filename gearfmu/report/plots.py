@@ -41,15 +41,13 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     return Plot("torque", title, caption, over_time(panels), columns(trace, clutch + others + slips))
 
 
-def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot | None:
-    """Speeds in rpm; None when nothing turns. groups: names of rotors that share a panel, with their signs; without
+def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot:
+    """Speeds in rpm of what turns. groups: names of rotors that share a panel, with their signs; without
     groups everything that turns, each once, by magnitude."""
     turning = [n for n in trace.channels if n.endswith(".w") and trace.channels[n].unit == "rad/s"]
     of_groups = [[n for rotor in own if (n := f"{rotor}{GEAR_SPEED}") in trace and np.any(trace[n])] for own in groups]
-    rows = [row for row in of_groups if row] if groups else [distinct(trace, turning)]
+    rows = [row for row in of_groups or [distinct(trace, turning)] if row]
     names = [name for row in rows for name in row]
-    if not names:
-        return None
     panels = []
     for row in rows:
         curves = (Curve(trace.time, (trace[n] if groups else np.abs(trace[n])) * RPM, n, "rpm") for n in row)
