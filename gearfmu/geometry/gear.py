@@ -165,10 +165,9 @@ _CLOSE = 3e-4  # of the base radius
 class GearGeometry(ReferenceGear):
     """An external gear in its body frame: tooth 0 centred on +x at z = 0 (ISO 21771 symbols; lengths m, angles rad).
 
-    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient, helix angle. r_b, r,
-    r_a: base, reference and tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the
-    transverse section. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those
-    of the transverse section at mid-width.
+    r_a: tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the transverse section. h_fp,
+    rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those of the transverse section
+    at mid-width.
     """
 
     r_a: float
@@ -271,10 +270,10 @@ def _crossing(gear: GearGeometry) -> float:
 class InternalGearGeometry(ReferenceGear):
     """An internal gear in its body frame: tooth space 0 centred on +x at z = 0 (lengths m, angles rad).
 
-    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient (positive outwards),
-    helix angle. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of the tip edge
-    rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping cutter with that
-    tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the transverse section.
+    x is positive outwards. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of
+    the tip edge rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping
+    cutter with that tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the
+    transverse section.
     """
 
     r_a: float
