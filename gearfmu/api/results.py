@@ -137,7 +137,7 @@ def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike],
 
     Raises GearfmuError for fewer than two.
     """
-    from gearfmu.report.compare import Compared, write_comparison
+    from gearfmu.report.compare import write_comparison
 
     named = list(traces.items()) if isinstance(traces, Mapping) else [("", trace) for trace in traces]
     if len(named) < 2:
@@ -145,7 +145,7 @@ def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike],
     runs = [_run(trace) for _, trace in named]
     given = [name for name, _ in named]
     labels = given if all(given) else _labels(runs, [trace for _, trace in named])
-    return write_comparison([Compared(*own) for own in zip(labels, runs, strict=True)], Path(path))
+    return write_comparison(dict(zip(labels, runs, strict=True)), Path(path))
 
 
 def _run(source: Trace | PathLike) -> Run:

@@ -53,40 +53,44 @@ class Identity:
     nominals: Mapping[str, float] = field(default_factory=dict)
 
 
-def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
-    """The XML document (UTF-8) for these variables, in their order; raises FmuError for a unit without definition."""
-    root = ET.Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": "2.0",
-            "modelName": identity.name,
-            "guid": identity.guid,
-            "description": identity.description,
-            "version": identity.version,
-            **identity.rights,
-            "generationTool": f"gearfmu {identity.version}",
-            "variableNamingConvention": "structured",
-            "numberOfEventIndicators": "0",
-        },
-    )
-    simulation = ET.SubElement(root, "CoSimulation", _capabilities(identity))
-    if identity.sources:
-        listed = ET.SubElement(simulation, "SourceFiles")
-        for name in identity.sources:
-            ET.SubElement(listed, "File", {"name": name})
-    _add_units(root, variables)
-    _add_enumerations(root, variables)
-    categories = ET.SubElement(root, "LogCategories")
-    for name, text in LOG_CATEGORIES.items():
-        ET.SubElement(categories, "Category", {"name": name, "description": text})
-    experiment = {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)}
-    ET.SubElement(root, "DefaultExperiment", experiment)
-    listed = ET.SubElement(root, "ModelVariables")
-    for variable in variables:
-        _add_variable(listed, variable, identity.nominals)
-    _add_structure(root, variables)
+def element(tag: str, /, *children: ET.Element, **attributes: str) -> ET.Element:
+    """An element of an XML document around others."""
+    node = ET.Element(tag, attributes)
+    node.extend(children)
+    return node
+
+
+def document(root: ET.Element) -> bytes:
+    """The indented document (UTF-8)."""
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
+    """The XML document (UTF-8) for these variables, in their order; raises FmuError for a unit without definition."""
+    sources = [element("SourceFiles", *(element("File", name=name) for name in identity.sources))]
+    categories = (element("Category", name=name, description=text) for name, text in LOG_CATEGORIES.items())
+    experiment = {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)}
+    root = element(
+        "fmiModelDescription",
+        element("CoSimulation", *(sources if identity.sources else []), **_capabilities(identity)),
+        element("UnitDefinitions", *map(_unit, sorted({unit for v in variables if (unit := unit_of(v))}))),
+        *_type_definitions(variables),
+        element("LogCategories", *categories),
+        element("DefaultExperiment", **experiment),
+        element("ModelVariables", *(_variable(variable, identity.nominals) for variable in variables)),
+        _structure(variables),
+        fmiVersion="2.0",
+        modelName=identity.name,
+        guid=identity.guid,
+        description=identity.description,
+        version=identity.version,
+        **identity.rights,
+        generationTool=f"gearfmu {identity.version}",
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
+    return document(root)
 
 
 def enumeration_type(variable: Variable) -> str:
@@ -114,28 +118,22 @@ def _capabilities(identity: Identity) -> dict[str, str]:
     }
 
 
-def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted({unit for v in variables if (unit := unit_of(v))}):
-        node = ET.SubElement(definitions, "Unit", {"name": unit})
-        ET.SubElement(node, "BaseUnit", {base: str(power) for base, power in base_exponents(unit).items()})
-        for name, factor in DISPLAY.get(unit, ()):
-            ET.SubElement(node, "DisplayUnit", {"name": name, "factor": repr(factor)})
+def _unit(unit: str) -> ET.Element:
+    base = {base: str(power) for base, power in base_exponents(unit).items()}
+    shown = (element("DisplayUnit", name=name, factor=repr(factor)) for name, factor in DISPLAY.get(unit, ()))
+    return element("Unit", element("BaseUnit", **base), *shown, name=unit)
 
 
-def _add_enumerations(root: ET.Element, variables: Sequence[Variable]) -> None:
-    enumerations = [v for v in variables if v.type == "Enumeration"]
-    if not enumerations:
-        return
-    definitions = ET.SubElement(root, "TypeDefinitions")
-    for variable in enumerations:
-        simple = ET.SubElement(definitions, "SimpleType", {"name": enumeration_type(variable)})
-        node = ET.SubElement(simple, "Enumeration")
-        for value, item in enumerate(variable.items):
-            ET.SubElement(node, "Item", {"name": item, "value": str(value)})
+def _type_definitions(variables: Sequence[Variable]) -> list[ET.Element]:
+    """One element with the enumerations; none without any."""
+    found = []
+    for variable in (v for v in variables if v.type == "Enumeration"):
+        items = (element("Item", name=item, value=str(value)) for value, item in enumerate(variable.items))
+        found.append(element("SimpleType", element("Enumeration", *items), name=enumeration_type(variable)))
+    return [element("TypeDefinitions", *found)] if found else []
 
 
-def _add_variable(listed: ET.Element, variable: Variable, nominals: Mapping[str, float]) -> None:
+def _variable(variable: Variable, nominals: Mapping[str, float]) -> ET.Element:
     output = variable.causality == "output"
     attributes = {
         "name": variable.name,
@@ -146,7 +144,6 @@ def _add_variable(listed: ET.Element, variable: Variable, nominals: Mapping[str,
     }
     if variable.causality != "input":
         attributes["initial"] = "calculated" if output else "exact"
-    node = ET.SubElement(listed, "ScalarVariable", attributes)
     detail = {"declaredType": enumeration_type(variable)} if variable.type == "Enumeration" else {}
     if unit := unit_of(variable):
         detail["unit"] = unit
@@ -158,7 +155,7 @@ def _add_variable(listed: ET.Element, variable: Variable, nominals: Mapping[str,
         detail.update(min=value_text(variable, variable.minimum), max=value_text(variable, variable.maximum))
     if not output:
         detail["start"] = value_text(variable, variable.start)
-    ET.SubElement(node, variable.type, detail)
+    return element("ScalarVariable", element(variable.type, **detail), **attributes)
 
 
 def _variability(variable: Variable) -> str:
@@ -174,15 +171,12 @@ def value_text(variable: Variable, value: float) -> str:
     return repr(float(value)) if variable.type == "Real" else str(int(value))
 
 
-def _add_structure(root: ET.Element, variables: Sequence[Variable]) -> None:
+def _structure(variables: Sequence[Variable]) -> ET.Element:
     """Outputs follow the inputs only through a step: no direct dependencies. Initial outputs depend on everything."""
-    structure = ET.SubElement(root, "ModelStructure")
     indices = [str(k) for k, v in enumerate(variables, start=1) if v.causality == "output"]
-    outputs = ET.SubElement(structure, "Outputs")
-    initial = ET.SubElement(structure, "InitialUnknowns")
-    for index in indices:
-        ET.SubElement(outputs, "Unknown", {"index": index, "dependencies": ""})
-        ET.SubElement(initial, "Unknown", {"index": index})
+    outputs = (element("Unknown", index=index, dependencies="") for index in indices)
+    initial = (element("Unknown", index=index) for index in indices)
+    return element("ModelStructure", element("Outputs", *outputs), element("InitialUnknowns", *initial))
 
 
 def named(variables: Sequence[Variable], stage: Stage) -> list[Variable]:
@@ -227,14 +221,10 @@ def shafts(variables: Sequence[Variable]) -> dict[str, list[str]]:
 
 def terminals_and_icons(variables: Sequence[Variable]) -> bytes:
     """The XML document (UTF-8)."""
-    root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
-    terminals = ET.SubElement(root, "Terminals")
+    terminals = []
     for shaft, names in shafts(variables).items():
         flange = f"rotational flange of shaft {shaft}; all angles about +z"
         about = {"name": shaft, "matchingRule": "bus", "terminalKind": KIND, "description": flange}
-        terminal = ET.SubElement(terminals, "Terminal", about)
-        for name in names:
-            member = {"variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"}
-            ET.SubElement(terminal, "TerminalMemberVariable", member)
-    ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+        members = ({"variableName": n, "memberName": n.split(".")[1], "variableKind": "signal"} for n in names)
+        terminals.append(element("Terminal", *(element("TerminalMemberVariable", **own) for own in members), **about))
+    return document(element("fmiTerminalsAndIcons", element("Terminals", *terminals), fmiVersion="3.0"))

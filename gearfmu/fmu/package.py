@@ -14,13 +14,12 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TypedDict
-from xml.etree import ElementTree as ET
 
 from typing_extensions import Unpack
 
 from gearfmu.errors import FmuError
 from gearfmu.files import written_whole
-from gearfmu.fmu.description import Identity, model_description, named, terminals_and_icons
+from gearfmu.fmu.description import Identity, document, element, model_description, named, terminals_and_icons
 from gearfmu.fmu.documentation import licences, page
 from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.kernel import Kernel
@@ -216,14 +215,9 @@ def source_files() -> dict[str, bytes]:
 
 def build_description(identifier: str, names: list[str]) -> bytes:
     """buildDescription.xml for these files."""
-    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    compiled = (element("SourceFile", name=name) for name in names if name.endswith(".c"))  # the others are included
     options = {"language": "C99", "compiler": "gcc", "compilerOptions": COMPILER_OPTIONS}
-    files = ET.SubElement(configuration, "SourceFileSet", options)
-    for name in names:
-        if name.endswith(".c"):  # the others are included
-            ET.SubElement(files, "SourceFile", {"name": name})
-    ET.SubElement(files, "IncludeDirectory", {"name": "."})
-    ET.SubElement(configuration, "Library", {"name": "m", "external": "true"})
-    ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+    files = element("SourceFileSet", *compiled, element("IncludeDirectory", name="."), **options)
+    library = element("Library", name="m", external="true")
+    configuration = element("BuildConfiguration", files, library, modelIdentifier=identifier)
+    return document(element("fmiBuildDescription", configuration, fmiVersion="3.0"))

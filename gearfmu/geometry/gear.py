@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +42,7 @@ class ReferenceGear:
     alpha: float
     x: float
     beta: float = field(default=0.0, kw_only=True)
+    solid: ClassVar[int] = 1  # -1 of a ring, whose flanks bound a space
 
     @property
     def m_t(self) -> float:
@@ -95,6 +97,10 @@ class ReferenceGear:
     def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
         """Points (..., 2) in m of the flank of tooth 0, in a ring of space 0."""
         return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Unit normals (..., 2) out of the material in the transverse section, of a ring into space 0."""
+        return self.solid * involute.flank_normal(roll, self.r_b, self.psi_b, sg)
 
     def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
         """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
@@ -159,10 +165,9 @@ _CLOSE = 3e-4  # of the base radius
 class GearGeometry(ReferenceGear):
     """An external gear in its body frame: tooth 0 centred on +x at z = 0 (ISO 21771 symbols; lengths m, angles rad).
 
-    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient, helix angle. r_b, r,
-    r_a: base, reference and tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the
-    transverse section. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those
-    of the transverse section at mid-width.
+    r_a: tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the transverse section. h_fp,
+    rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those of the transverse section
+    at mid-width.
     """
 
     r_a: float
@@ -236,10 +241,6 @@ class GearGeometry(ReferenceGear):
         roll = self.s_tip - self.tip_edge
         return self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b)
 
-    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Unit normals (..., 2) out of tooth 0 in the transverse section."""
-        return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
 
 @lru_cache(maxsize=64)
 def _crossing(gear: GearGeometry) -> float:
@@ -269,10 +270,10 @@ def _crossing(gear: GearGeometry) -> float:
 class InternalGearGeometry(ReferenceGear):
     """An internal gear in its body frame: tooth space 0 centred on +x at z = 0 (lengths m, angles rad).
 
-    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient (positive outwards),
-    helix angle. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of the tip edge
-    rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping cutter with that
-    tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the transverse section.
+    x is positive outwards. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of
+    the tip edge rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping
+    cutter with that tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the
+    transverse section.
     """
 
     r_a: float
@@ -280,6 +281,7 @@ class InternalGearGeometry(ReferenceGear):
     r_rim: float
     tip_edge: float
     fillet: float
+    solid = -1
 
     @property
     def s_a(self) -> float:
@@ -314,29 +316,24 @@ class InternalGearGeometry(ReferenceGear):
         roll = self.s_tip + self.tip_edge
         return self.half_pitch - (self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
 
-    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Unit normals (..., 2) out of the ring's material, into space 0."""
-        return -involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-
     def fillet_point(self, share: ArrayLike) -> np.ndarray:
         """Points (..., 2) in m of the fillet of flank sg = +1 at shares 0 (form point) … 1 (root circle) of its arc."""
         radius, angle = self.fillet_centre
         centre = radius * np.array([math.cos(angle), math.sin(angle)])
-        start = -self.flank_normal(self.s_form)
-        begin, turn = math.atan2(start[1], start[0]), self._fillet_turn
-        towards = begin + np.asarray(share, float) * turn
+        towards = self._fillet_begin + np.asarray(share, float) * (angle - self._fillet_begin)
         return centre + self.fillet * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
 
     @property
-    def _fillet_turn(self) -> float:
-        """Angle (rad, negative) of the fillet's arc from the flank's normal to the radial direction."""
-        start = -self.flank_normal(self.s_form)
-        return self.fillet_centre[1] - math.atan2(start[1], start[0])
+    def _fillet_begin(self) -> float:
+        """Direction (rad) from the fillet's centre to its form point: against the flank's normal out of the ring. The
+        arc turns from there to the radial direction."""
+        x, y = -self.flank_normal(self.s_form)
+        return math.atan2(y, x)
 
     @property
     def fillet_length(self) -> float:
         """Length of one fillet, m."""
-        return abs(self._fillet_turn) * self.fillet
+        return abs(self.fillet_centre[1] - self._fillet_begin) * self.fillet
 
 
 def _signed_root(radius: float, r_b: float) -> float:

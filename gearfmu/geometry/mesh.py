@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
 from gearfmu.geometry import involute
-from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry, ReferenceGear
+from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
 
 HANDS = {"sun": 1, "planet": -1, "ring": -1}  # sign of the helix angle over that of the set
+Rolls = TypeVar("Rolls", float, np.ndarray)
 MOUNTS = 6  # of a ring, where nothing says how many
 
 
@@ -28,7 +29,7 @@ class GearMesh:
     ring (`RingMesh`). side: 1 where the radii of both add up to the centre distance, -1 where gear 0 is inside gear 1.
     """
 
-    gears: tuple[GearGeometry, ReferenceGear]
+    gears: tuple[GearGeometry, GearGeometry | InternalGearGeometry]
     a: float
     backlash: float
     side: ClassVar[int]
@@ -59,10 +60,20 @@ class GearMesh:
         """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
         return math.pi * self.gears[0].m_t * math.cos(self.gears[0].alpha_t)
 
+    def opposite(self, roll: Rolls) -> Rolls:
+        """Roll (m) on gear 1 at the contact point that has `roll` (m) on gear 0; of a pair also the other way round."""
+        return self.length - self.side * roll
+
     @property
     def start(self) -> float:
         """Roll (m) of gear 0 at the beginning of the path of contact, where the tip edge rounding of gear 1 begins."""
-        raise NotImplementedError
+        return self.side * (self.length - self.gears[1].s_tip)
+
+    def largest_relative_radius(self) -> float:
+        """Largest relative radius of curvature s s'/L (m) along the path of contact, s' the roll on gear 1."""
+        path = self.path
+        roll = path["E"] if self.side < 0 else min(max(self.length / 2, path["A"]), path["E"])
+        return roll * self.opposite(roll) / self.length
 
     @property
     def path(self) -> dict[str, float]:
@@ -104,19 +115,6 @@ class PairGeometry(GearMesh):
         if not self.a > self.base:
             raise ValueError("the centre distance is smaller than the sum of the base radii")
 
-    def opposite(self, roll: float) -> float:
-        """Roll (m) on the other gear at the contact point that has `roll` (m) on this one."""
-        return self.length - roll
-
-    @property
-    def start(self) -> float:
-        return self.opposite(self.gears[1].s_tip)
-
-    def largest_relative_radius(self) -> float:
-        """Largest relative radius of curvature s (L − s)/L (m) along the path of contact."""
-        roll = min(max(self.length / 2, self.path["A"]), self.path["E"])
-        return roll * (self.length - roll) / self.length
-
     @property
     def tip_circle_contact_ratio(self) -> float:
         """Transverse contact ratio of the tip circles, edge roundings left away (the number that catalogues state)."""
@@ -147,15 +145,6 @@ class PairGeometry(GearMesh):
         inv_w = float(involute.inv(self.alpha_wt))
         return math.pi - self.gears[1].psi_b + inv_w * (1 + ratio) - self.gears[0].psi_b * ratio
 
-    @property
-    def zero_backlash_center_distance(self) -> float:
-        """Centre distance (m) at which the nominal teeth would have no backlash."""
-        first, second = self.gears
-        inv_w = float(involute.inv(first.alpha_t)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (
-            first.z + second.z
-        )
-        return (first.r_b + second.r_b) / math.cos(involute.inverse_inv(max(inv_w, 0.0)))
-
 
 def mount_spaces(teeth: int, points: int) -> list[int]:
     """Tooth spaces of a ring that are nearest to its mounts, which are spaced evenly from space 0 on."""
@@ -184,10 +173,6 @@ class RingMesh(GearMesh):
         """The ring."""
         return self.gears[1]
 
-    @property
-    def start(self) -> float:
-        return self.ring.s_tip - self.length
-
     def outer_single_contact(self, gear: int) -> float:
         """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
         return (self.path["A"] + self.base_pitch, self.path["E"] - self.base_pitch + self.length)[gear]
@@ -211,8 +196,7 @@ class RingMesh(GearMesh):
     @property
     def least_tip_radius(self) -> float:
         """Smallest tip radius (m) of the ring whose flank does not meet the planet below its form circle."""
-        roll = self.length + self.planet.s_form
-        return float(involute.radius_at_roll(roll, self.ring.r_b))
+        return float(involute.radius_at_roll(self.opposite(self.planet.s_form), self.ring.r_b))
 
     @property
     def largest_planet_tip_radius(self) -> float:
@@ -242,11 +226,6 @@ class RingMesh(GearMesh):
         inv_w = float(involute.inv(self.alpha_wt))
         pitch = self.a / (self.ring.z - self.planet.z)
         return 2 * pitch * (self.ring.z * (self.ring.psi_b - inv_w) - self.planet.z * (self.planet.psi_b - inv_w))
-
-    def largest_relative_radius(self) -> float:
-        """Largest relative radius of curvature s (s + L)/L (m) along the path of contact."""
-        roll = self.path["E"]
-        return roll * (roll + self.length) / self.length
 
 
 @dataclass(frozen=True)

@@ -58,18 +58,10 @@ class TeState:
     forces: dict[tuple[int, int], tuple[float, ...]]
 
 
-@dataclass(frozen=True)
-class _Opened:
-    """A model that was checked and opened; kernels of the same blob share it, for nothing writes to it. keep: the
-    memory behind the address."""
-
-    model: int
-    keep: tuple[ctypes.Array, ctypes.Array]
-
-
 @lru_cache(maxsize=2)
-def _opened(blob: bytes, library: Path | None) -> _Opened:
-    """ModelError: the blob is refused, with the kernel's message."""
+def _opened(blob: bytes, library: Path | None) -> tuple[int, ctypes.Array, ctypes.Array]:
+    """Address of a model that was checked and opened, and the memory behind it; kernels of the same blob share it, for
+    nothing writes to it. ModelError: the blob is refused, with the kernel's message."""
     kernel = load(library)
     blob_keep, address = aligned(len(blob))
     ctypes.memmove(address, blob, len(blob))
@@ -77,7 +69,7 @@ def _opened(blob: bytes, library: Path | None) -> _Opened:
     message = ctypes.create_string_buffer(MESSAGE)
     if kernel.gk_model_open(model, address, len(blob), message):
         raise ModelError(message.value.decode(errors="replace"))
-    return _Opened(model, (blob_keep, model_keep))
+    return model, blob_keep, model_keep
 
 
 class Kernel:
@@ -90,7 +82,7 @@ class Kernel:
     def __init__(self, blob: bytes, parameters: Mapping[str, float] | None = None, library: Path | None = None):
         self._lib = load(library)
         self._opened = _opened(bytes(blob), library)
-        self._model = self._opened.model
+        self._model = self._opened[0]
         self._setup_keep, self._setup = aligned(self._lib.gk_setup_size(self._model))
         self._work_keep, self._work = aligned(self._lib.gk_work_size(self._model))
         self._data_keep, self._data = aligned(self._lib.gk_data_size(self._model))

@@ -101,6 +101,11 @@ class Plot:
     picture: str | Chart
     columns: dict[str, np.ndarray]
 
+    @property
+    def empty(self) -> bool:
+        """A chart without panels is left out of a page."""
+        return isinstance(self.picture, Chart) and not self.picture.panels
+
 
 def over_time(panels: Iterable[Panel], group: str = "time") -> Chart:
     """Panels over the time of the run; they zoom with all others of the page."""

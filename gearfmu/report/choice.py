@@ -12,6 +12,7 @@ from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
 from gearfmu.report import housing, mesh_cycle, planets, plots, plots_nvh, plots_runup
 from gearfmu.report.chart import Plot
+from gearfmu.report.kinds import FORCES, force_channels
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
 from gearfmu.report.run import Run
@@ -19,21 +20,25 @@ from gearfmu.report.signals import meshes
 from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.deformation import DeformationError
-from gearfmu.stage.run.trace import Trace
 
 Maker: TypeAlias = Callable[[], "Plot | None"]
 
 
-def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
-    """Every figure the run allows, and in words why others are not there."""
+def chosen_plots(run: Run) -> tuple[dict[str, list[Plot]], list[str]]:
+    """Every figure the run allows, by chapter ("time", "speed", "frequency", "housing"), and in words why others are
+    not there."""
     gears, gaps = deformed_gears(run)
-    made, missing = [], []
-    for maker in _figures(run, gears):
-        try:
-            if (plot := maker()) is not None:
-                made.append(plot)
-        except MetricsError as error:
-            missing.append(str(error))
+    made: dict[str, list[Plot]] = {}
+    missing = []
+    makers = {"time": _over_time(run, gears), **_over_speed_or_frequency(run), "housing": housing.figures(run)}
+    for chapter, own in makers.items():
+        made[chapter] = []
+        for maker in own:
+            try:
+                if (plot := maker()) is not None and not plot.empty:
+                    made[chapter].append(plot)
+            except MetricsError as error:
+                missing.append(str(error))
     if not run.angles and run.planets is None:
         missing.append("No mesh orders: the trace has no gear speed or no tooth numbers.")
     return made, [*gaps, *run.statics[1], *dict.fromkeys(missing)]
@@ -60,58 +65,41 @@ def turning(run: Run) -> View | None:
     forces = [mesh for mesh in meshes(run.trace) if f"{mesh}.force" in run.trace]
     if run.stage is None or run.trace.time.size < 2 or not forces:
         return None
-    if run.planets is not None:
-        window = planets.detail_window(run.trace, run.planets, run.window)
-    else:
-        window = detail_window(run.trace, forces[0], run.angles.get(forces[0]))
     times = np.zeros(0) if run.deformation is None else run.deformation.time
     recorded = [(gear, times) for gear in deformed_gears(run)[0]]
-    return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), window, recorded)
+    return moving_view(run.trace, run.stage, run.stage.by_name(run.bodies or ()), run.detail(forces[0]), recorded)
 
 
-def _figures(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
-    """All figures: of a pair or train mesh by mesh, of a set its planets side by side. gears: to be drawn deformed."""
-    trace, window, own, angles = run.trace, run.window, run.planets, run.angles
+def _over_time(run: Run, gears: Sequence[DeformedGear]) -> list[Maker]:
+    """Of a pair or train mesh by mesh, of a set its planets side by side. gears: to be drawn deformed."""
+    trace, own = run.trace, run.planets
     makers: list[Maker] = [partial(plots.torque_and_slip, trace)]
     makers.append(partial(plots.speeds, trace, own.rotors if own else ()))
-    over_frequency: list[Maker]
     if own is None:
-        for mesh in meshes(trace):
-            late = detail_window(trace, mesh, angles.get(mesh))
-            makers += [partial(plots.mesh_force_and_error, trace, mesh, part) for part in (None, late)]
-        forces = plots_nvh.force_channels(trace)
-        over_frequency = [partial(plots_nvh.spectra, trace, window, angles, forces, plots_nvh.FORCES)]
+        details = [(mesh, part) for mesh in meshes(trace) for part in (None, run.detail(mesh))]
+        makers += [partial(plots.mesh_force_and_error, trace, *detail) for detail in details]
     else:
-        late = planets.detail_window(trace, own, window)
-        makers += [partial(planets.forces, trace, own, part) for part in (None, late)]
-        makers += [partial(make, trace, own, window) for make in (planets.planets, planets.sharing)]
+        makers += [partial(planets.forces, trace, own, part) for part in (None, run.detail(""))]
+        makers += [partial(make, run, own) for make in (planets.planets, planets.sharing)]
         makers.append(partial(plots.pin_forces, trace, own.planets))
-        over_frequency = [partial(plots_nvh.spectra_by_central, trace, own, window)]
     makers += [partial(plots.bearing_forces, trace, own is not None), partial(plots.axial_and_tilting, trace)]
     if run.stage is not None:
-        cycle = partial(mesh_cycle.transmission_error, trace, window, run.stage)
-        makers += [partial(cycle, mesh, run.loads.get(mesh)) for mesh in run.shown_meshes]
-        makers += [partial(mesh_cycle.contact_pattern, trace, run.stage, *loaded) for loaded in run.loads.items()]
+        kinds = (mesh_cycle.transmission_error, mesh_cycle.contact_pattern)
+        makers += [partial(kind, run, mesh) for kind in kinds for mesh in run.shown_meshes]
     if run.deformation is not None:
-        kinds = [partial(kind, run.deformation) for kind in (drawn.pictures, drawn.film)]
-        makers += [partial(kind, gear, trace, run.stage) for gear in gears for kind in kinds]
-    makers += [partial(plots.energy, trace)] if own else []
-    makers += over_frequency if run.run_up is None else [partial(make, run.run_up) for make in plots_runup.FIGURES]
-    if own is None:
-        makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
-        makers += [partial(plots_nvh.force_spectrogram, trace, angles)] if run.run_up is None else []
-    return makers + housing.figures(run)
+        views = [partial(view, run, run.deformation) for view in (drawn.pictures, drawn.film)]
+        makers += [partial(view, gear) for gear in gears for view in views]
+    return makers + ([partial(plots.energy, trace)] if own else [])
 
 
-def detail_window(trace: Trace, mesh: str, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
-    """About `periods` mesh periods (s) around the largest force of an engagement, or a twentieth of the run where its
-    mesh angle is missing."""
-    start, end = float(trace.time[0]), float(trace.time[-1])
-    force = np.abs(trace[f"{mesh}.force"]) if f"{mesh}.force" in trace else np.zeros(1)
-    centre = float(trace.time[int(np.argmax(force))])
-    half = 0.025 * (end - start)
-    if angle is not None and angle[-1] > 2 * np.pi * periods:
-        frequency = np.interp(centre, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
-        half = min(0.5 * periods / max(frequency, 1e-9), 0.5 * (end - start))
-    centre = min(max(centre, start + half), end - half)
-    return centre - half, centre + half
+def _over_speed_or_frequency(run: Run) -> dict[str, list[Maker]]:
+    """Orders over the speed of a run-up instead of spectra; in either case the orders of meshes along the run."""
+    cuts: list[Maker] = []
+    if run.planets is None:
+        cuts = [partial(plots_nvh.order_cuts, run, mesh) for mesh in run.angles]
+    if run.run_up is not None:
+        return {"speed": [partial(make, run.run_up) for make in plots_runup.FIGURES], "frequency": cuts}
+    if run.planets is not None:
+        return {"speed": [], "frequency": [partial(plots_nvh.spectra_by_central, run, run.planets)]}
+    spectra = partial(plots_nvh.spectra, run, force_channels(run.trace), FORCES)
+    return {"speed": [], "frequency": [spectra, *cuts, partial(plots_nvh.force_spectrogram, run)]}

@@ -5,31 +5,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
 from gearfmu.files import write_text
 from gearfmu.report import metrics, page, sections
-from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
-from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded
+from gearfmu.report.chart import Chart, Curve, Panel, Plot, level_limits, over_time
+from gearfmu.report.kinds import FORCES, averaging, force_channels
+from gearfmu.report.mesh_cycle import BINS, HARMONICS, mean_cycle, with_harmonics
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.names import minus, plain, shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.plots_nvh import (
-    SHOWN_TO,
-    averaging,
-    force_channels,
-    octave_table,
-    segment,
-    spectrum_curve,
-    spectrum_of,
-)
+from gearfmu.report.plots_nvh import SHOWN_TO, octave_table, segment, spectrum_curve, spectrum_of
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
 from gearfmu.stage.run.te import mesh_harmonics
-from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import write_columns
 
 ORDERS = 6
@@ -37,36 +29,45 @@ ALIKE = 0.05  # dB, or %: smaller differences are not called better or worse
 LEVELS = ("rms_ac_N", "rms_ac_um")  # results whose differences are told in dB
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A run and what it is called on the page."""
-
-    label: str
-    run: Run
+Runs: TypeAlias = Mapping[str, Run]  # by what each is called on the page
 
 
-def write_comparison(compared: Sequence[Compared], path: Path) -> Path:
-    """Write the page and, in <name>_data beside it, the data of its figures; returns `path`."""
-    folder = path.with_name(f"{path.stem}_data")
-    plots = [plot for plot in _plots(compared) if plot is not None]
+def write_comparison(runs: Runs, path: Path) -> Path:
+    """Write the page and, in <name>_data beside it, the data of its figures; returns `path`. runs: by their names."""
+    folder, names = path.with_name(f"{path.stem}_data"), list(runs)
+    plots = _plots(runs)
     for plot in plots:
-        write_columns(folder / f"{plot.name}.csv", plot.columns)
-    names = [own.label for own in compared]
+        size = max(len(values) for values in plot.columns.values())
+        write_columns(folder / f"{plot.name}.csv", {key: _padded(own, size) for key, own in plot.columns.items()})
     described = " · ".join(
-        f"{own.label}: {own.run.title}, {own.run.stage_name}, {own.run.summary.get('outcome', 'outcome not given')}"
-        for own in compared
+        f"{name}: {run.title}, {run.stage_name}, {run.summary.get('outcome', 'outcome not given')}"
+        for name, run in runs.items()
     )
     body = [
         page.head(" and ".join((", ".join(names[:-1]), names[-1])), "", described),
-        page.tiles(_tiles(compared)),
-        page.section("Results", _results(compared), name="results"),
+        page.tiles(_tiles(runs)),
+        page.section("Results", _results(runs), name="results"),
         *[page.figure(plot, folder.name) for plot in plots],
-        *_octaves(compared),
-        *_order_table(compared),
-        page.section("How they were run", _facts(compared)),
+        *_octaves(runs),
+        *_order_table(runs),
+        page.section("How they were run", _facts(runs)),
     ]
     write_text(path, page.page(f"Comparison: {', '.join(names)}", body, plots))
     return path
+
+
+def _padded(values: np.ndarray, size: int) -> np.ndarray:
+    """(size,): NaN behind the end."""
+    return np.concatenate([np.asarray(values, dtype=float), np.full(size - len(values), np.nan)])
+
+
+def _first(runs: Runs) -> tuple[str, Run]:
+    """Name of the run that the others are compared with, and it."""
+    return next(iter(runs.items()))
+
+
+def _others(runs: Runs) -> dict[str, Run]:
+    return dict(list(runs.items())[1:])
 
 
 def _difference(key: str, value: float, first: float) -> tuple[str, float]:
@@ -80,33 +81,32 @@ def _difference(key: str, value: float, first: float) -> tuple[str, float]:
     return minus(f"{value - first:+.3g}"), value - first
 
 
-def _tiles(compared: Sequence[Compared]) -> list[tuple[str, str, str]]:
+def _tiles(runs: Runs) -> list[tuple[str, str, str]]:
     """The largest news: what each other run changes against the first."""
-    first, found = compared[0].run.results, []
-    for own in compared[1:]:
-        values = own.run.results
+    (base, run), found = _first(runs), []
+    for name, own in _others(runs).items():
         for end, words in (
             ("te_rms_ac_um", "alternating transmission error"), ("mesh_force_rms_ac_N", "alternating mesh force"),
             ("dynamic_factor", "dynamic factor"),
         ):  # fmt: skip
-            key = next((k for k in first if k.endswith(end) and k in values), None)
+            key = next((k for k in run.results if k.endswith(end) and k in own.results), None)
             if key is not None:
-                value, _, unit = _difference(key, values[key], first[key])[0].partition(" ")
-                found.append((value, unit, f"{words}: {own.label} against {compared[0].label}"))
+                value, _, unit = _difference(key, own.results[key], run.results[key])[0].partition(" ")
+                found.append((value, unit, f"{words}: {name} against {base}"))
     return found
 
 
-def _results(compared: Sequence[Compared]) -> str:
+def _results(runs: Runs) -> str:
     """The table of key results, one column a run and one a difference."""
-    names, rows = meshes(compared[0].run.trace), []
-    for key, first in compared[0].run.results.items():
-        words, _, unit = sections.result_words(key, names)
-        changes = [cell for own in compared[1:] for cell in _cells(key, own.run.results.get(key), first)]
+    (base, run), rows = _first(runs), []
+    for key, first in run.results.items():
+        words, _, unit = sections.result_words(key, meshes(run.trace))
+        changes = [cell for own in _others(runs).values() for cell in _cells(key, own.results.get(key), first)]
         rows.append((words, unit, f"{first:.4g}", *changes))
-    others = [cell for own in compared[1:] for cell in (own.label, "change")]
-    where = "; ".join(f"{own.label} {own.run.window.start:.4g} s to {own.run.window.end:.4g} s" for own in compared)
-    note = page.note(f"Changes against {compared[0].label}. Windows: {where}. {sections.FACTOR_WORDS}")
-    return page.table(("", "unit", compared[0].label, *others), rows, (0, 1)) + note
+    others = [cell for name in _others(runs) for cell in (name, "change")]
+    where = "; ".join(f"{name} {own.window.start:.4g} s to {own.window.end:.4g} s" for name, own in runs.items())
+    note = page.note(f"Changes against {base}. Windows: {where}. {sections.FACTOR_WORDS}")
+    return page.table(("", "unit", base, *others), rows, (0, 1)) + note
 
 
 def _cells(key: str, value: float | None, first: float) -> tuple[str, str]:
@@ -118,110 +118,75 @@ def _cells(key: str, value: float | None, first: float) -> tuple[str, str]:
     return f"{value:.4g}", page.Ready(f'<span class="{"better" if change < 0 else "worse"}">{words}</span>')
 
 
-def _plots(compared: Sequence[Compared]) -> list[Plot | None]:
-    names = [mesh for mesh in meshes(compared[0].run.trace) if all(mesh in meshes(own.run.trace) for own in compared)]
-    found: list[Plot | None] = []
-    for mesh in names:
-        found += [_mesh_cycle(compared, mesh), _orders(compared, mesh)]
-    return [*found, _spectra(compared), *[_over_time(compared, mesh) for mesh in names]]
+def _plots(runs: Runs) -> list[Plot]:
+    _, first = _first(runs)
+    names = [mesh for mesh in meshes(first.trace) if all(mesh in meshes(own.trace) for own in runs.values())]
+    found = [plot for mesh in names for plot in (_mesh_cycle(runs, mesh), _orders(runs, mesh))]
+    found += [_spectra(runs), *[_over_time(runs, mesh) for mesh in names]]
+    return [plot for plot in found if not plot.empty]
 
 
-def _over_time(compared: Sequence[Compared], mesh: str) -> Plot | None:
+def _over_time(runs: Runs, mesh: str) -> Plot:
     """Force and transmission error of a mesh over time, the runs over one another."""
-    panels, columns = [], {}
-    for channel, scale, label in (("te", 1e6, "transmission error in µm"), ("force", 1e-3, "mesh force in kN")):
-        own = [c for c in compared if f"{mesh}.{channel}" in c.run.trace]
-        curves = [
-            Curve(c.run.trace.time, scale * c.run.trace[f"{mesh}.{channel}"], c.label, label.split()[-1]) for c in own
-        ]
-        if curves:
-            panels.append(Panel(f"{shown(f'{mesh}.{channel}')}: {label}", tuple(curves), height=210))
-    if not panels:
-        return None
-    size = max(c.run.trace.time.size for c in compared)
-    for c in compared:
-        columns[f"{c.label} time_[s]"] = _padded(c.run.trace.time, size)
-        for channel in ("te", "force"):
-            if f"{mesh}.{channel}" in c.run.trace:
-                columns[f"{c.label} {mesh}.{channel}"] = _padded(c.run.trace[f"{mesh}.{channel}"], size)
-    chart = Chart(tuple(panels), TIME, "time")
-    title = of_mesh(compared[0].run.trace, mesh, "Transmission error and mesh force")
-    return Plot(f"{mesh}_time", title, "Each run in its own time.", chart, columns)
+    panels, columns, names = [], {}, (f"{mesh}.te", f"{mesh}.force")
+    for name, scale, label in zip(names, (1e6, 1e-3), ("transmission error in µm", "mesh force in kN"), strict=True):
+        unit, own = label.split()[-1], {key: run.trace for key, run in runs.items() if name in run.trace}
+        curves = tuple(Curve(trace.time, scale * trace[name], key, unit) for key, trace in own.items())
+        panels += [Panel(f"{shown(name)}: {label}", curves, height=210)] if curves else []
+    for key, run in runs.items():
+        columns[f"{key} time_[s]"] = run.trace.time
+        columns |= {f"{key} {name}": run.trace[name] for name in names if name in run.trace}
+    title = of_mesh(_first(runs)[1].trace, mesh, "Transmission error and mesh force")
+    return Plot(f"{mesh}_time", title, "Each run in its own time.", over_time(panels), columns)
 
 
-def _padded(values: np.ndarray, size: int) -> np.ndarray:
-    """(size,): NaN behind the end."""
-    return np.concatenate([np.asarray(values, dtype=float), np.full(size - len(values), np.nan)])
-
-
-def _mesh_cycle(compared: Sequence[Compared], mesh: str) -> Plot | None:
-    """Mean transmission error over the mesh cycle and its harmonics."""
-    found: dict[str, np.ndarray] = {}
-    for own in compared:
-        stage, part = own.run.stage, own.run.part
-        engagement = None if stage is None else next((e for e in stage.engagements if e.name == mesh), None)
-        if stage is None or engagement is None or f"{mesh}.te" not in part:
-            continue
-        position = position_of(part, stage, engagement)
-        mean = None if position is None else folded(position, 1e6 * part[f"{mesh}.te"])
-        if mean is not None:
-            found[own.label] = mean
-    if len(found) < 2:
-        return None
-    x, orders = (np.arange(BINS) + 0.5) / BINS, np.arange(1.0, HARMONICS + 1)
-    lines = {label: mesh_harmonics(mean[None], HARMONICS)[0] for label, mean in found.items()}
-    curves = tuple(Curve(x, mean - mean.mean(), label, "µm") for label, mean in found.items())
-    bars = tuple(Curve(orders, line, label, "µm rms", "bars") for label, line in lines.items())
-    panels = (
-        Panel("transmission error in µm, without its mean", curves, height=230, x_label="position in pitches"),
-        Panel("harmonics in µm, rms", bars, height=230, x_label="harmonic of the mesh"),
-    )
-    told = "; ".join(f"{label} {np.ptp(mean):.3g} µm" for label, mean in found.items())
+def _mesh_cycle(runs: Runs, mesh: str) -> Plot:
+    """Mean transmission error over the mesh cycle and its harmonics; without panels for fewer than two runs."""
+    found = {name: mean for name, run in runs.items() if (mean := mean_cycle(run, mesh)) is not None}
+    x, label = (np.arange(BINS) + 0.5) / BINS, "transmission error in µm, without its mean"
+    lines = {name: mesh_harmonics(mean[None], HARMONICS)[0] for name, mean in found.items()}
+    curves = tuple(Curve(x, mean - mean.mean(), name, "µm") for name, mean in found.items())
+    panel = Panel(label, curves, height=230, x_label="position in pitches")
+    told = "; ".join(f"{name} {np.ptp(mean):.3g} µm" for name, mean in found.items())
     caption = f"Mean over all mesh cycles of each run's window. Peak to peak: {told}."
-    columns = {"harmonic": orders} | {f"{label}_[um rms]": line for label, line in lines.items()}
-    title = of_mesh(compared[0].run.trace, mesh, "Mesh cycle")
-    return Plot(f"{mesh}_cycle", title, caption, Chart(panels, across=2), columns)
+    columns = {"harmonic": np.arange(1.0, HARMONICS + 1)}
+    columns |= {f"{name}_[um rms]": line for name, line in lines.items()}
+    chart = with_harmonics(panel, lines) if len(found) > 1 else Chart(())
+    return Plot(f"{mesh}_cycle", of_mesh(_first(runs)[1].trace, mesh, "Mesh cycle"), caption, chart, columns)
 
 
-def _common(compared: Sequence[Compared]) -> list[str]:
-    names = force_channels(compared[0].run.trace)
-    return [name for name in names if all(name in own.run.trace for own in compared)]
+def _common(runs: Runs) -> list[str]:
+    """Forces that all runs have."""
+    return [name for name in force_channels(_first(runs)[1].trace) if all(name in own.trace for own in runs.values())]
 
 
-def _spectra(compared: Sequence[Compared]) -> Plot | None:
+def _spectra(runs: Runs) -> Plot:
     """Spectra of every force that all runs have, the runs over one another."""
     panels, columns = [], {}
-    for name in _common(compared):
+    for name in _common(runs):
         curves = []
-        for own in compared:
+        for key, run in runs.items():
             try:
-                found = spectrum_of(own.run.part, name, segment(own.run.part.time.size))
+                found = spectrum_of(run.part, name, segment(run.part.time.size))
             except MetricsError:
                 continue
-            curves.append(spectrum_curve(own.label, found, SHOWN_TO))
-            columns[f"{own.label} frequency_[Hz]"] = found.frequency
-            columns[f"{own.label} {name}_[dB re 1 N]"] = metrics.level(found.amplitude)
-        if curves:
-            panels.append(Panel(f"{shown(name)}: level in dB re 1 N", tuple(curves), limits=level_limits(curves)))
-    if not panels:
-        return None
-    size = max(len(values) for values in columns.values())
-    columns = {name: _padded(values, size) for name, values in columns.items()}
+            curves.append(spectrum_curve(key, found, SHOWN_TO))
+            columns[f"{key} frequency_[Hz]"] = found.frequency
+            columns[f"{key} {name}_[dB re 1 N]"] = metrics.level(found.amplitude)
+        label = f"{shown(name)}: level in dB re 1 N"
+        panels += [Panel(label, tuple(curves), limits=level_limits(curves))] if curves else []
     caption = "Rms amplitude of each line, Hann windows; each run over its window."
-    chart = Chart(tuple(panels), "frequency in kHz", "frequency")
-    return Plot("spectra", "Spectra of the forces", caption, chart, columns)
+    return Plot("spectra", FORCES.spectra, caption, Chart(tuple(panels), "frequency in kHz", "frequency"), columns)
 
 
-def order_levels(own: Compared, mesh: str) -> dict[str, np.ndarray]:
+def order_levels(run: Run, mesh: str) -> dict[str, np.ndarray]:
     """Level (ORDERS,) dB re 1 N of the mesh orders in every force of a run, mean power over its window."""
-    run = own.run
     found: dict[str, np.ndarray] = {}
-    if mesh not in run.angles:
-        return found
-    for name in force_channels(run.trace):
+    trace = run.trace
+    for name in force_channels(trace) if mesh in run.angles else ():
         try:
             cuts = metrics.order_cuts(
-                run.trace.time, run.trace[name], run.angles[mesh], ORDERS, averaged=averaging(run.trace, name)
+                trace.time, trace[name], run.angles[mesh], ORDERS, averaged=averaging(trace, name)
             )
         except MetricsError:
             continue
@@ -231,11 +196,11 @@ def order_levels(own: Compared, mesh: str) -> dict[str, np.ndarray]:
     return found
 
 
-def _orders(compared: Sequence[Compared], mesh: str) -> Plot | None:
+def _orders(runs: Runs, mesh: str) -> Plot:
     """Mesh orders of every force, the runs beside one another."""
-    levels = {own.label: order_levels(own, mesh) for own in compared}
+    levels = {name: order_levels(run, mesh) for name, run in runs.items()}
     orders, panels, columns = np.arange(1.0, ORDERS + 1), [], {"order": np.arange(1.0, ORDERS + 1)}
-    for name in _common(compared):
+    for name in _common(runs):
         known = {label: found[name] for label, found in levels.items() if name in found}
         if not known:
             continue
@@ -245,52 +210,45 @@ def _orders(compared: Sequence[Compared], mesh: str) -> Plot | None:
         limits = (max(math.floor(base / 10) * 10 - 10, top - 90), math.ceil(top / 10) * 10)
         panels.append(Panel(f"{shown(name)}: level in dB re 1 N", curves, limits=limits, height=150))
         columns |= {f"{label} {name}_[dB re 1 N]": level for label, level in known.items()}
-    if not panels:
-        return None
     caption = "Level of every mesh order, mean power over the window of each run."
-    chart = Chart(tuple(panels), "order of the mesh", across=2)
-    title = of_mesh(compared[0].run.trace, mesh, "Mesh orders")
-    return Plot(f"{mesh}_orders", title, caption, chart, columns)
+    title, chart = "Mesh orders", Chart(tuple(panels), "order of the mesh", across=2)
+    return Plot(f"{mesh}_orders", of_mesh(_first(runs)[1].trace, mesh, title), caption, chart, columns)
 
 
-def _octaves(compared: Sequence[Compared]) -> list[str]:
+def _octaves(runs: Runs) -> list[str]:
     """Octave bands of the first run, and what the others change in dB."""
     try:
-        tables = [octave_table(own.run.trace, own.run.window) for own in compared]
+        tables = {name: octave_table(run) for name, run in runs.items()}
     except MetricsError:
         return []
-    rows = [row for table in tables for row in table.values()]
-    bands = [band for band in next(iter(tables[0].values()), {}) if all(band in row for row in rows)]
-    levels = [{name: np.array([row[band] for band in bands]) for name, row in table.items()} for table in tables]
+    rows = [row for table in tables.values() for row in table.values()]
+    bands = [band for band in next(iter(next(iter(tables.values())).values()), {}) if all(band in row for row in rows)]
+    levels = [{name: np.array([row[band] for band in bands]) for name, row in t.items()} for t in tables.values()]
     head = ("Hz", *(f"{band:g}" for band in bands))
-    return _level_table(compared, "Octave bands", head, levels, "octaves") if bands else []
+    return _level_table(runs, "Octave bands", head, levels, "octaves") if bands else []
 
 
-def _order_table(compared: Sequence[Compared]) -> list[str]:
+def _order_table(runs: Runs) -> list[str]:
     """Mesh orders of the first run in dB, and what the others change."""
-    found, head = [], ("order", *(str(k) for k in range(1, ORDERS + 1)))
-    for mesh in meshes(compared[0].run.trace):
-        title = of_mesh(compared[0].run.trace, mesh, "Mesh orders in numbers")
-        found += _level_table(compared, title, head, [order_levels(own, mesh) for own in compared])
+    found, head, trace = [], ("order", *(str(k) for k in range(1, ORDERS + 1))), _first(runs)[1].trace
+    for mesh in meshes(trace):
+        title = of_mesh(trace, mesh, "Mesh orders in numbers")
+        found += _level_table(runs, title, head, [order_levels(own, mesh) for own in runs.values()])
     return found
 
 
 def _level_table(
-    compared: Sequence[Compared],
-    title: str,
-    head: Sequence[str],
-    levels: Sequence[Mapping[str, np.ndarray]],
-    mark: str = "",
+    runs: Runs, title: str, head: Sequence[str], levels: Sequence[Mapping[str, np.ndarray]], mark: str = ""
 ) -> list[str]:
     """A section with levels (dB) of the first run by channel, and what the others change; none without common
     channels. levels: by channel of each run; mark: target of links."""
-    rows = []
-    for name in (n for n in _common(compared) if all(n in own for own in levels)):
-        rows.append((f"{plain(name) or name}, {compared[0].label}", *map(_db, levels[0][name])))
-        for own, level in zip(compared[1:], levels[1:], strict=True):
+    rows, (base, *others) = [], runs
+    for name in (n for n in _common(runs) if all(n in own for own in levels)):
+        rows.append((f"{plain(name) or name}, {base}", *map(_db, levels[0][name])))
+        for label, level in zip(others, levels[1:], strict=True):
             change = level[name] - levels[0][name]
-            rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
-    note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
+            rows.append((f"    {label}, change", *(_db(value, "+") for value in change)))
+    note = page.note(f"Level in dB re 1 N (rms) of {base}, and changes of the others in dB.")
     return [page.section(title, note, page.table(head, rows), name=mark)] if rows else []
 
 
@@ -298,7 +256,7 @@ def _db(value: float, sign: str = "") -> str:
     return "–" if math.isnan(value) else minus(f"{value:{sign}.1f}")
 
 
-def _facts(compared: Sequence[Compared]) -> str:
-    known = [sections.facts(own.run.summary) for own in compared]
+def _facts(runs: Runs) -> str:
+    known = [sections.facts(run.summary) for run in runs.values()]
     rows = [(key, *(facts.get(key, "–") for facts in known)) for key in known[0]]
-    return page.table(("", *(own.label for own in compared)), rows)
+    return page.table(("", *runs), rows)

@@ -18,14 +18,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from PIL import Image
 
+from gearfmu.geometry.plane import direction
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
+from gearfmu.report.run import Run
 from gearfmu.report.style import INK, MUTED, STEEL, WIDTH, embedded, png, round_scale, styled
 from gearfmu.stage.assembly.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.touching import GEAR_PHI
-from gearfmu.stage.run.trace import Trace
-from gearfmu.stagefile.forms.general import Stage
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn
 IN_A_ROW = 3
@@ -35,22 +35,23 @@ MICRO = 1e6
 
 @dataclass(frozen=True)
 class _Face:
-    """What is seen of a gear along its axis: quadrilaterals (Q, 4) that face the eye, and whether a carrier's turning
-    neighbours are marked: (N, F) angles and the distance (m) and radius (m) of their centres."""
+    """What is seen of a gear along its axis: quadrilaterals (Q, 4) that face the eye, and marks of a carrier's turning
+    neighbours: centres (N, F, 2) and radius, m."""
 
     gear: DeformedGear
     quads: np.ndarray
     scale: float
     norm: Normalize
-    neighbours: tuple[np.ndarray, float, float] | None
+    neighbours: np.ndarray
+    radius: float
 
 
-def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
-    """The gear at the times of the pictures, side by side; None without one. stage: for the marks of planets."""
+def pictures(run: Run, deformation: Deformation, gear: DeformedGear) -> Plot | None:
+    """The gear at the times of the pictures, side by side; None without one."""
     chosen = list(deformation.pictures)
     if not chosen:
         return None
-    face, moved = _face(deformation, gear, chosen, (trace, stage))
+    face, moved = _face(run, deformation.time, gear, chosen)
     rows = math.ceil(len(chosen) / IN_A_ROW)
     with styled():
         width = WIDTH / min(len(chosen), IN_A_ROW)
@@ -67,12 +68,12 @@ def pictures(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: 
     return Plot(f"deformation_{gear.name}", title, _caption(face, moved), image, _columns(deformation, gear, chosen))
 
 
-def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stage | None) -> Plot | None:
+def film(run: Run, deformation: Deformation, gear: DeformedGear) -> Plot | None:
     """The frames of the film as one animated PNG; None with fewer than two."""
     chosen = list(deformation.film)
     if len(chosen) < 2:
         return None
-    face, moved = _face(deformation, gear, chosen, (trace, stage))
+    face, moved = _face(run, deformation.time, gear, chosen)
     with styled():
         figure = Figure(figsize=(6.4, 7.1), layout="constrained", dpi=FILM_DPI)
         canvas, axis = FigureCanvasAgg(figure), figure.subplots()
@@ -99,9 +100,7 @@ def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Stag
     return Plot(f"deformation_{gear.name}_film", title, caption, _animated(images), columns)
 
 
-def _face(
-    deformation: Deformation, gear: DeformedGear, frames: Sequence[int], run: tuple[Trace, Stage | None]
-) -> tuple[_Face, list[np.ndarray]]:
+def _face(run: Run, time: np.ndarray, gear: DeformedGear, frames: Sequence[int]) -> tuple[_Face, list[np.ndarray]]:
     """What the frames have in common, and their elastic displacements."""
     points, quads = gear.surface
     moved = [gear.elastic(frame) for frame in frames]
@@ -111,24 +110,24 @@ def _face(
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     facing = quads[normal[:, 2] > 1e-3 * np.linalg.norm(normal, axis=1)]
     scale, norm = round_scale(SHOWN * diameter / most), Normalize(0, MICRO * most)
-    return _Face(gear, facing, scale, norm, _neighbours(deformation.time, gear.name, *run)), moved
+    return _Face(gear, facing, scale, norm, *_neighbours(run, time, gear.name)), moved
 
 
-def _neighbours(
-    time: np.ndarray, gear: str, trace: Trace, stage: Stage | None
-) -> tuple[np.ndarray, float, float] | None:
-    """Angles (planets, F) of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's."""
+def _neighbours(run: Run, time: np.ndarray, gear: str) -> tuple[np.ndarray, float]:
+    """Centres (N, F, 2) m of the planets that mesh with a gear that stands, as the ring of a set, by the carrier's
+    angle, and the radius (m) of their tips; of other gears none."""
+    trace, stage, none = run.trace, run.stage, (np.zeros((0, time.size, 2)), 0.0)
     if stage is None or not stage.rotors[stage.rotor_of(gear)].stands:
-        return None
+        return none
     meshes = [mesh for mesh in stage.engagements if mesh.gears[1] == gear]
     carrier = stage.rotors[stage.rotor_of(gear)].carried_by
     if not meshes or carrier is None or carrier + GEAR_PHI not in trace:
-        return None
+        return none
     turned = np.interp(time, trace.time, trace[carrier + GEAR_PHI])
     centres = np.array([mesh_axes(stage, mesh)[0] for mesh in meshes])
     planet = next(body for body in stage.gears if body.name == meshes[0].gears[0])
     angles = np.arctan2(centres[:, 1], centres[:, 0])[:, None] + turned
-    return angles, float(np.hypot(*centres[0])), float(planet.tip_diameter) / 2
+    return float(np.hypot(*centres[0])) * direction(angles), float(planet.tip_diameter) / 2
 
 
 def _draw(axis: Axes, face: _Face, frame: int, moved: np.ndarray) -> None:
@@ -142,10 +141,8 @@ def _draw(axis: Axes, face: _Face, frame: int, moved: np.ndarray) -> None:
         PolyCollection(list(drawn[face.quads[depth]]), facecolors=colours[depth], edgecolors=colours[depth], lw=0.25)
     )
     axis.add_patch(Circle((0, 0), edge, fill=False, ec=MUTED, lw=0.7, ls=(0, (4, 3))))
-    for angle in face.neighbours[0][:, frame] if face.neighbours is not None else ():
-        _, distance, radius = face.neighbours  # type: ignore[misc]
-        centre = (distance * math.cos(angle), distance * math.sin(angle))
-        axis.add_patch(Circle(centre, radius, fill=False, ec=MUTED, lw=0.8))
+    for centre in face.neighbours[:, frame]:
+        axis.add_patch(Circle(tuple(centre), face.radius, fill=False, ec=MUTED, lw=0.8))
         axis.plot(*centre, ".", color=MUTED, ms=3)
     most = edge * (1 + 2.4 * SHOWN)
     axis.set(xlim=(-most, most), ylim=(-most, most), aspect="equal")
@@ -161,7 +158,7 @@ def _bar(figure: Figure, axes: list[Axes], face: _Face, shrink: float) -> None:
 def _caption(face: _Face, moved: Sequence[np.ndarray]) -> str:
     largest = ", ".join(f"{MICRO * np.linalg.norm(u, axis=1).max():.3g}" for u in moved)
     marks = ""
-    if face.neighbours is not None:
+    if len(face.neighbours):
         marks = " Thin circles: tip circles of the planets. What holds the ring is spread evenly round its rim."
     return (
         f"Seen along the axis, elastic displacement enlarged {face.scale:g} times, coloured by its magnitude; largest: "

@@ -13,11 +13,12 @@ from gearfmu.errors import GearfmuError
 from gearfmu.modes.paths import paths_of
 from gearfmu.report import plots, plots_nvh
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, level_limits, over_time
-from gearfmu.report.metrics import MetricsError, level, sample_step, undo_mean
-from gearfmu.report.plots_nvh import ACCELERATIONS, SENSOR, heat_of
+from gearfmu.report.kinds import ACCELERATIONS, SENSOR, by_part, loudest_sensors, sensors
+from gearfmu.report.metrics import MetricsError, sample_step, undo_mean
+from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.run import Run
 from gearfmu.report.runup import RunUp
-from gearfmu.report.signals import GEAR_SPEED, Window
+from gearfmu.report.signals import GEAR_SPEED
 from gearfmu.sound import BANDS, SoundError, SoundPower, bands_of, nominal, radiation, segments, third_octaves
 from gearfmu.sound import level as power_level
 from gearfmu.stage.run.housing import Heard, housing_body, radiated_power
@@ -28,31 +29,25 @@ NAME = "housing"  # what the names of its figures begin with
 MOUNT = "mount."
 PATCHES = 300  # boundary elements where none are stored: seconds
 POWER = "dB re 1 pW"
-SHOWN_DB = 60
 
 
 def figures(run: Run) -> list[Callable[[], Plot | None]]:
     """What makes the chapter; nothing where no sensor of a housing moves."""
-    trace, window, names = run.trace, run.window, sensors(run.trace)
+    names = sensors(run.trace)
     if not names:
         return []
-    found: list[Callable[[], Plot | None]] = [partial(accelerations, trace, window)]
+    found: list[Callable[[], Plot | None]] = [partial(accelerations, run)]
     if run.run_up is None:
-        found.append(partial(plots_nvh.spectra, trace, window, run.angles, names, ACCELERATIONS))
-        loud = plots_nvh.loudest_sensors(trace)
-        found += [partial(plots_nvh.cuts, trace, own, loud, ACCELERATIONS) for own in run.angles.items()]
+        found.append(partial(plots_nvh.spectra, run, names, ACCELERATIONS))
+        loud = loudest_sensors(run.trace)
+        found += [partial(plots_nvh.cuts, run, mesh, loud, ACCELERATIONS) for mesh in run.angles]
     sounding = partial(sound, run) if run.run_up is None else partial(sound_over_speed, run.run_up, run)
-    return [*found, partial(transfer_paths, run), partial(mounts, trace), sounding]
+    return [*found, partial(transfer_paths, run), partial(mounts, run.trace), sounding]
 
 
-def sensors(trace: Trace) -> list[str]:
-    """Channels of the sensors of a housing that moves, in the trace's order."""
-    return [name for name in trace.channels if name.startswith(SENSOR) and np.any(trace[name])]
-
-
-def accelerations(trace: Trace, window: Window) -> Plot:
-    """Third octaves of every sensor's accelerations over a window, their averaging over the step taken out."""
-    part, names = trace.window(window.start, window.end), sensors(trace)
+def accelerations(run: Run) -> Plot:
+    """Third octaves of every sensor's accelerations over the window, their averaging over the step taken out."""
+    part, window, names = run.part, run.window, sensors(run.trace)
     try:
         pieces = segments(part.time, np.stack([part[name] for name in names], axis=1), moved=False)
     except SoundError as error:
@@ -60,26 +55,23 @@ def accelerations(trace: Trace, window: Window) -> Plot:
     squares = 0.5 * (np.abs(pieces.velocity) ** 2).mean(axis=0)
     squares = undo_mean(np.sqrt(squares.T), pieces.frequency, sample_step(part.time)) ** 2
     bands = bands_of(pieces.frequency)
-    levels = level(np.sqrt(third_octaves(pieces.frequency, squares, bands)), ACCELERATIONS.reference)
-    panels = []
-    for sensor in dict.fromkeys(name.rsplit(".", 1)[0] for name in names):
-        own = {name: levels[i] for i, name in enumerate(names) if name.startswith(f"{sensor}.")}
-        panels.append(_bars(own, bands, f"{sensor.removeprefix(SENSOR)}: {ACCELERATIONS.label}", ACCELERATIONS.label))
+    rows, unit = ACCELERATIONS.level(np.sqrt(third_octaves(pieces.frequency, squares, bands))), ACCELERATIONS.label
+    levels = dict(zip(names, rows, strict=True))
+    panels = [
+        _bars({name: levels[name] for name in own}, bands, f"{own[0].split('.')[1]}: {unit}", unit)
+        for own in by_part(names)
+    ]
     caption = f"Accelerations in third octaves (IEC 61260-1), from {window.start:.3f} s to {window.end:.3f} s "
     caption += f"({window.reason}); 120 dB are 1 m/s² rms. Lines {pieces.frequency[1]:.3g} Hz apart."
-    columns = {"third_octave_[Hz]": bands} | {f"{n}_[{ACCELERATIONS.label}]": levels[i] for i, n in enumerate(names)}
+    columns = {"third_octave_[Hz]": bands} | {f"{name}_[{unit}]": own for name, own in levels.items()}
     chart = Chart(tuple(panels), "third octave in Hz", f"{NAME}_octaves")
     return Plot(f"{NAME}_octaves", "Accelerations of the housing", caption, chart, columns)
 
 
-def mounts(trace: Trace) -> Plot | None:
-    """Forces of the housing on the ground over time; None without mounts."""
+def mounts(trace: Trace) -> Plot:
+    """Forces of the housing on the ground over time."""
     names = [n for n in trace.channels if n.startswith(MOUNT) and n.split(".")[-1] in ("fx", "fy", "fz")]
-    feet = dict.fromkeys(name.split(".")[1] for name in names)
-    if not feet:
-        return None
-    groups = {foot: [name for name in names if name.startswith(f"{MOUNT}{foot}.")] for foot in feet}
-    panels = [Panel(f"{foot}: force in N", plots.channels(trace, own)) for foot, own in groups.items()]
+    panels = [Panel(f"{own[0].split('.')[1]}: force in N", plots.channels(trace, own)) for own in by_part(names)]
     caption = "Force of the housing on the ground, along the axes of the stage."
     return Plot(f"{NAME}_mounts", "Forces of the mounts", caption, over_time(panels), plots.columns(trace, names))
 
@@ -109,8 +101,7 @@ def sound_over_speed(up: RunUp, run: Run) -> Plot:
     curves = tuple(Curve(speed, own, name, POWER) for name, own in levels.items())
     kept = (found.frequency > 0) & (found.frequency <= BANDS[1])
     lines = power_level(found.power[:, kept]).T
-    top = 5 * np.ceil(lines.max() / 5)
-    heat = heat_of(speed, found.frequency[kept] / 1e3, lines, (top - SHOWN_DB, top), f"{POWER} a line")
+    heat = heat_of(speed, found.frequency[kept] / 1e3, lines, lines.max(), f"{POWER} a line")
     panels = (
         Panel(POWER, curves, limits=level_limits(curves)),
         Panel("frequency in kHz", heat=heat, height=300, limits=(0.0, BANDS[1] / 1e3)),
@@ -128,7 +119,7 @@ def sound_over_speed(up: RunUp, run: Run) -> Plot:
 def transfer_paths(run: Run) -> Plot:
     """Share of every bearing direction at the loudest sensor, in its loudest third octave and in all."""
     stage, bodies = _at_hand(run, "Transfer paths")
-    loudest = max(plots_nvh.loudest_sensors(run.trace), key=lambda name: float(np.std(run.trace[name])))
+    loudest = max(loudest_sensors(run.trace), key=lambda name: float(np.std(run.trace[name])))
     try:
         found = paths_of(run.trace, stage, bodies, loudest, run.window.start)
     except GearfmuError as error:
@@ -136,14 +127,12 @@ def transfer_paths(run: Run) -> Plot:
     alone, joint = found.octaves()
     band = float(nominal(found.bands[[joint.sum(axis=0).argmax()]])[0])
     shares = {"all third octaves": 100 * found.share(), f"third octave {band:g} Hz": 100 * found.share(band)}
-    caption = (
-        f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one below 0 "
+    caption = f"Share of every bearing direction in the mean square of {found.sensor}. Shares sum to 100 %; one "
+    caption += (
+        "below 0 makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
     )
-    caption += "makes the sensor quieter. Forces of bearings times transfer functions of the housing on its feet."
-    columns = {"third_octave_[Hz]": found.bands} | {
-        f"{name}_[{ACCELERATIONS.label}]": level(np.sqrt(own), ACCELERATIONS.reference)
-        for name, own in zip(found.names, alone, strict=True)
-    }
+    rows = zip(found.names, ACCELERATIONS.level(np.sqrt(alone)), strict=True)
+    columns = {"third_octave_[Hz]": found.bands} | {f"{name}_[{ACCELERATIONS.label}]": own for name, own in rows}
     panels = tuple(_by_bearing(f"{words}: share in %", found.names, own) for words, own in shares.items())
     chart = Chart(panels, "bearing", f"{NAME}_paths")
     return Plot(f"{NAME}_paths", f"Transfer paths to {found.sensor.removeprefix(SENSOR)}", caption, chart, columns)

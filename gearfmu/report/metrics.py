@@ -78,12 +78,6 @@ def level(amplitude: np.ndarray | float, reference: float = 1.0) -> np.ndarray:
     return 20 * np.log10(np.maximum(np.asarray(amplitude, dtype=float) / reference, FLOOR))
 
 
-def level_label(unit: str, reference: float) -> str:
-    """What a level says of itself: "dB re 1 N", "dB re 1 µm/s²"."""
-    number = f"{reference:g} " if reference >= 1e-3 else f"{1e6 * reference:g} µ"
-    return f"dB re {number}{unit.replace('s2', 's²')}"
-
-
 def sample_step(time: np.ndarray) -> float:
     """The even sampling interval of `time` (n,), s; raises MetricsError when steps differ by more than 1e-3 of it."""
     if time.size < 2:

@@ -23,7 +23,7 @@ from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.report.style import round_scale
-from gearfmu.stage.assembly.meshes import direction_of, kind_of, mesh_axes, tooth_phases
+from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage
@@ -40,8 +40,8 @@ HOUSING_TONE = 1.75
 class Drawn:
     """A gear in the view. points (P, 3) m, `teeth` equal sectors of them one after the other; quads (Q, 4) of the first
     sector and whether a point is the next sector's; angle, x, y (F,), z; contacts by mesh: (3, F, C) tooth, roll (m),
-    force (N, negative on flank 1); unit: displacement (2, R, P, 3) m/N under unit loads on the flanks 0 and 1 of tooth
-    0 at rolls (R,); frames (G, P, 3) m at `times` (G,) where the deformation was recorded."""
+    force (N, negative on flank 1); loads: rolls (R,) and displacement (2, R, P, 3) m/N under unit loads there on the
+    flanks 0 and 1 of tooth 0; recorded: times (G,) and frames (G, P, 3) m where the deformation was recorded."""
 
     name: str
     points: np.ndarray
@@ -51,10 +51,8 @@ class Drawn:
     angle: np.ndarray
     place: tuple[np.ndarray, np.ndarray, float]
     contacts: dict[str, np.ndarray] = field(default_factory=dict)
-    rolls: np.ndarray | None = None
-    unit: np.ndarray | None = None
-    times: np.ndarray | None = None
-    frames: np.ndarray | None = None
+    loads: tuple[np.ndarray, np.ndarray] | None = None
+    recorded: tuple[np.ndarray, np.ndarray] | None = None
     extra: np.ndarray | None = None  # (F,) rad: turn per unit of enlargement that keeps loaded flanks together
     tone: float = 0.0  # of a shaft, carrier or housing, drawn rigid: brightness; 0 of a gear
     inside: bool = False  # of a housing: only faces whose inner side is seen, so that it hides no gear
@@ -99,6 +97,43 @@ class View:
         )
 
 
+@dataclass(frozen=True)
+class _Course:
+    """A stage at the times (F,) s of a view."""
+
+    trace: Trace
+    stage: Stage
+    time: np.ndarray
+
+    def angle(self, rotor: str | None) -> np.ndarray | None:
+        """(F,) rad of a rotor in the fixed axes; 0 of one at rest and of none; None where it was not recorded."""
+        if rotor is None or self.stage.rotors[rotor].stands:
+            return np.zeros_like(self.time)
+        name = f"{rotor}{GEAR_PHI}"
+        return np.interp(self.time, self.trace.time, self.trace[name]) if name in self.trace else None
+
+    def carried(self, mesh: EngagementSpec) -> np.ndarray:
+        """Angle (F,) rad of the axes in which an engagement rolls."""
+        return self._known(self.stage.frame_of(mesh))
+
+    def gear(self, name: str, body: Body, phase: float) -> Drawn:
+        """A gear by its picture, without loads; phase: angle of its tooth or space 0, rad, where the stage begins."""
+        own, picture = self.stage.rotors[self.stage.rotor_of(name)], body.picture
+        assert picture is not None
+        about = self._known(None if own.stands else own.carried_by)
+        (x, y), teeth = own.axis, body.toothed.teeth
+        place = x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about), float(own.bodies[name])
+        points, surface = np.asarray(picture.points, float), np.asarray(picture.quads, int)
+        angle = self._known(self.stage.rotor_of(name)) + phase
+        sector = _first_sector(len(points), surface, teeth)
+        return Drawn(name, points, *sector, teeth, angle, place, loads=_unit_loads(picture))
+
+    def _known(self, rotor: str | None) -> np.ndarray:
+        angle = self.angle(rotor)
+        assert angle is not None
+        return angle
+
+
 def moving_view(
     trace: Trace, stage: Stage, bodies: Mapping[str, Body], window: tuple[float, float],
     recorded: Sequence[tuple[DeformedGear, np.ndarray]] = (),
@@ -106,15 +141,14 @@ def moving_view(
     """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: by name;
     recorded: gears with the times (s) of their frames."""
     gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].picture is not None]
-    time = np.linspace(*window, FRAMES)
-    if not gears or any(_rotor_angle(trace, stage, stage.rotor_of(name)) is None for name in gears):
+    course = _Course(trace, stage, np.linspace(*window, FRAMES))
+    if not gears or any(course.angle(stage.rotor_of(name)) is None for name in gears):
         return None
-    phases, made = tooth_phases(stage), {}
-    for name in gears:
-        made[name] = _body(trace, stage, (name, bodies[name]), time, phases[name])
+    phases = tooth_phases(stage)
+    made = {name: course.gear(name, bodies[name], phases[name]) for name in gears}
     for mesh in stage.engagements:
         if f"{mesh.name}.force" in trace and set(mesh.gears) <= set(made):
-            _load(trace, stage, mesh, (made, bodies), time)
+            _load(course, mesh, [made[name] for name in mesh.gears])
     for gear, times in recorded:
         if gear.name in made:
             _record(made[gear.name], gear, times, window)
@@ -122,25 +156,20 @@ def moving_view(
     most = max(_largest(body) for body in made.values())
     if most <= 0:
         return None
-    module = float(stage.gears[0].normal_module)
-    scale = round_scale(SHOWN_FRACTION * module / most)
-    drawn = [*made.values(), *_structure(trace, stage, time), *_housings(stage, bodies)]
-    return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
+    scale = round_scale(SHOWN_FRACTION * float(stage.gears[0].normal_module) / most)
+    drawn = [*made.values(), *_structure(course), *_housings(stage, bodies)]
+    return View(course.time, drawn, scale, most, _close(course), tuple(g.name for g, _ in recorded))
 
 
-def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Drawn]:
+def _structure(course: _Course) -> list[Drawn]:
     """Shafts and carriers whose angle was recorded."""
     found = []
-    for name, rotor, profile, (x, y), z in parts(stage):
-        recorded = _rotor_angle(trace, stage, rotor)
-        if recorded is None:
+    for name, rotor, profile, (x, y), z in parts(course.stage):
+        if (angle := course.angle(rotor)) is None:
             continue
-        angle, axis = np.interp(time, trace.time, recorded), complex(*stage.rotors[rotor].axis)
-        at = axis + complex(x, y) * np.exp(1j * angle)
-        surface = turned(profile)
-        found.append(
-            Drawn(name, *surface, AROUND, angle, (at.real, at.imag, z), tone=BOLT_TONE if "bolt" in name else 1.0)
-        )
+        at = complex(*course.stage.rotors[rotor].axis) + complex(x, y) * np.exp(1j * angle)
+        place, tone = (at.real, at.imag, z), BOLT_TONE if "bolt" in name else 1.0
+        found.append(Drawn(name, *turned(profile), AROUND, angle, place, tone=tone))
     return found
 
 
@@ -152,28 +181,10 @@ def _housings(stage: Stage, bodies: Mapping[str, Body]) -> list[Drawn]:
         if skin is not None:
             points = skin.points.astype(float)
             x, y, z = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            place, surface = (still + x, still + y, float(z)), (points - [x, y, z], skin.faces)
             ahead = np.zeros_like(skin.faces, np.int8)
-            place, centred = (still + x, still + y, float(z)), points - [x, y, z]
-            surface = (centred, skin.faces, ahead)
-            found.append(Drawn(housing.name, *surface, 1, still, place, tone=HOUSING_TONE, inside=True))
+            found.append(Drawn(housing.name, *surface, ahead, 1, still, place, tone=HOUSING_TONE, inside=True))
     return found
-
-
-def _body(trace: Trace, stage: Stage, named: tuple[str, Body], time: np.ndarray, phase: float) -> Drawn:
-    (name, body), rotor = named, stage.rotor_of(named[0])
-    display, carrier = body.picture, stage.rotors[rotor].carried_by
-    assert display is not None
-    turned = _rotor_angle(trace, stage, rotor)
-    assert turned is not None
-    angle, (x, y) = np.interp(time, trace.time, turned), stage.rotors[rotor].axis
-    about = np.zeros_like(time)
-    if carrier is not None and not stage.rotors[rotor].stands:
-        about = np.interp(time, trace.time, trace[f"{carrier}{GEAR_PHI}"])
-    places = (x * np.cos(about) - y * np.sin(about), x * np.sin(about) + y * np.cos(about))
-    points, quads = np.asarray(display.points, float), np.asarray(display.quads, int)
-    teeth = body.toothed.teeth if _periodic(points, quads, body.toothed.teeth) else 1
-    place = (*places, float(stage.rotors[rotor].bodies[name]))
-    return Drawn(name, points, *_first_sector(len(points), quads, teeth), teeth, angle + phase, place)
 
 
 def _first_sector(points: int, quads: np.ndarray, teeth: int) -> tuple[np.ndarray, np.ndarray]:
@@ -182,57 +193,20 @@ def _first_sector(points: int, quads: np.ndarray, teeth: int) -> tuple[np.ndarra
     return first % size, (first // size == 1).astype(np.int8)
 
 
-def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
-    """Angle (n,) rad of a rotor in the fixed axes; a rotor at rest does not turn."""
-    if stage.rotors[rotor].stands:
-        return np.zeros(trace.time.size)
-    return trace[f"{rotor}{GEAR_PHI}"] if f"{rotor}{GEAR_PHI}" in trace else None
-
-
-def _periodic(points: np.ndarray, quads: np.ndarray, teeth: int) -> bool:
-    """Whether points and quads are those of the first sector, repeated."""
-    if len(points) % teeth or len(quads) % teeth:
-        return False
-    size, turn = len(points) // teeth, 2 * math.pi / teeth
-    first = np.tile(points[:size], (teeth, 1))
-    angle = np.repeat(np.arange(teeth) * turn, size)
-    c, s = np.cos(angle), np.sin(angle)
-    turned = np.stack([c * first[:, 0] - s * first[:, 1], s * first[:, 0] + c * first[:, 1], first[:, 2]], axis=1)
-    per = len(quads) // teeth
-    shifted = (np.tile(quads[:per], (teeth, 1)) + size * np.repeat(np.arange(teeth), per)[:, None]) % len(points)
-    return bool(np.allclose(turned, points, atol=1e-6 * np.ptp(points)) and np.array_equal(shifted, quads))
-
-
-def _load(
-    trace: Trace, stage: Stage, mesh: EngagementSpec, gears: tuple[dict[str, Drawn], Mapping[str, Body]],
-    time: np.ndarray,
-) -> None:  # fmt: skip
-    """Add the tooth pairs in contact of an engagement to its two bodies."""
-    made, bodies = gears
-    pair, force = mesh_shape(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
-    carried = _carried(trace, stage, mesh, time)
-    gamma = direction_of(pair, *mesh_axes(stage, mesh))
-    found = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
-    for i in range(time.size):
-        sg = 1 if force[i] >= 0 else -1
-        angles = [made[name].angle[i] - carried[i] - gamma for name in mesh.gears]
-        contacts = contacts_at(pair, angles, sg)[:CONTACTS]
+def _load(course: _Course, mesh: EngagementSpec, gears: Sequence[Drawn]) -> None:
+    """Add the tooth pairs in contact of an engagement to its two gears."""
+    stage, trace, count = course.stage, course.trace, course.time.size
+    pair, force = mesh_shape(stage, mesh), np.interp(course.time, trace.time, trace[f"{mesh.name}.force"])
+    carried, gamma = course.carried(mesh), direction_of(pair, *mesh_axes(stage, mesh))
+    found = [np.zeros((3, count, CONTACTS)) for _ in gears]
+    for i in range(count):
+        angles = [gear.angle[i] - carried[i] - gamma for gear in gears]
+        contacts = contacts_at(pair, angles, 1 if force[i] >= 0 else -1)[:CONTACTS]
         for c, contact in enumerate(contacts):
-            for (tooth, roll, part), number, at in zip(found, contact.teeth, contact.rolls, strict=True):
-                tooth[i, c], roll[i, c], part[i, c] = number, at, force[i] / len(contacts)
-    for name, own in zip(mesh.gears, found, strict=True):
-        body = made[name]
-        body.contacts[mesh.name] = own
-        if body.unit is None:
-            picture = bodies[name].picture
-            assert picture is not None
-            body.rolls, body.unit = _unit_loads(picture)
-
-
-def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
-    """Angle (F,) rad of the axes in which an engagement rolls."""
-    frame = stage.frame_of(mesh)
-    return np.zeros_like(time) if frame is None else np.interp(time, trace.time, trace[f"{frame}{GEAR_PHI}"])
+            for own, number, at in zip(found, contact.teeth, contact.rolls, strict=True):
+                own[:, i, c] = number, at, force[i] / len(contacts)
+    for gear, own in zip(gears, found, strict=True):
+        gear.contacts[mesh.name] = own
 
 
 def _unit_loads(display: Picture) -> tuple[np.ndarray, np.ndarray]:
@@ -260,8 +234,8 @@ def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[fl
     points, quads = gear.surface
     body.points, body.teeth = points @ back, gear.body.toothed.teeth
     body.quads, body.ahead = _first_sector(len(points), quads, body.teeth)
-    body.times, body.frames = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
-    body.contacts, body.unit, body.rolls = {}, None, None
+    body.recorded = times[list(chosen)], np.stack([gear.elastic(k) @ back for k in chosen])
+    body.contacts, body.loads = {}, None
 
 
 def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
@@ -275,7 +249,7 @@ def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
         a, b = (stage.rotor_of(name) for name in mesh.gears)
         behind = np.mean(turned[b], axis=0) if b in turned else np.zeros(FRAMES)
         recede = sum(_recede(made[name], mesh.name, own) for name, own in zip(mesh.gears, pair.gears, strict=True))
-        ratio = kind_of(pair) * pair.gears[1].r_b / pair.gears[0].r_b
+        ratio = pair.side * pair.gears[1].r_b / pair.gears[0].r_b
         turned.setdefault(a, []).append(recede / pair.gears[0].r_b - ratio * behind)
     for name, body in made.items():
         if (own := turned.get(stage.rotor_of(name))) is not None:
@@ -284,13 +258,13 @@ def _turn_together(stage: Stage, made: dict[str, Drawn]) -> None:
 
 def _recede(body: Drawn, mesh: str, geometry: ReferenceGear) -> np.ndarray:
     """(F,) m, signed as the force: how far the loaded flanks of a gear yield at their contacts, mean over them."""
-    if body.unit is None or body.rolls is None or mesh not in body.contacts:
+    if body.loads is None or mesh not in body.contacts:
         return np.zeros(FRAMES)
-    known = zip(body.unit[0], body.rolls, strict=True)
-    yields = np.array([_yield(body.points, unit, geometry, roll) for unit, roll in known])
+    rolls, (first, _) = body.loads
+    yields = np.array([_yield(body.points, unit, geometry, roll) for unit, roll in zip(first, rolls, strict=True)])
     _, roll, force = body.contacts[mesh]
     count = np.maximum((force != 0).sum(axis=1), 1)
-    return np.asarray((force * np.interp(roll, body.rolls, yields)).sum(axis=1) / count)
+    return np.asarray((force * np.interp(roll, rolls, yields)).sum(axis=1) / count)
 
 
 def _yield(points: np.ndarray, unit: np.ndarray, geometry: ReferenceGear, roll: float) -> float:
@@ -303,22 +277,23 @@ def _yield(points: np.ndarray, unit: np.ndarray, geometry: ReferenceGear, roll: 
 
 def _largest(body: Drawn) -> float:
     """Largest displacement (m) at any frame."""
-    if body.frames is not None:
-        return float(np.linalg.norm(body.frames, axis=2).max())
-    if body.unit is None or body.rolls is None:
+    if body.recorded is not None:
+        return float(np.linalg.norm(body.recorded[1], axis=2).max())
+    if body.loads is None:
         return 0.0
-    size, rolls = np.linalg.norm(body.unit, axis=3).max(axis=(0, 2)), body.rolls
+    rolls, unit = body.loads
+    size = np.linalg.norm(unit, axis=3).max(axis=(0, 2))
     found = (float(np.abs(np.interp(roll, rolls, size) * f).max()) for _, roll, f in body.contacts.values())
     return max(found, default=0.0)
 
 
-def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _close(course: _Course) -> tuple[np.ndarray, np.ndarray, float]:
     """Pitch point of the first engagement, x and y (F,) m, and a radius (m) around it."""
-    mesh = stage.engagements[0]
+    stage, mesh = course.stage, course.stage.engagements[0]
     (x, y), (u, v) = mesh_axes(stage, mesh)
-    pair = mesh_shape(stage, mesh)
-    part = pair.gears[0].z / (pair.gears[0].z + pair.gears[1].z)
-    at = complex(x + part * (u - x), y + part * (v - y)) * np.exp(1j * _carried(trace, stage, mesh, time))
+    a, b = mesh_shape(stage, mesh).gears
+    part = a.z / (a.z + b.z)
+    at = complex(x + part * (u - x), y + part * (v - y)) * np.exp(1j * course.carried(mesh))
     return at.real, at.imag, 4.0 * float(stage.gears[0].normal_module)
 
 
@@ -335,14 +310,16 @@ def _numbers(body: Drawn, pack: Pack) -> dict[str, Any]:
     }  # fmt: skip
     if body.extra is not None:
         found["extra"] = pack.add(body.extra)
-    if body.frames is not None and body.times is not None:
-        scale = float(np.abs(body.frames).max()) / STEPS or 1.0
-        frames = np.rint(body.frames / scale).astype(np.int8)
-        found |= {"times": pack.add(body.times), "frames": pack.add_raw(frames.ravel()), "step": scale}
-    elif body.unit is not None and body.rolls is not None:
-        scale = float(np.abs(body.unit).max()) / STEPS
-        unit = np.rint(body.unit / scale).astype(np.int8)
-        found |= {"rolls": pack.add(body.rolls), "unit": pack.add_raw(unit.ravel()), "step": scale}
+    if body.recorded is not None:
+        times, frames = body.recorded
+        scale = float(np.abs(frames).max()) / STEPS or 1.0
+        steps = np.rint(frames / scale).astype(np.int8)
+        found |= {"times": pack.add(times), "frames": pack.add_raw(steps.ravel()), "step": scale}
+    elif body.loads is not None and body.contacts:
+        rolls, unit = body.loads
+        scale = float(np.abs(unit).max()) / STEPS
+        steps = np.rint(unit / scale).astype(np.int8)
+        found |= {"rolls": pack.add(rolls), "unit": pack.add_raw(steps.ravel()), "step": scale}
         found["contacts"] = [
             {
                 "tooth": pack.add_raw(tooth.astype(np.int32).ravel()), "most": CONTACTS,

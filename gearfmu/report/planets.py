@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Panel, Plot, over_time
 from gearfmu.report.plots import columns, pin_force
-from gearfmu.report.signals import PlanetSet, Window, mesh_speed, recorded
+from gearfmu.report.run import Run
+from gearfmu.report.signals import PlanetSet
 from gearfmu.stage.run.trace import Trace
 
 
@@ -34,50 +34,34 @@ def _opened(part: Trace, own: PlanetSet) -> str:
     return f"Magnitudes. Teeth apart in this share of the samples: {words or 'none'}."
 
 
-def shares(trace: Trace, own: PlanetSet, window: Window) -> tuple[dict[str, np.ndarray], dict[str, float]]:
-    """Share of every engagement in the force of its central gear, 1 where all planets carry alike: over time (n,), mean
-    over one mesh period, NaN where that would reach beyond the run; and mean over `window`."""
-    period = max(1, round(2 * np.pi / mesh_speed(trace, own) / metrics.sample_step(trace.time)))
-    inside = (trace.time >= window.start) & (trace.time <= window.end)
-    over_time, means = {}, {}
-    for meshes in own.meshes.values():
-        smooth = {mesh: _running_mean(np.abs(_force(trace, mesh)), period) for mesh in meshes.values()}
-        total = np.maximum(sum(smooth.values()), 1e-9)
-        part = {mesh: float(np.mean(np.abs(_force(trace, mesh)[inside]))) for mesh in meshes.values()}
-        for mesh, values in smooth.items():
-            over_time[mesh] = len(meshes) * values / total
-            means[mesh] = len(meshes) * part[mesh] / max(sum(part.values()), 1e-9)
-    return over_time, means
-
-
-def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+def sharing(run: Run, own: PlanetSet) -> Plot:
     """Share of every planet in the load of sun and ring."""
-    over_time_, means = shares(trace, own, window)
+    (shares, means), time, window = run.shares, run.trace.time, run.window
     panels = []
     for central, meshes in own.meshes.items():
-        curves = [Curve(trace.time, over_time_[m], f"{planet}: {means[m]:.3f}") for planet, m in meshes.items()]
+        curves = [Curve(time, shares[m], f"{planet}: {means[m]:.3f}") for planet, m in meshes.items()]
         limits = _limits([curve.y for curve in curves], LEAST_SPAN)
         panels.append(Panel(f"share at the {central}", tuple(curves), limits=limits, height=160))
     caption = (
         "Mesh force over the mean of all planets, running mean over one mesh period; in the legend the mean from "
         f"{window.start:.3g} s to {window.end:.3g} s ({window.reason})."
     )
-    data = {"time_[s]": trace.time} | {f"{mesh}_share": values for mesh, values in over_time_.items()}
+    data = {"time_[s]": time} | {f"{mesh}_share": values for mesh, values in shares.items()}
     return Plot("sharing", "Load sharing", caption, over_time(panels), data)
 
 
-def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+def planets(run: Run, own: PlanetSet) -> Plot:
     """One row a planet: its mesh forces over the last mesh periods, its shares and the force on its pin over the
     run."""
-    shared, means = shares(trace, own, window)
-    late = trace.window(*detail_window(trace, own, window))
+    trace, window, (shares, means) = run.trace, run.window, run.shares
+    late = trace.window(*run.detail(""))
     data, rows = {"time_[s]": trace.time}, []
     for planet in own.planets:
         meshes = {central: own_meshes[planet] for central, own_meshes in own.meshes.items() if planet in own_meshes}
         forces = [Curve(late.time, 1e-3 * np.abs(late[f"{m}.force"]), central, "kN") for central, m in meshes.items()]
-        parts = [Curve(trace.time, shared[m], f"{central} {means[m]:.3f}") for central, m in meshes.items()]
+        parts = [Curve(trace.time, shares[m], f"{central} {means[m]:.3f}") for central, m in meshes.items()]
         for central, mesh in meshes.items():
-            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shared[mesh]}
+            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shares[mesh]}
         pin = []
         if (pressed := pin_force(trace, planet)) is not None:
             pin = [Curve(trace.time, 1e-3 * pressed, f"mean {np.mean(pressed):.4g} N", "kN", colour=2)]
@@ -112,21 +96,3 @@ def _limits(curves: Sequence[np.ndarray], least: float) -> tuple[float, float] |
     low, high = float(values.min()), float(values.max())
     edge = max(0.05 * (high - low), 0.5 * (least - (high - low))) or 0.05 * abs(high) or 1.0
     return low - edge, high + edge
-
-
-def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float = 8) -> tuple[float, float]:
-    """The last mesh periods (s) of the run, within `window`."""
-    width = periods * 2 * np.pi / mesh_speed(trace, own)
-    return max(window.start, window.end - width), window.end
-
-
-def _force(trace: Trace, mesh: str) -> np.ndarray:
-    return trace[recorded(trace, f"{mesh}.force")]
-
-
-def _running_mean(values: np.ndarray, width: int) -> np.ndarray:
-    """(n,): mean over `width` samples around each; NaN at the ends, where there are fewer."""
-    found, width = np.full(values.size, np.nan), min(width, values.size)
-    before = (width - 1) // 2
-    found[before : before + values.size - width + 1] = np.convolve(values, np.full(width, 1.0 / width), "valid")
-    return found

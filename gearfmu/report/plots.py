@@ -41,15 +41,13 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     return Plot("torque", title, caption, over_time(panels), columns(trace, clutch + others + slips))
 
 
-def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot | None:
-    """Speeds in rpm; None when nothing turns. groups: names of rotors that share a panel, with their signs; without
+def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot:
+    """Speeds in rpm of what turns. groups: names of rotors that share a panel, with their signs; without
     groups everything that turns, each once, by magnitude."""
     turning = [n for n in trace.channels if n.endswith(".w") and trace.channels[n].unit == "rad/s"]
     of_groups = [[n for rotor in own if (n := f"{rotor}{GEAR_SPEED}") in trace and np.any(trace[n])] for own in groups]
-    rows = [row for row in of_groups if row] if groups else [distinct(trace, turning)]
+    rows = [row for row in of_groups or [distinct(trace, turning)] if row]
     names = [name for row in rows for name in row]
-    if not names:
-        return None
     panels = []
     for row in rows:
         curves = (Curve(trace.time, (trace[n] if groups else np.abs(trace[n])) * RPM, n, "rpm") for n in row)
@@ -59,13 +57,11 @@ def speeds(trace: Trace, groups: Sequence[Sequence[str]] = ()) -> Plot | None:
     return Plot("set_speed" if groups else "speed", "Speeds", words, over_time(panels), columns(trace, names))
 
 
-def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | None = None) -> Plot | None:
+def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | None = None) -> Plot:
     """Force and transmission error of an engagement over the run or a window (s); shaded where its teeth are apart or
-    on the coast flanks; None without either channel."""
+    on the coast flanks."""
     scales = {f"{mesh}.force": (1e-3, "mesh force in kN"), f"{mesh}.te": (1e6, "transmission error in µm")}
     names = [name for name in scales if name in trace]
-    if not names:
-        return None
     part = trace if window is None else trace.window(*window)
     state = _by_flank(trace, part, mesh) if f"{mesh}.contact" in part else None
     shaded = () if state is None else tuple(_contact(part.time, state))
@@ -86,14 +82,12 @@ def of_mesh(trace: Trace, mesh: str, title: str) -> str:
     return f"{title}, {mesh_words(mesh)}" if len(meshes(trace)) > 1 else title
 
 
-def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
-    """Bearing forces x and y of every bearing over time; None without them. carried: of a planetary set."""
+def bearing_forces(trace: Trace, carried: bool = False) -> Plot:
+    """Bearing forces x and y of every bearing over time. carried: of a planetary set."""
     groups = {b: found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])}
     floor = noise_floor(trace)
     quiet = [name for name, own in groups.items() if all(np.abs(trace[channel]).max() < floor for channel in own)]
     groups = {name: own for name, own in groups.items() if name not in quiet}
-    if not groups:
-        return None
     panels = [Panel(f"{name}: force in kN", channels(trace, found, 1e-3, "kN")) for name, found in groups.items()]
     names = [name for found in groups.values() for name in found]
     caption = "Force of the shaft on its bearing, along the axes x and y of the stage."
@@ -105,8 +99,8 @@ def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
     return Plot("bearing", "Bearing forces", caption, over_time(panels), columns(trace, names))
 
 
-def axial_and_tilting(trace: Trace) -> Plot | None:
-    """Axial forces and tilting moments of bearings and pins over time; None where there are hardly any, as of spur
+def axial_and_tilting(trace: Trace) -> Plot:
+    """Axial forces and tilting moments of bearings and pins over time; no panels where there are hardly any, as of spur
     gears."""
     floor, panels, names = noise_floor(trace), [], []
     for kind, where in (("bearing", "on bearings"), ("pin", "on the planets' pins")):
@@ -119,8 +113,6 @@ def axial_and_tilting(trace: Trace) -> Plot | None:
             if own:
                 panels.append(Panel(label, channels(trace, own, scale, label.rsplit(maxsplit=1)[-1]), height=170))
                 names += own
-    if not panels:
-        return None
     caption = "Along and about the fixed axes x, y and z; those of pins turn with the carrier."
     title = "Axial forces and tilting moments"
     return Plot("axial", title, caption, over_time(panels), columns(trace, names))

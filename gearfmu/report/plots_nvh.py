@@ -3,76 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits, over_time
+from gearfmu.report.kinds import ACCELERATIONS, FORCES, Kind, averaging, by_part, force_channels
 from gearfmu.report.names import shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import (
-    GEAR_SPEED,
-    PlanetSet,
-    Window,
-    bearings,
-    mesh_speed,
-    meshes,
-    noise_floor,
-    on_mounts,
-    recorded,
-    steady,
-)
+from gearfmu.report.run import Run
+from gearfmu.report.signals import GEAR_SPEED, PlanetSet, bearings, mesh_speed, meshes, on_mounts, recorded, steady
 from gearfmu.stage.run.trace import Trace
 
-RANGE_DB = 90
+RANGE_DB, SHOWN_DB = 90, 60  # of maps over time, over speed
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 LOOKS = ("dashed", "dotted")  # of the orders of one mesh and the next
 MOST_ROWS, MOST_COLUMNS = 400, 700  # of a map in the page
-SENSOR = "sensor."
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 MARKED_ORDERS = 12  # of a set
 SHOWN_TO = 12e3  # Hz; the data reach half the sampling rate
-
-
-@dataclass(frozen=True)
-class Kind:
-    """Of signals: prefix of the names of their figures, title of their spectra, unit, reference of levels."""
-
-    prefix: str
-    spectra: str
-    unit: str = "N"
-    reference: float = 1.0
-
-    @property
-    def label(self) -> str:
-        """Of a level."""
-        return metrics.level_label(self.unit, self.reference)
-
-    def level(self, amplitude: np.ndarray) -> np.ndarray:
-        """Level in dB."""
-        return metrics.level(amplitude, self.reference)
-
-
-FORCES = Kind("", "Spectra of the forces")
-ACCELERATIONS = Kind("housing_", "Spectra of the accelerations of the housing", "m/s2", 1e-6)  # ISO 1683
-
-
-def force_channels(trace: Trace) -> list[str]:
-    """The channels whose sound matters: bearing forces, then mesh forces. Where the mean over the communication step
-    was recorded ("…_mean") it replaces the sample at its end: averaging weakens folded parts. Forces that
-    cancel are left out (`noise_floor`)."""
-    names = [f"bearing.{name}.{direction}" for name in bearings(trace) for direction in ("fx", "fy")]
-    names += [f"{mesh}.force" for mesh in meshes(trace)]
-    best = [next((n for n in (f"{name}_mean", name) if n in trace), None) for name in names]
-    floor = noise_floor(trace)
-    return [name for name in best if name is not None and np.abs(trace[name]).max() >= floor]
-
-
-def averaging(trace: Trace, name: str) -> float:
-    """Time (s) over which a sample of the channel is a mean: the communication step of "…_mean" and sensors, else 0."""
-    return metrics.sample_step(trace.time) if name.endswith("_mean") or name.startswith(SENSOR) else 0.0
 
 
 def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spectrum:
@@ -81,26 +31,19 @@ def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spec
     return metrics.amplitude_spectrum(part[name], step, size, averaging(part, name))
 
 
-def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+def spectra_by_central(run: Run, own: PlanetSet) -> Plot:
     """Spectra of the mesh forces and of the ring's force on its mounts along fixed axes. Marked: mesh orders k f_m, and
     around each the sidebands of the planets' passing, k f_m ± N f_c (N planets, f_c: carrier)."""
-    part = trace.window(window.start, window.end)
-    groups = {f"meshes of the {c}": [f"{mesh}.force" for mesh in meshes.values()] for c, meshes in own.meshes.items()}
-    groups |= {"ring on its mounts": fixed} if (fixed := list(on_mounts(part))) else {}
+    part, window = run.part, run.window
+    groups = {f"meshes of the {c}: ": [f"{m}.force" for m in meshes.values()] for c, meshes in own.meshes.items()}
+    groups |= {"ring on its mounts: ": fixed} if (fixed := list(on_mounts(part))) else {}
     used = {name: recorded(part, name) for group in groups.values() for name in group}
-    spectra = {name: spectrum_of(part, best, segment(part.time.size, 1)) for name, best in used.items()}
+    found = {name: spectrum_of(part, best, segment(part.time.size, 1)) for name, best in used.items()}
     mesh_frequency = mesh_speed(part, own) / (2 * np.pi)
     speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
     carrier = float(np.median(speed)) / (2 * np.pi)
-    is_steady = steady(speed)
-    top = min(SHOWN_TO, 0.5 / metrics.sample_step(part.time))
-    marks = _side_marks(mesh_frequency, len(own.planets) * carrier, top) if is_steady else []
-    panels = [
-        _levels({name: spectra[name] for name in group}, top, marks, FORCES, f"{title}: ")
-        for title, group in groups.items()
-    ]
-    chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
-    first = next(iter(spectra.values()))
+    marks = _side_marks(mesh_frequency, len(own.planets) * carrier, _top(part)) if steady(speed) else []
+    first = next(iter(found.values()))
     caption = (
         f"Rms amplitude of each line, Hann, resolution {first.resolution:.3g} Hz, {window.start:.3g} s to "
         f"{window.end:.3g} s ({window.reason}). "
@@ -108,11 +51,12 @@ def spectra_by_central(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     caption += (
         f"Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: k·f_m ± {len(own.planets)} f_c, "
         f"f_c = {carrier:.2f} Hz of the carrier."
-        if is_steady
+        if steady(speed)
         else "Mesh orders are not marked: the speed is not steady."
     )
-    data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in spectra.items()}
-    return Plot("spectrum", "Spectra of the forces", caption, chart, data)
+    data = {"frequency_[Hz]": first.frequency} | {f"{used[n]}_rms_[N]": s.amplitude for n, s in found.items()}
+    parts = [(of, {name: found[name] for name in group}) for of, group in groups.items()]
+    return Plot("spectrum", FORCES.spectra, caption, _over_frequency(parts, _top(part), marks, FORCES), data)
 
 
 def _side_marks(mesh_frequency: float, passing: float, top: float) -> list[Mark]:
@@ -124,27 +68,15 @@ def _side_marks(mesh_frequency: float, passing: float, top: float) -> list[Mark]
     return found
 
 
-def loudest_sensors(trace: Trace) -> list[str]:
-    """Of every sensor the direction that moves most."""
-    names = [name for name in trace.channels if name.startswith(SENSOR) and np.any(trace[name])]
-    return [max(own, key=lambda name: float(np.std(trace[name]))) for own in _by_part(names)]
-
-
-def spectra(
-    trace: Trace, window: Window, angles: Mapping[str, np.ndarray], names: Sequence[str], kind: Kind
-) -> Plot | None:
-    """Level of channels over frequency, mesh orders marked; None without channels. angles: mesh angle (n,) rad by
-    engagement."""
+def spectra(run: Run, names: Sequence[str], kind: Kind) -> Plot | None:
+    """Level of channels over frequency, mesh orders marked; None without channels."""
     if not names:
         return None
-    part = trace.window(window.start, window.end)
-    step = metrics.sample_step(part.time)
+    trace, part, window = run.trace, run.part, run.window
     own = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
-    top = min(SHOWN_TO, 0.5 / step)
-    found = {mesh: _order_marks(part.time, trace, (mesh, angle), top) for mesh, angle in angles.items()}
+    found = {mesh: _order_marks(run, mesh, _top(part)) for mesh in run.angles}
     marked, marks = [mesh for mesh in found if found[mesh]], [mark for own in found.values() for mark in own]
-    panels = [_levels({name: own[name] for name in group}, top, marks, kind) for group in _by_part(names)]
-    chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
+    groups = [("", {name: own[name] for name in group}) for group in by_part(names)]
     first = next(iter(own.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
@@ -160,27 +92,27 @@ def spectra(
     for name, spectrum in own.items():
         data[f"{name}_rms_[{kind.unit}]"] = spectrum.amplitude
         data[f"{name}_[{kind.label}]"] = kind.level(spectrum.amplitude)
-    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, chart, data)
+    return Plot(f"{kind.prefix}spectrum", kind.spectra, caption, _over_frequency(groups, _top(part), marks, kind), data)
 
 
-def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
+def order_cuts(run: Run, mesh: str) -> Plot | None:
     """Level of the first orders of an engagement in its force and every bearing force along the run; None without
-    forces. mesh_angle (n,) rad: of this engagement."""
-    others = tuple(f"{other}." for other in meshes(trace) if other != mesh)
-    names = [name for name in force_channels(trace) if not name.startswith(others)]
-    names = [name for name in names if ".fx" not in name or len(bearings(trace)) < 2]
-    return cuts(trace, (mesh, mesh_angle), names, FORCES)
+    forces."""
+    others = tuple(f"{other}." for other in meshes(run.trace) if other != mesh)
+    names = [name for name in force_channels(run.trace) if not name.startswith(others)]
+    names = [name for name in names if ".fx" not in name or len(bearings(run.trace)) < 2]
+    return cuts(run, mesh, names, FORCES)
 
 
-def cuts(trace: Trace, of: tuple[str, np.ndarray], names: Sequence[str], kind: Kind) -> Plot | None:
-    """Level of the first orders of an engagement (name, mesh angle (n,) rad) in channels along the run; None without
-    channels. MetricsError where not even the first order lies below the sampling limit anywhere in the run."""
-    mesh, mesh_angle = of
+def cuts(run: Run, mesh: str, names: Sequence[str], kind: Kind) -> Plot | None:
+    """Level of the first orders of an engagement in channels along the run; None without channels. MetricsError where
+    not even the first order lies below the sampling limit anywhere in the run."""
     if not names:
         return None
+    trace, angle = run.trace, run.angles[mesh]
     file = f"{kind.prefix}orders" if len(meshes(trace)) < 2 else f"{kind.prefix}orders_{mesh}"
     found = {
-        name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS, averaged=averaging(trace, name))
+        name: metrics.order_cuts(trace.time, trace[name], angle, ORDERS, averaged=averaging(trace, name))
         for name in names
     }
     first = next(iter(found.values()))
@@ -208,9 +140,10 @@ def cuts(trace: Trace, of: tuple[str, np.ndarray], names: Sequence[str], kind: K
     return Plot(file, title, caption, over_time(panels), data)
 
 
-def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | None:
+def force_spectrogram(run: Run) -> Plot | None:
     """Level of one force over time and frequency with the mesh orders on top: a bearing force, or in a coarsely sampled
-    trace a mean over the step, which folds less; None without forces. angles: mesh angle (n,) rad by engagement."""
+    trace a mean over the step, which folds less; None without forces."""
+    trace = run.trace
     names = force_channels(trace)
     if not names:
         return None
@@ -222,21 +155,18 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     picture_data = metrics.spectrogram(trace[name], step, window_size, hop, averaging(trace, name))
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
-    values, limit = metrics.level(picture_data.amplitude), min(SHOWN_TO, 0.5 / step)
-    top, time = float(np.ceil(values.max() / 5) * 5), picture_data.time + trace.time[0]
-    shown_to = picture_data.frequency <= limit
-    heat = heat_of(time, picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T, (top - RANGE_DB, top))
-    rays = [
-        curve
-        for k, own in enumerate(angles.items())
-        for curve in _order_curves(trace, own, LOOKS[k % len(LOOKS)], limit)
-    ]
+    values, limit = metrics.level(picture_data.amplitude), _top(trace)
+    time, shown_to = picture_data.time + trace.time[0], picture_data.frequency <= limit
+    kept = picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T
+    heat = heat_of(time, *kept, values.max(), span=RANGE_DB)
+    looks = {mesh: LOOKS[k % len(LOOKS)] for k, mesh in enumerate(run.angles)}
+    rays = [curve for mesh, look in looks.items() for curve in _order_curves(run, mesh, look, limit)]
     limits = (float(time[0]), float(time[-1]))
     panel = Panel(f"{shown(name)}: frequency in kHz", tuple(rays), heat, height=300, limits=(0.0, limit / 1e3))
     chart = Chart((panel,), group="time", x_limits=limits)
     caption = (
         f"{name}; Hann windows of {window_size * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
-        f"Dashed: orders {' and, dotted, '.join(f'of {mesh}' for mesh in angles) or 'of the mesh'} from the speed."
+        f"Dashed: orders {' and, dotted, '.join(f'of {mesh}' for mesh in run.angles) or 'of the mesh'} from the speed."
     )
     data = {
         "time_[s]": np.repeat(time, picture_data.frequency.size),
@@ -246,18 +176,9 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     return Plot("spectrogram", "Spectrogram", caption, chart, data)
 
 
-def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
-    """Octave-band levels in dB re 1 N by channel over `window`, from one full-length Hann window."""
-    part = trace.window(window.start, window.end)
-    return {name: metrics.octave_levels(spectrum_of(part, name)) for name in force_channels(trace)}
-
-
-def _by_part(names: Sequence[str]) -> list[list[str]]:
-    """The channels of one bearing, or of the mesh, share a panel."""
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(name.rsplit(".", 1)[0], []).append(name)
-    return list(groups.values())
+def octave_table(run: Run) -> dict[str, dict[float, float]]:
+    """Octave-band levels in dB re 1 N by channel over the run's window, from one full-length Hann window."""
+    return {name: metrics.octave_levels(spectrum_of(run.part, name)) for name in force_channels(run.trace)}
 
 
 def segment(samples: int, windows: int = 3) -> int:
@@ -286,13 +207,14 @@ def sampling_warning(trace: Trace) -> str | None:
 
 
 def heat_of(
-    x: np.ndarray, y: np.ndarray, levels: np.ndarray, limits: tuple[float, float], unit: str = "dB re 1 N"
+    x: np.ndarray, y: np.ndarray, levels: np.ndarray, top: float, unit: str = "dB re 1 N", span: float = SHOWN_DB
 ) -> Heat:
-    """A map of levels (Y, X) dB over ascending or descending x (X,) and y (Y,): of neighbours beyond MOST_COLUMNS and
-    MOST_ROWS the largest, so that no line is lost."""
+    """A map of levels (Y, X) dB over ascending or descending x (X,) and y (Y,), shown from `top`, rounded up to 5 dB,
+    `span` down: of neighbours beyond MOST_COLUMNS and MOST_ROWS the largest, so that no line is lost."""
+    top = float(np.ceil(top / 5) * 5)
     levels, x = _largest_of(levels.T, x, MOST_COLUMNS)
     levels, y = _largest_of(levels.T, y, MOST_ROWS)
-    return Heat(x, y, levels, *limits, unit)
+    return Heat(x, y, levels, top - span, top, unit)
 
 
 def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -304,12 +226,20 @@ def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarr
     return np.fmax.reduceat(levels, starts, axis=0), np.add.reduceat(at, starts) / counts
 
 
-def _levels(
-    spectra: Mapping[str, metrics.Spectrum], top: float, marks: Sequence[Mark], kind: Kind, of: str = ""
-) -> Panel:
-    """A panel of levels over frequency (kHz) up to `top` (Hz)."""
-    curves = tuple(spectrum_curve(name, own, top, kind) for name, own in spectra.items())
-    return Panel(f"{of}level in {kind.label}", curves, marks=tuple(marks), limits=level_limits(curves))
+def _top(part: Trace) -> float:
+    """The highest frequency that is shown, Hz."""
+    return min(SHOWN_TO, 0.5 / metrics.sample_step(part.time))
+
+
+def _over_frequency(
+    groups: Sequence[tuple[str, Mapping[str, metrics.Spectrum]]], top: float, marks: Sequence[Mark], kind: Kind
+) -> Chart:
+    """Levels over frequency (kHz) up to `top` (Hz), one panel for each group: what it is of, spectra by channel."""
+    panels = []
+    for of, found in groups:
+        curves = tuple(spectrum_curve(name, own, top, kind) for name, own in found.items())
+        panels.append(Panel(f"{of}level in {kind.label}", curves, marks=tuple(marks), limits=level_limits(curves)))
+    return Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
 
 
 def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float, kind: Kind = FORCES) -> Curve:
@@ -319,27 +249,27 @@ def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float, kind: Kind
     return Curve(spectrum.frequency[inside] / 1e3, level, name, kind.label)
 
 
-def _order_marks(time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray], top: float) -> list[Mark]:
-    """Marks of the orders of an engagement (name, mesh angle) at the median speed below `top` (Hz), where the speed
-    over time (n,) s is steady; else none."""
-    name, angle = mesh
-    frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
+def _order_marks(run: Run, mesh: str, top: float) -> list[Mark]:
+    """Marks of the orders of an engagement at the median speed below `top` (Hz), where the speed within the window is
+    steady; else none."""
+    time, angle = run.trace.time, run.angles[mesh]
+    frequency = np.interp(run.part.time, time, np.gradient(angle, time)) / (2 * np.pi)
     if not steady(frequency):
         return []
-    several, middle = len(meshes(trace)) > 1, np.percentile(frequency, 50)
+    several, middle = len(meshes(run.trace)) > 1, np.percentile(frequency, 50)
     highest = min(int(top / middle), 3 if several else 24)
-    return [Mark(k * middle / 1e3, f"{name} {k}" if several else str(k)) for k in range(1, highest + 1)]
+    return [Mark(k * middle / 1e3, f"{mesh} {k}" if several else str(k)) for k in range(1, highest + 1)]
 
 
-def _order_curves(trace: Trace, mesh: tuple[str, np.ndarray], look: str, limit: float) -> list[Curve]:
-    """Frequency (kHz) of the first orders of an engagement (name, mesh angle) below `limit` (Hz)."""
-    name, angle = mesh
-    frequency = np.gradient(angle, trace.time) / (2 * np.pi)
-    thin = slice(None, None, max(1, trace.time.size // MOST_COLUMNS))
+def _order_curves(run: Run, mesh: str, look: str, limit: float) -> list[Curve]:
+    """Frequency (kHz) of the first orders of an engagement below `limit` (Hz)."""
+    time = run.trace.time
+    frequency = np.gradient(run.angles[mesh], time) / (2 * np.pi)
+    thin = slice(None, None, max(1, time.size // MOST_COLUMNS))
     found = []
     for order in range(1, ORDERS + 1):
         curve = np.where(order * frequency < limit, order * frequency, np.nan)
         if np.any(np.isfinite(curve)):
-            words = f"order {order}" if len(meshes(trace)) < 2 else f"{name} order {order}"
-            found.append(Curve(trace.time[thin], curve[thin] / 1e3, words, "kHz", look))
+            words = f"order {order}" if len(meshes(run.trace)) < 2 else f"{mesh} order {order}"
+            found.append(Curve(time[thin], curve[thin] / 1e3, words, "kHz", look))
     return found

@@ -6,12 +6,12 @@ import numpy as np
 
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits
+from gearfmu.report.kinds import Kind
 from gearfmu.report.names import shown
 from gearfmu.report.plots import RPM
-from gearfmu.report.plots_nvh import Kind, heat_of
+from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.runup import RunUp, Signal
 
-SHOWN_DB = 60
 BINS = 160  # windows of the frequency map over the run
 CROSSED = " Circles: where an order meets a natural frequency of the stage, linearised under its mean load, that a "
 CROSSED += "transmission error drives."
@@ -120,8 +120,7 @@ def _column(run: RunUp, name: str) -> str:
 def _heat(x: np.ndarray, y: np.ndarray, amplitude: np.ndarray, own: Signal) -> Heat:
     """A map of amplitude (Y, X) rms, from the highest level SHOWN_DB down."""
     values = own.kind.level(amplitude)
-    top = float(np.ceil(np.nanpercentile(values, 99.9) / 5) * 5)
-    return heat_of(x, y, values, (top - SHOWN_DB, top), own.kind.label)
+    return heat_of(x, y, values, float(np.nanpercentile(values, 99.9)), own.kind.label)
 
 
 def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, kind: Kind, number: int) -> Curve:

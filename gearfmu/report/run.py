@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,25 +11,24 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.report.mesh_cycle import static_loads
-from gearfmu.report.metrics import MetricsError
-from gearfmu.report.planets import shares
+from gearfmu.errors import ModelError, SimulationError
+from gearfmu.report import signals
+from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
-from gearfmu.report.signals import (
-    PlanetSet,
-    Window,
-    known_meshings,
-    mesh_angles,
-    meshes,
-    planet_set,
-    window_of_interest,
-)
+from gearfmu.stage import assemble
 from gearfmu.stage.run.deformation import Deformation
-from gearfmu.stage.run.flank_loads import FlankLoads
+from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import Meshing
+
+LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
+POSITIONS, POSITIONS_OF_SET = 24, 16  # over a pitch: a set solves all its meshes at each
+PERIODS, PERIODS_OF_SET = 6, 8  # of a mesh, seen in detail
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class Run:
     deformation: Deformation | None = None
 
     @cached_property
-    def window(self) -> Window:
+    def window(self) -> signals.Window:
         """The part that results and spectra are taken from."""
-        return window_of_interest(self.trace)
+        return signals.window_of_interest(self.trace)
 
     @cached_property
     def part(self) -> Trace:
@@ -60,26 +60,47 @@ class Run:
     @cached_property
     def known(self) -> dict[str, Meshing]:
         """Meshing by engagement."""
-        return known_meshings(self.trace, self.spec)
+        return signals.known_meshings(self.trace, self.spec)
 
     @cached_property
-    def planets(self) -> PlanetSet | None:
+    def planets(self) -> signals.PlanetSet | None:
         """The planetary set, None for other stages."""
-        return planet_set(self.trace, self.known)
+        return signals.planet_set(self.trace, self.known)
 
     @cached_property
+    def shares(self) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+        """Share of every engagement in the force of its central gear, 1 where all planets carry alike: over time (n,),
+        mean over one mesh period, NaN where that would reach beyond the run; and mean over the window. Empty for other
+        stages; MetricsError for samples that are not even."""
+        over_time: dict[str, np.ndarray] = {}
+        means: dict[str, float] = {}
+        if self.planets is None:
+            return over_time, means
+        trace, window = self.trace, self.window
+        period = max(1, round(2 * np.pi / signals.mesh_speed(trace, self.planets) / sample_step(trace.time)))
+        inside = (trace.time >= window.start) & (trace.time <= window.end)
+        for own in self.planets.meshes.values():
+            force = {mesh: np.abs(trace[signals.recorded(trace, f"{mesh}.force")]) for mesh in own.values()}
+            smooth = {mesh: signals.running_mean(values, period) for mesh, values in force.items()}
+            total = np.maximum(sum(smooth.values()), 1e-9)
+            part = {mesh: float(np.mean(values[inside])) for mesh, values in force.items()}
+            for mesh, values in smooth.items():
+                over_time[mesh] = len(own) * values / total
+                means[mesh] = len(own) * part[mesh] / max(sum(part.values()), 1e-9)
+        return over_time, means
+
+    @property
     def mean_shares(self) -> dict[str, float]:
-        """Share of every planet in the force of its central gear by engagement, mean over the window; empty for other
-        stages and for samples that are not even."""
+        """The means of `shares`; empty for samples that are not even."""
         try:
-            return {} if self.planets is None else shares(self.trace, self.planets, self.window)[1]
+            return self.shares[1]
         except MetricsError:
             return {}
 
     @cached_property
     def angles(self) -> dict[str, np.ndarray]:
         """Mesh angle (n,) rad by engagement."""
-        return mesh_angles(self.trace, self.spec)
+        return signals.mesh_angles(self.trace, self.spec)
 
     @cached_property
     def stage(self) -> Stage | None:
@@ -89,17 +110,34 @@ class Run:
     @cached_property
     def shown_meshes(self) -> list[str]:
         """Engagements with statics in the report: all, of a set the first of every central gear."""
-        forces = [mesh for mesh in meshes(self.trace) if f"{mesh}.force" in self.trace]
+        forces = [mesh for mesh in signals.meshes(self.trace) if f"{mesh}.force" in self.trace]
         if self.planets is None:
             return forces
         return [next(iter(own.values())) for own in self.planets.meshes.values()]
 
     @cached_property
     def statics(self) -> tuple[dict[str, FlankLoads], list[str]]:
-        """Statics under the run's mean load by engagement, and why some are missing; empty without stage and bodies."""
+        """Statics of engagements under the mean mesh force that each has over the window, and in words why others are
+        not there; those with hardly a load are left out. Empty without stage and bodies."""
+        found: dict[str, FlankLoads] = {}
+        missing: list[str] = []
+        kernel = None
         if self.stage is None:
-            return {}, []
-        return static_loads(self.trace, self.window, self.shown_meshes, self.stage, self.bodies or ())
+            return found, missing
+        model = assemble(self.stage, self.bodies or ())
+        slices = float(self.trace.meta.get("slices") or 5)
+        positions = POSITIONS if model.stage.frame_of(model.stage.engagements[0]) is None else POSITIONS_OF_SET
+        for mesh in self.shown_meshes:
+            try:
+                place = place_of(model, mesh)
+                torque = float(np.mean(self.part[f"{mesh}.force"])) * place.lever
+                torque *= math.cos(mesh_shape(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
+                if abs(torque) >= LEAST_LOAD * place.most:
+                    kernel = kernel or statics_of(model, slices=slices)
+                    found[mesh] = flank_loads(model, torque, mesh, positions, kernel)
+            except (SimulationError, ModelError) as error:
+                missing.append(f"Mesh cycle and contact pattern of {mesh}: {error}")
+        return found, missing
 
     @property
     def loads(self) -> dict[str, FlankLoads]:
@@ -117,6 +155,23 @@ class Run:
         if found is None or self.stage is None or f"{first}.force" not in found.signals:
             return found
         return replace(found, resonances=resonances(found, first, self.stage, self.bodies or ()))
+
+    def detail(self, mesh: str) -> tuple[float, float]:
+        """A few mesh periods (s): of a set the last ones within the window, else around the largest force of an
+        engagement, or a twentieth of the run where its mesh angle is missing."""
+        trace, angle = self.trace, self.angles.get(mesh)
+        if self.planets is not None:
+            width = PERIODS_OF_SET * 2 * np.pi / signals.mesh_speed(trace, self.planets)
+            return max(self.window.start, self.window.end - width), self.window.end
+        start, end = float(trace.time[0]), float(trace.time[-1])
+        force = np.abs(trace[f"{mesh}.force"]) if f"{mesh}.force" in trace else np.zeros(1)
+        centre = float(trace.time[int(np.argmax(force))])
+        half = 0.025 * (end - start)
+        if angle is not None and angle[-1] > 2 * np.pi * PERIODS:
+            frequency = np.interp(centre, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
+            half = min(0.5 * PERIODS / max(frequency, 1e-9), 0.5 * (end - start))
+        centre = min(max(centre, start + half), end - half)
+        return centre - half, centre + half
 
     @property
     def title(self) -> str:

@@ -14,7 +14,7 @@ from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
-from gearfmu.report.plots_nvh import ACCELERATIONS, FORCES, SENSOR, Kind, averaging, loudest_sensors
+from gearfmu.report.kinds import ACCELERATIONS, FORCES, SENSOR, Kind, averaging, loudest_sensors
 from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
 from gearfmu.stage import assemble
 from gearfmu.stage.run.place import place_of

@@ -160,7 +160,7 @@ def octaves(run: Run) -> str:
     if run.run_up is not None:
         return ""
     try:
-        levels = plots_nvh.octave_table(run.trace, run.window)
+        levels = plots_nvh.octave_table(run)
     except MetricsError:
         return ""
     bands = list(dict.fromkeys(band for row in levels.values() for band in row))

@@ -169,3 +169,11 @@ def on_mounts(part: Trace) -> dict[str, np.ndarray]:
     known = {name: part[recorded(part, name)] for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
     floor = noise_floor(part)
     return known if any(np.abs(values).max() >= floor for values in known.values()) else {}
+
+
+def running_mean(values: np.ndarray, width: int) -> np.ndarray:
+    """(n,): mean over `width` samples around each; NaN at the ends, where there are fewer."""
+    found, width = np.full(values.size, np.nan), min(width, values.size)
+    before = (width - 1) // 2
+    found[before : before + values.size - width + 1] = np.convolve(values, np.full(width, 1.0 / width), "valid")
+    return found

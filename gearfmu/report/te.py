@@ -87,13 +87,12 @@ def _micrometres(length: float) -> float:
 
 def _drawn(result: TeResult, unloaded: TeResult | None = None) -> list[Drawn]:
     """Every curve; without load in grey."""
-    found = []
     parts = [result] if unloaded is None or np.any(result.torque == 0) else [result, unloaded]
-    for part in parts:
-        lines = part.harmonics(HARMONICS)
-        for (colour, torque, te), line in zip(_coloured(part, part.te), lines, strict=True):
-            found.append((colour, torque, part.position, te, line))
-    return found
+    return [
+        (colour, torque, part.position, te, line)
+        for part in parts
+        for (colour, torque, te), line in zip(_coloured(part, part.te), part.harmonics(HARMONICS), strict=True)
+    ]
 
 
 def _coloured(result: TeResult, rows: np.ndarray) -> list[tuple[str, float, np.ndarray]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.shifts import distance_of_shifts
 
 MODULE = 4.5e-3
 ALPHA = math.radians(20)
@@ -21,3 +22,9 @@ def gear(teeth: int, shift: float, tip_diameter: float, bore: float, module: flo
 PINION = gear(16, 0.1817, 82.46e-3, 30e-3)
 WHEEL = gear(24, 0.1715, 118.36e-3, 40e-3)
 PAIR = PairGeometry((PINION, WHEEL), 91.5e-3, 1e-4)
+
+
+def without_backlash(pair: PairGeometry) -> float:
+    """Centre distance (m) at which the nominal teeth would have no backlash."""
+    a, b = pair.gears
+    return distance_of_shifts(a.m, a.alpha, a.beta, a.z + b.z, a.x + b.x)

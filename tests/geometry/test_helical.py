@@ -8,6 +8,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from fzg import without_backlash
 from hypothesis import given
 from hypothesis import strategies as st
 from sections import half_outline
@@ -41,7 +42,7 @@ def test_reference_diameters_and_overlap_as_published() -> None:
     assert 2e3 * FIRST.r == pytest.approx(141.340, abs=6e-4)
     assert 2e3 * SECOND.r == pytest.approx(856.354, abs=1e-3)
     assert EXAMPLE.overlap_ratio(0.1) == pytest.approx(1.083, abs=6e-4)
-    assert EXAMPLE.zero_backlash_center_distance == pytest.approx(0.5, abs=5e-6)
+    assert without_backlash(EXAMPLE) == pytest.approx(0.5, abs=5e-6)
 
 
 def test_pair_in_50_digits() -> None:

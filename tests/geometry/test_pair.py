@@ -8,7 +8,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-from fzg import PAIR, PINION, WHEEL, gear
+from fzg import PAIR, PINION, WHEEL, gear, without_backlash
 
 from gearfmu.geometry import PairGeometry, involute
 from gearfmu.geometry.mesh import contact_modulus, half_width
@@ -39,7 +39,7 @@ def test_fzg_type_c_in_50_digits() -> None:
 def test_fzg_type_c_as_published() -> None:
     assert PAIR.tip_circle_contact_ratio == pytest.approx(1.44, abs=0.005)
     assert PAIR.nominal_backlash == pytest.approx(-0.07e-6, abs=0.01e-6)
-    assert PAIR.zero_backlash_center_distance == pytest.approx(91.5e-3, abs=0.1e-6)
+    assert without_backlash(PAIR) == pytest.approx(91.5e-3, abs=0.1e-6)
     assert PAIR.r_w == pytest.approx((36.6e-3, 54.9e-3))
     assert PAIR.contact_ratio == pytest.approx(1.412, abs=5e-4)
 
@@ -100,7 +100,7 @@ def test_nominal_backlash_grows_with_the_centre_distance() -> None:
     assert (wide.nominal_backlash - PAIR.nominal_backlash) / step == pytest.approx(
         2 * math.tan(PAIR.alpha_wt), rel=0.01
     )
-    assert replace(PAIR, a=LOOSE.zero_backlash_center_distance).nominal_backlash == pytest.approx(0, abs=1e-15)
+    assert replace(PAIR, a=without_backlash(LOOSE)).nominal_backlash == pytest.approx(0, abs=1e-15)
 
 
 def test_backlash_angles_and_normal_backlash() -> None:

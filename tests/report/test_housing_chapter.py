@@ -18,13 +18,11 @@ from gearfmu.report.choice import turning
 from gearfmu.report.metrics import MetricsError, undo_mean
 from gearfmu.report.run import Run
 from gearfmu.report.runup import RunUp, Turning
-from gearfmu.report.signals import Window
 from gearfmu.sound import level, segments, third_octaves
 from gearfmu.stage.run.trace import Channel, Trace
 
 STEP = 25e-6
 TIME = np.arange(8001) * STEP
-ALL = Window(0.0, float(TIME[-1]), "here")
 FIGURES = [
     f"housing_{name}" for name in ("octaves", "spectrum", "orders_stage1", "orders_stage2", "paths", "mounts", "sound")
 ]
@@ -40,7 +38,8 @@ def tone(frequency: float) -> Trace:
 
 @pytest.mark.parametrize("middle", [160, 1000, 6300])
 def test_one_metre_per_second_squared_is_120_decibel_in_its_own_third_octave(middle: float) -> None:
-    plot = housing.accelerations(tone(1000 * 10 ** (round(10 * np.log10(middle / 1000)) / 10)), ALL)
+    heard = tone(1000 * 10 ** (round(10 * np.log10(middle / 1000)) / 10))
+    plot = housing.accelerations(Run(heard, {}))
     levels, bands = plot.columns["sensor.lid.ax_[dB re 1 µm/s²]"], plot.picture.panels[0].ticks
     at = bands.index(f"{middle:g}")
     assert levels[at] == pytest.approx(120.0, abs=0.02) and np.delete(levels, at).max() < 90

@@ -18,10 +18,10 @@ from gearfmu.report.mesh_cycle import (
     no_mean_cycle,
     over_width,
     static_face_load_factor,
-    static_loads,
     transmission_error,
 )
 from gearfmu.report.results import dynamic_factors
+from gearfmu.report.run import Run
 from gearfmu.report.signals import SETTLED, Window, window_of_interest
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
@@ -101,17 +101,17 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
     te = np.interp(np.mod(pitches, 1.0), np.append(table.position, 1.0), np.append(table.te[0], table.te[0, 0]))
     names = {"mesh.te": te, "wheel.gear.phi": -pitches * 2 * np.pi / pair.gears[1].z}
     trace = steady(np.full(time.size, TORQUE / pair.gears[0].r_b), time, **names)
-    window, stage = window_of_interest(trace), spec
-    loads, missing = static_loads(trace, window, ["mesh"], spec, bodies)
-    assert missing == []
-    plot = transmission_error(trace, window, stage, "mesh", loads["mesh"])
+    cycle = Run(trace, {}, spec, bodies)
+    assert cycle.statics[1] == []
+    plot = transmission_error(cycle, "mesh")
     assert plot is not None and not isinstance(plot.picture, str)
     static, run = plot.picture.panels[0].curves
     assert (static.name, run.name) == ("quasi-static", "in the run")
     assert np.abs(np.interp(static.x[1:-1], run.x, run.y) - static.y[1:-1]).max() < 0.08 * np.ptp(static.y)
     harmonics = plot.picture.panels[1].curves
     assert harmonics[1].y[:3] == pytest.approx(harmonics[0].y[:3], rel=0.03, abs=0.03)
-    pattern = contact_pattern(trace, stage, "mesh", loads["mesh"])
+    pattern = contact_pattern(cycle, "mesh")
+    assert pattern is not None
     heat = pattern.picture.panels[0].heat  # type: ignore[union-attr]
     assert heat is not None and heat.values.max() == heat.high and "drive flanks" in pattern.caption
 
@@ -119,7 +119,7 @@ def test_quasi_static_and_recorded_cycle_lie_over_one_another() -> None:
 def test_without_statics_and_mean_cycle_there_is_no_picture() -> None:
     spec, time = load_stage("fzg_c/stage_relief"), np.arange(100) * 1e-4
     trace = steady(np.ones(100), time, **{"mesh.te": np.zeros(100), "wheel.gear.phi": np.zeros(100)})
-    assert transmission_error(trace, window_of_interest(trace), spec, "mesh", None) is None
+    assert transmission_error(Run(trace, {}, spec), "mesh") is None
 
 
 def test_a_short_run_is_called_short() -> None:
@@ -161,7 +161,7 @@ def test_face_load_factor_is_that_of_the_means() -> None:
 def test_no_statics_without_a_load() -> None:
     spec = load_stage("fzg_c")
     trace = steady(np.full(100, 0.1), np.arange(100.0))
-    assert static_loads(trace, Window(0, 99, "here"), ["mesh"], spec, load_bodies(spec)) == ({}, [])
+    assert Run(trace, {}, spec, load_bodies(spec)).statics == ({}, [])
 
 
 def test_load_over_the_width_is_smooth_and_goes_through_the_slices() -> None:

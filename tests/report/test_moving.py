@@ -96,7 +96,7 @@ def test_the_page_gets_one_sector_and_small_numbers(view: View) -> None:
     pinion = content["stage"]["bodies"][0]
     assert pinion["teeth"] == 16 and arrays[pinion["points"]].size == 3 * pinion["size"]
     unit = arrays[pinion["unit"]].astype(float) * pinion["step"]
-    assert np.abs(unit - view.bodies[0].unit.ravel()).max() <= 0.51 * pinion["step"]  # type: ignore[union-attr]
+    assert np.abs(unit - view.bodies[0].loads[1].ravel()).max() <= 0.51 * pinion["step"]  # type: ignore[index]
     assert arrays[pinion["angle"]] == pytest.approx(view.bodies[0].angle)
 
 

@@ -14,7 +14,7 @@ from gearfmu.report.chart import Chart
 from gearfmu.report.heading import of_set, phasing, planet_phases
 from gearfmu.report.planets import LEAST_SPAN, planets, sharing
 from gearfmu.report.run import Run
-from gearfmu.report.signals import Window, known_meshings, planet_set
+from gearfmu.report.signals import known_meshings, planet_set
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stagefile.stage import load_stage
 
@@ -72,7 +72,7 @@ def test_shares_that_differ_by_rounding_are_a_line() -> None:
     alike = {f"{central}_{planet}.force": trace.channels["sun_planet1.force"]
              for central in own.meshes for planet in own.planets}  # fmt: skip
     for chart in (sharing, planets):
-        plot = chart(Trace(trace.time, {**trace.channels, **alike}, trace.meta), own, Window(0.02, 0.2, "here"))
+        plot = chart(Run(Trace(trace.time, {**trace.channels, **alike}, trace.meta), {}), own)
         assert isinstance(plot.picture, Chart)
         limits = [panel.limits or (0.0, 0.0) for panel in plot.picture.panels if "share" in panel.label]
         assert limits and all(high - low == pytest.approx(LEAST_SPAN) for low, high in limits)
@@ -84,7 +84,7 @@ def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:
     trace = Trace(trace.time, {**trace.channels, "carrier.gear.w": swinging}, trace.meta)
     own = planet_set(trace, known_meshings(trace))
     assert own is not None
-    assert "the speed is not steady" in plots_nvh.spectra_by_central(trace, own, Window(0.0, 0.2, "here")).caption
+    assert "the speed is not steady" in plots_nvh.spectra_by_central(Run(trace, {}), own).caption
 
 
 def test_a_pair_is_no_set() -> None:

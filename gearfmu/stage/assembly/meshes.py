@@ -18,7 +18,6 @@ from gearfmu.quantities import kernel_limits, kernel_number
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import MeshShape, face_width, mesh_shape, toothed
 
-EXTERNAL, INTERNAL = 1, -1
 LONGEST = {"pair": 7.5e-6, "helical": 5e-6, "shared": 12.5e-6}  # s: default steps (docs/decisions/kernel.md)
 SAME_ANGLE = 1e-9  # rad
 
@@ -68,8 +67,7 @@ def _placed(stage: Stage) -> tuple[dict[str, float], list[int]]:
 def direction_of(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
     """Angle (rad) from A's axis to B's, of a ring from its own to A's: above −π; π along −x, whichever way that is
     rounded."""
-    sense = -1 if isinstance(pair, RingMesh) else 1
-    gamma = math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
+    gamma = math.atan2(pair.side * (b[1] - a[1]), pair.side * (b[0] - a[0]))
     return gamma + 2 * math.pi if gamma < SAME_ANGLE - math.pi else gamma
 
 
@@ -93,7 +91,7 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
     engaged, numbers, directions, periods = [], [], [], []
     for mesh in stage.engagements:
         pair, (a, b) = mesh_shape(stage, mesh), mesh_axes(stage, mesh)
-        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
+        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), pair.side, _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
         rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
         place = [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
@@ -148,11 +146,6 @@ def _tilt(mesh: EngagementSpec, a: Sequence[float], b: Sequence[float]) -> tuple
     return -y, x  # the axis e_z + (x, y) is e_z turned by (-y, x)
 
 
-def kind_of(pair: MeshShape) -> int:
-    """The kernel's number of a kind of engagement."""
-    return INTERNAL if isinstance(pair, RingMesh) else EXTERNAL
-
-
 def _coast_shift(geometry: MeshShape) -> int:
     """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal
     backlash. In a ring tooth 0 stands in space 0."""
@@ -202,7 +195,7 @@ def mesh_penalty(stage: Stage, mesh: EngagementSpec) -> float:
     a, b = (gear.material for gear in gears)
     e_star = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
     first = shape.path["C"]
-    second = first + shape.length if isinstance(shape, RingMesh) else shape.length - first
+    second = shape.opposite(first)
     radius = first * second / shape.length / math.cos(shape.gears[0].beta_b)
     load = mesh.torque_max / shape.gears[0].r_b / face_width(stage, mesh)
     return min(3 * math.pi * e_star / (8 * half_width(load, radius, e_star)), STIFFEST)

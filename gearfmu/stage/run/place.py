@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.assembly.meshes import kind_of
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stagefile.forms.general import EngagementSpec
 from gearfmu.stagefile.forms.shapes import mesh_shape
@@ -45,7 +44,7 @@ def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
     frame = stage.frame_of(engagement)
     carried = float(turning[frame]) if frame is not None else 0.0
     speed_b = float(turning[rotors[1]]) - carried
-    pitch = kind_of(pair) * 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
+    pitch = pair.side * 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
     if frame is None:
         speed = float(turning[rotors[0]])
         return MeshPlace(number, pitch, a.r_b * speed, engagement.torque_max * abs(speed))

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.geometry import PairGeometry
-from gearfmu.stage.assembly.meshes import kind_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage
 from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
@@ -39,7 +38,7 @@ def position_of(trace: Trace, stage: Stage, mesh: EngagementSpec) -> np.ndarray 
     """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B; None
     where that was not recorded."""
     pair, angle = mesh_shape(stage, mesh), angle_of(trace, stage, mesh.gears[1])
-    return None if angle is None else np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
+    return None if angle is None else np.asarray(-pair.side * angle * pair.gears[1].z / (2 * math.pi))
 
 
 def contacts_at(pair: MeshShape, angles: Sequence[float], sg: int) -> list[Contact]:

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.mesh import RingMesh
+from gearfmu.geometry.shifts import distance_of_shifts
 from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.forms.general import GearBody, RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import GearShape, MeshShape, gear_shape, largest_half_width
@@ -282,7 +283,8 @@ def _external(mesh: Meshed, pair: PairGeometry) -> Found:
         remedy = f"{facts}, more than declared: declare that, or correct centre distance or profile shifts"
         yield "backlash", mesh.backlash, remedy
     elif allowance > _LARGEST_ALLOWANCE * module:
-        fitting = millimetres(pair.zero_backlash_center_distance)
+        a, b = pair.gears
+        fitting = millimetres(distance_of_shifts(a.m, a.alpha, a.beta, a.z + b.z, a.x + b.x))
         remedy = f"{facts}, none at {fitting}; to thin the teeth by {_um(allowance)} is no tolerance: correct it"
         yield "distance", mesh.distance, remedy
 
