@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from builds import leaky_library
 
+import gearfmu as gf
 from evidence.fmu_probes.everything import findings
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
@@ -50,6 +51,13 @@ def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDesc
 
 def test_good_fmus_have_no_problems(native, python, other):
     assert [findings(fmu) for fmu in (native, python, other)] == [[], [], []]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "kind"), [("planetary54", "torque"), ("planetary54", "spring"), ("two_stage", "")])
+def test_fmus_of_sets_and_trains_have_none_either(name, kind, tmp_path):
+    ports = {"carrier": kind, "sun": kind} if kind else None
+    assert findings(export(gf.assemble(name, ports=ports), tmp_path / "stage.fmu")) == []
 
 
 @pytest.fixture

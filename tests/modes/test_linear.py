@@ -1,5 +1,5 @@
-"""The linearised stage: oscillators by hand, a pair put together from its parts, difference quotients of statics, free
-vibration of the kernel, springs varied one by one, ports and chains."""
+"""The linearised stage: oscillators by hand, difference quotients of statics, free vibration of the kernel, springs
+varied one by one, ports and chains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 from mesh_mode import mesh_mode as rigid_mesh_mode
-from pair_by_parts import couple, gear_at, loaded_contacts
 from slices import by_functions_alone
 
 from gearfmu.body import load_bodies
@@ -21,7 +20,6 @@ from gearfmu.kernel.linear import LinearModel
 from gearfmu.modes.linear import Linearised, followed, full_kernel, linearised, shaft_rows, stage_modes
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.run.limits import largest_torque, places_of
-from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import ChainSpec
@@ -104,34 +102,6 @@ def test_a_support_and_its_damper() -> None:
 
 
 # ---- by other methods -----------------------------------------------------------------------------------------------
-def from_parts(stage: Stage, model: StageModel, torque: float, position: float) -> np.ndarray:
-    contacts = loaded_contacts(stage.spec, statics_of(model), torque, position)
-    return couple(
-        stage.spec, [gear_at(stage.spec, stage.bodies, g, position, contacts) for g in (0, 1)], contacts
-    ).frequencies()
-
-
-def all_frequencies(system: Linearised) -> np.ndarray:
-    scale = 1 / np.sqrt(system.linear.mass)
-    squared = sl.eigh(scale[:, None] * system.stiffness * scale, eigvals_only=True)
-    return np.sqrt(np.maximum(squared, 0)) / (2 * np.pi)
-
-
-def test_all_frequencies_are_those_of_the_pair_put_together_from_its_parts(fzg: Stage) -> None:
-    """406 of them. The parts stand where they would without load, and the pose moves frequencies in proportion to the
-    load; the kernel interpolates flanks twice, on its own grid of rolls too."""
-    fine = assemble(fzg.spec, fzg.bodies, 96)
-    for torque, model, tolerance in ((1.0, fine, 2e-5), (1.0, fzg.model, 1e-4), (TORQUE, fine, 1.6e-3)):
-        worst, kernel = 0.0, full_kernel(model)
-        for position in (1 / 8, 3 / 8):
-            mine = all_frequencies(linearised(model, torque, position, kernel))
-            theirs = from_parts(fzg, model, torque, position)
-            assert mine.size == theirs.size
-            worst = max(worst, np.abs(mine / theirs - 1).max())
-        print(f"{torque:g} N·m, {'fine' if model is fine else 'usual'} grid: largest difference {worst:.1e}")
-        assert worst < tolerance
-
-
 @pytest.mark.parametrize(
     ("name", "bearings"),
     [("fzg_c", 1.0), ("fzg_c", 0.0), ("helical_demo", 1.0), ("two_stage", 1.0)]
