@@ -15,7 +15,6 @@ from gearfmu.cosim.coupled import Plan, Result, run_coupled
 from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
-from gearfmu.errors import SpecError
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stage import StageModel, assemble
@@ -33,19 +32,6 @@ def test_the_scene_of_the_paper_is_in_balance_at_the_start() -> None:
     assert scene.duration == 0.1 and scene.start.pinion_speed == SPEED and speeds == {"carrier": 85.0, "sun": 340.0}
     power = {name: Law(load).at(0.0, speeds[name]) * speeds[name] for name, load in scene.shaft_loads.items()}
     assert power["carrier"] == 600.0 * SPEED and sum(power.values()) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_load_without_a_port_and_a_port_without_a_load_are_told_together() -> None:
-    scene = load_scene(PAPER)
-    stage = load_stage(scene.stage.name)
-    spring = stage.ports["sun"].model_copy(update={"kind": "spring"})
-    stage = stage.model_copy(update={"ports": {**stage.ports, "sun": spring}})
-    loads = {"carrier": scene.shaft_loads["carrier"], "ring": scene.shaft_loads["sun"]}
-    with pytest.raises(SpecError) as told:
-        in_drivetrain(scene.model_copy(update={"shaft_loads": loads}), stage)
-    remedies = {problem.field: problem.remedy for problem in told.value.problems}
-    assert remedies["shaft_loads.ring"].endswith("it has carrier, sun")
-    assert remedies["ports.sun.kind"] == "nothing drives it: write [shaft_loads.sun]"
 
 
 def test_hashes_of_scenes_without_loads_are_those_of_before() -> None:

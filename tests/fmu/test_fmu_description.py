@@ -19,7 +19,7 @@ from gearfmu.errors import FmuError
 from gearfmu.fmu import export, package
 from gearfmu.fmu.description import DEFAULT_STEP, named
 from gearfmu.fmu.package import content_identifier
-from gearfmu.fmu.units import base_exponents, unit_of
+from gearfmu.fmu.units import base_exponents
 from gearfmu.kernel import build, library_path
 from gearfmu.kernel.build import BuildError, host_platform
 from gearfmu.quantities import HEADER
@@ -47,24 +47,6 @@ def test_unknown_units_are_refused_by_name(unit):
         return
     with pytest.raises(FmuError, match="unit"):
         base_exponents(unit)
-
-
-def test_description_is_the_kernels_table(model, native):
-    description = read_model_description(str(native))
-    listed = description.modelVariables
-    assert [v.name for v in listed] == [v.name for v in model.kernel_variables()]
-    for ours, theirs in zip(model.kernel_variables(), listed, strict=True):
-        assert (ours.reference, ours.type, ours.causality, unit_of(ours)) == (
-            theirs.valueReference,
-            theirs.type,
-            theirs.causality,
-            theirs.unit,
-        )
-        assert theirs.description.endswith(ours.description)
-        if ours.causality != "output" and ours.type != "Boolean":
-            assert float(theirs.start) == ours.start
-    assert description.guid == model.guid
-    assert description.coSimulation.canSerializeFMUstate and not description.coSimulation.providesDirectionalDerivative
 
 
 def test_ports_decide_terminals_and_causality(model, other_model, tmp_path):

@@ -10,14 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from decks import write_deck
+from gears import write_matrices
 
 from gearfmu import cli
 from gearfmu.body import reduce_body
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
-from gearfmu.fem import hex20
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.carrier import carrier_full_order
@@ -68,11 +67,7 @@ def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready
     own = stage(tmp_path / "own")
     section = CARRIER
     if ready:
-        mesh, _ = carrier_parts()
-        for name, matrix in zip(
-            "km", hex20.assemble(mesh.nodes, mesh.elements, own.written.carrier.material), strict=True
-        ):
-            sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
+        write_matrices(tmp_path, carrier_parts()[0])
         section += 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
     body, native = (carrier_full_order(spec.by_file["carrier"]) for spec in (stage(tmp_path, section), own))
     assert [(i.name, i.kind) for i in body.interfaces] == [(i.name, i.kind) for i in native.interfaces]

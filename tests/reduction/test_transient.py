@@ -105,18 +105,6 @@ def test_methods_are_ordered_as_in_the_paper() -> None:
     assert found["with residual"] < 0.01 * found["modal"]
 
 
-def test_rate_of_convergence_in_the_number_of_modes() -> None:
-    """Between 24 and 96 vectors: truncation alone leaves the static flexibility, of first order in the modes or less,
-    behind; with it, or with Rubin's attachment modes, the error falls as the square at least."""
-    counts = np.array([24, 48, 96])
-    slope = {
-        name: -np.polyfit(np.log(counts), [np.log(error(method, int(n), residual)) for n in counts], 1)[0]
-        for name, method, residual in (("modal", "modal", False), ("mended", "modal", True), ("rubin", "rubin", False))
-    }
-    print({name: f"{value:.1f}" for name, value in slope.items()})
-    assert 0 < slope["modal"] < 1.5 and slope["mended"] > 2 and slope["rubin"] > 2
-
-
 def test_the_scheme_is_of_second_order_and_keeps_energy_at_alpha_0() -> None:
     scene = with_both(pushed("gs"), reduced("modal", 24))
 

@@ -102,10 +102,6 @@ def test_unusable_signals_are_refused_with_the_remedy() -> None:
         metrics.order_cuts(np.arange(100) * STEP, np.zeros(100), np.linspace(0, 6, 100))
 
 
-def test_level_of_silence_is_finite() -> None:
-    assert metrics.level(0.0) == -240
-
-
 @pytest.mark.parametrize("turns", [8, 32])
 def test_means_over_the_step_give_the_amplitudes_of_the_signal(turns: int) -> None:
     """Exact means of a vibration over every step: spectrum, spectrogram, cut and map tell its own level."""
