@@ -152,8 +152,6 @@ DAMAGE = {
     "frequency must be above 0 and ascending": _overwrite("frequency", 3, 1.0),
     "static is missing": _drop("static"),
     "does not fit": _reshape,
-    "body format 2, this gearfmu reads 3 and 4": _attribute("format_version", 2),
-    "not a gearfmu body": _attribute("format", "gearfmu-trace"),
     "64 hex digits": _attribute("input_hash", "abc"),
     "pair must follow": _overwrite("flank/part", slice(None), 1),
     "flank/roll must ascend": _overwrite("flank/roll", 0, 1.0),

@@ -27,17 +27,6 @@ def test_tip_edge_rounding_touches_flank_and_tip_circle() -> None:
         assert sg * math.atan2(centre[1], centre[0]) == pytest.approx(PINION.tip_land_half_angle, abs=1e-14)
 
 
-def test_undercut_limit_is_the_textbook_one() -> None:
-    """Sharp rack (no rounding beyond the straight flank): x_min = h_f − z sin²α/2 with the straight dedendum."""
-    straight = 1.25 - 0.38 * (1 - math.sin(ALPHA))
-    limit = straight - 16 * math.sin(ALPHA) ** 2 / 2
-    assert gear(16, limit, 82e-3, 30e-3).s_form == pytest.approx(0, abs=1e-15)
-    for shift, cut in ((limit - 0.01, True), (limit + 0.01, False)):
-        shape = gear(16, shift, 82e-3, 30e-3)
-        assert bool(shape.rounding.form_roll < 0) is cut and shape.s_form > 0
-    assert gear(16, 0.5, 82e-3, 30e-3).least_shift(straight) == pytest.approx(limit, abs=1e-15)
-
-
 def left_by_the_rack(shape: GearGeometry, radius: np.ndarray) -> np.ndarray:
     """Half angle (rad) of the tooth that a rack leaves at these radii (m), from nothing but its outline: the tooth of
     the tool is `half` wide at a depth below its datum, and is rolled through in steps of the angle `turn`."""
