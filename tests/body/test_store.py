@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies, reduce_body
+from gearfmu.body import body_path, load_bodies, load_body, reduce_bodies, reduce_body
 from gearfmu.body.body import _FORMER
 from gearfmu.body.layout import ENTRIES, entries_of, value_of
 from gearfmu.body.store import save_body
@@ -95,15 +95,6 @@ def test_contact_ports_and_backlash_leave_the_body_alone(made):
     pair = spec.written.pair.model_copy(update={"backlash": 3e-4})
     contact = spec.written.contact.model_copy(update={"slices": 9})
     assert len(load_bodies(rewritten(spec, pair=pair, contact=contact))) == 2
-
-
-def test_inspect_tells_what_the_file_holds(made):
-    spec, bodies, _ = made
-    report = inspect_file(body_path(spec, "wheel"))
-    assert report["kind"] == "body"
-    assert report["facts"]["modes"] == len(bodies[1].frequency)
-    assert report["facts"]["mass_kg"] == pytest.approx(0.885, rel=2e-3)
-    assert {d["path"] for d in report["datasets"]} == {entry.path for entry in entries_of(bodies[1])}
 
 
 def damaged(path: Path, change) -> Path:

@@ -79,15 +79,18 @@ def test_rattle_between_two_flanks_has_the_closed_form_period():
     assert energy_of(unit) == pytest.approx(before, rel=1e-9)
 
 
-def test_prescribed_motion_through_a_spring_has_its_closed_form():
-    """Constant acceleration of the outer end: torque k·e with e'' = a − (k/J) e, and the mean torque is the momentum
-    over the step."""
-    network = Network(
+def behind_a_driven_end() -> Network:
+    return Network(
         (Driven("out"), Inertia("gear", 0.01)),
         (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),),
         motion_ports={"pinion": "out"},
     )
-    unit = PyUnit(network)
+
+
+def test_prescribed_motion_through_a_spring_has_its_closed_form():
+    """Constant acceleration of the outer end: torque k·e with e'' = a − (k/J) e, and the mean torque is the momentum
+    over the step."""
+    unit = PyUnit(behind_a_driven_end())
     unit.set(unit.resolve(["pinion.phi", "pinion.w", "pinion.a"]), [0.0, 0.0, 5.0])
     unit.initialize(0.0)
     unit.step(0.0, 0.02)
@@ -100,12 +103,7 @@ def test_prescribed_motion_through_a_spring_has_its_closed_form():
 
 def test_a_jump_of_the_given_angle_is_blended_over_the_step():
     """The node arrives at the given angle's path at the end of the step; energy.work is the energy that came in."""
-    network = Network(
-        (Driven("out"), Inertia("gear", 0.01)),
-        (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),),
-        motion_ports={"pinion": "out"},
-    )
-    unit = started(network, micro_step=1e-6)
+    unit = started(behind_a_driven_end(), micro_step=1e-6)
     unit.set(unit.resolve(["pinion.phi", "pinion.w", "pinion.a"]), [0.01, 2.0, 0.0])
     unit.step(0.0, 1e-3)
     phi, work = unit.get(unit.resolve(["out.phi", "energy.work"]))

@@ -157,15 +157,6 @@ def flank_length(shape: GearGeometry) -> float:
     return (shape.s_tip**2 - shape.s_form**2) / (2 * shape.r_b)
 
 
-def test_scale_divides_every_element_along_the_same_lines() -> None:
-    """The corners of a coarse mesh are corners of the mesh of twice the scale (section and rim gradings nest)."""
-    coarse, fine = (gear_sector(SHAPES[0], WIDTH, MeshSpec(scale=scale, width=1)) for scale in (1, 2))
-    surface = [np.unique(mesh.flank[0].quads[:, :4]) for mesh in (coarse, fine)]
-    assert rows(coarse.nodes[surface[0]]) <= rows(fine.nodes[surface[1]])
-    cuts = [rows(mesh.nodes[mesh.cut_plus][np.isin(mesh.cut_plus, mesh.elements[:, :8])]) for mesh in (coarse, fine)]
-    assert cuts[0] <= cuts[1]
-
-
 def test_full_body_joins_all_sectors(case: tuple[GearGeometry, FeMesh]) -> None:
     shape, mesh = case
     full = mesh.full()

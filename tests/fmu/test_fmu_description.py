@@ -158,14 +158,6 @@ def test_no_other_processor_is_called_linux64(monkeypatch, system, processor, na
         assert host_platform() == name
 
 
-def test_library_is_a_byte_copy(native, python):
-    library = library_path().read_bytes()
-    for fmu in (native, python):
-        with zipfile.ZipFile(fmu) as archive:
-            copies = [name for name in archive.namelist() if archive.read(name) == library]
-        assert len(copies) == 1 and copies[0].startswith("binaries/" if fmu is native else "resources/")
-
-
 def test_same_model_same_bytes(model, native, python, tmp_path, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4e9)
     monkeypatch.setenv("TZ", "Asia/Tokyo")

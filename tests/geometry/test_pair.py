@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,22 +71,6 @@ def test_outlines_touch_at_the_wheel_phase_and_leave_the_backlash(pair: PairGeom
     assert clearance(pair, 1, turn) == pytest.approx(0, abs=1e-9)
     coast = pair.nominal_backlash * math.cos(pair.alpha_wt)
     assert clearance(pair, -1, turn) == pytest.approx(coast, abs=1e-9)
-
-
-def test_nominal_backlash_grows_with_the_centre_distance() -> None:
-    """dj_wt/da = 2 tan α_wt at constant rotation ratio (working pitch circle grows too: below 1 %)."""
-    step = 1e-6
-    wide = replace(PAIR, a=PAIR.a + step)
-    assert (wide.nominal_backlash - PAIR.nominal_backlash) / step == pytest.approx(
-        2 * math.tan(PAIR.alpha_wt), rel=0.01
-    )
-    assert replace(PAIR, a=LOOSE.zero_backlash_center_distance).nominal_backlash == pytest.approx(0, abs=1e-15)
-
-
-def test_backlash_angles_and_normal_backlash() -> None:
-    free = [PAIR.backlash / r_w for r_w in PAIR.r_w]
-    assert free[0] * PINION.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
-    assert free[1] * WHEEL.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
 
 
 def test_a_centre_distance_below_the_base_circles_is_refused() -> None:

@@ -20,12 +20,10 @@ from gearfmu.errors import MeshError, SpecError
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.imported.carrier import circle_centre
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import carrier_geometry
 from gearfmu.stagefile.reading.files import find_stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.stored import expected_hash
 
 BOLTS = ["PIN_A", "PIN_B", "PIN_C", "PIN_D"]
 CARRIER = '[carrier.import]\nfile = "carrier.inp"\nlength = "1 mm"\nbore = "SHAFT"\n'
@@ -77,15 +75,6 @@ def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready
     for name in ("stiffness", "mass"):
         assert np.abs(getattr(body, name) - getattr(native, name)).max() < 1e-9 * getattr(native, name).max(), name
     assert np.abs(body.rows() - native.rows()).max() < 1e-9
-
-
-def test_the_hash_of_an_imported_carrier_covers_the_file(tmp_path: Path) -> None:
-    deck, own = carrier_deck(tmp_path), stage(tmp_path / "own")
-    spec = stage(tmp_path, CARRIER)
-    hashes = [expected_hash(spec, "carrier"), expected_hash(own, "carrier")]
-    deck.write_text(deck.read_text(encoding="utf-8") + "** edited\n", encoding="utf-8")
-    assert len({*hashes, expected_hash(spec, "carrier")}) == 3
-    assert expected_hash(spec, "sun") == expected_hash(own, "sun")
 
 
 RING = '[ring.import]\nfile = "ring.inp"\nlength = "1 mm"\n'
@@ -168,14 +157,6 @@ def test_what_the_file_says_is_checked_at_load(tmp_path: Path) -> None:
     carrier_deck(tmp_path)
     with pytest.raises(SpecError, match="carrier.import.bolts = PIN_A, PIN_B, PIN_C: one node set for each of the 4"):
         stage(tmp_path, CARRIER.replace(', "PIN_D"', ""))
-
-
-def test_circles_are_found_from_any_part_of_them() -> None:
-    angle = np.array([0.1, 0.2, 0.25, 0.9, 1.5])
-    points = np.array([0.045, -0.01]) + 6e-3 * np.column_stack([np.cos(angle), np.sin(angle)])
-    assert np.allclose(circle_centre(points), [0.045, -0.01], atol=1e-12)
-    with pytest.raises(MeshError, match="in one line"):
-        circle_centre(np.column_stack([angle, 2 * angle]))
 
 
 def test_the_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -125,45 +125,6 @@ def test_statics_are_the_tangent_of_the_contact_routine(stages: dict[str, Stage]
         assert mine == pytest.approx(theirs, rel=3e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "levels"),
-    [
-        ("fzg_c", (0.0, 1.0, 3.0)),
-        ("helical_demo", (0.0, 3.0)),
-        ("two_stage", (0.0, 1.0)),
-        pytest.param("two_stage", (0.0, 1.0, 3.0), marks=pytest.mark.full),
-    ],
-)
-def test_statics_of_the_rows_do_not_know_the_level(
-    stages: dict[str, Stage], name: str, levels: tuple[float, ...]
-) -> None:
-    """Q + S + Σ w wᵀ/ω² over the oscillators: what is quasi-static at level rigid moves at level full, within an
-    engagement and, but for a small rest, between engagements. At level fast there is some of both."""
-    model = stages[name].model
-    torque, found = 0.5 * largest_torque(model), {}
-    for level in levels:
-        kernel = stages[name].kernel if level == 3.0 else model.kernel(level=level)
-        kernel.prepare()
-        linear = linearised(model, torque, 3 / 8, kernel).linear
-        moving = linear.omega > 0
-        flexible = linear.rows[:, moving] / linear.omega[moving]
-        found[level] = linear.residual + linear.own + flexible @ flexible.T
-    meshes = linear.label[:, 0]
-    between = (meshes[:, None] != meshes) & (meshes[:, None] >= 0) & (meshes >= 0)
-    most = found[levels[-1]]
-    for level in levels[:-1]:
-        off = np.abs(found[level] - most)
-        scale = np.sqrt(np.outer(np.diag(most), np.diag(most)))
-        print(f"{name}, level {level:g}: {(off / scale).max():.1e}; between meshes "
-              f"{(np.abs(most) / scale)[between].max(initial=0.0):.1e}")  # fmt: skip
-        # tables are linear between nodes in one, their product in the other; where axes give way in space, what is
-        # quasi-static is read where gears stand without load; two gears on one shaft do not know each other's static
-        # rest (6e-4 of a contact at level rigid)
-        shaft = 1e-3 if level == 0.0 else 2e-4
-        assert (off / scale).max() < (shaft if name == "two_stage" else 5e-5)
-    assert not between.any() or (np.abs(most) / scale)[between].max() > 1e-3
-
-
 def input_compliance(system: Linearised) -> float:
     """Angle of the first port's bore under a unit moment there, the second port's bore held, others free."""
     linear, own = system.linear, system.linear.own.copy()

@@ -44,17 +44,6 @@ def test_a_body_of_the_other_hand_is_the_mirror_image(kind: str) -> None:
 
 
 @KINDS
-def test_modes_of_the_other_hand_are_the_mirror_image(kind: str) -> None:
-    here, there = (elastic_modes(MAKERS[kind](sign * BETA), 40) for sign in (1, -1))
-    assert np.allclose(here.frequency, there.frequency, rtol=1e-9)
-    single, sign = here.part == 0, (-1.0) ** np.arange(3)
-    rows = (there.flank_rows.reshape(8, 3, -1) * sign[:, None]).reshape(here.flank_rows.shape)
-    mine, theirs = here.flank_rows[:, single], rows[:, single]
-    same = np.sign((mine * theirs).sum(axis=0))
-    assert np.abs(mine - theirs * same).max() < 1e-6 * np.abs(mine).max()
-
-
-@KINDS
 def test_a_vanishing_helix_is_the_spur_body(kind: str) -> None:
     """β = 1e-6°, reduced without mirror symmetry: tables, rows and frequencies of the spur body to 1e-6."""
     nearly, spur = MAKERS[kind](math.radians(1e-6)), MAKERS[kind](0.0)
