@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from analytic_stage import energy_of
 from pydantic import BaseModel
-from scipy.linalg import eigh
 
 from evidence.pages.drivetrain import page
 from gearfmu.cosim.drive import Drive, car_drive, engine_torque, rig_drive, road_load
@@ -101,19 +100,6 @@ def test_kinetic_energy_is_that_of_the_moving_vehicle():
         + 0.5 * CAR.disc_inertia * scene.start.pinion_speed**2,
         rel=1e-12,
     )
-
-
-def test_vehicle_side_frequencies():
-    """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to
-    slip."""
-    network = network_of(drive_of(closure(chain_in_fmu=False, tyre_slip_stiffness=1e-6, dmf_stiffness=1e-6)))
-    unit = PyUnit(network)
-    mass = np.diag([node.inertia for node in network.nodes])
-    rows = unit.dynamics.extension
-    values = eigh(rows.T @ np.diag([spring.k for spring in network.springs]) @ rows, mass, eigvals_only=True)
-    referred = 1 / CAR.final_drive_ratio**2
-    k, j1, j2 = CAR.half_shaft_stiffness * referred, CAR.final_drive_inertia, 2 * CAR.road_wheel_inertia * referred
-    assert math.sqrt(values[-1]) == pytest.approx(math.sqrt(k * (1 / j1 + 1 / j2)), rel=1e-9)
 
 
 def test_rig_holds_speed_and_starts_twisted():
