@@ -17,6 +17,7 @@ from gearfmu.body import reduce_bodies
 from gearfmu.errors import GearfmuError, MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.factor import FactorError
+from gearfmu.fem.matrices import read_matrix
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.imported.gear import hinge_problem
@@ -196,13 +197,34 @@ DECKS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", DECKS)
-def test_decks_that_would_be_read_wrongly_are_refused(tmp_path: Path, case: str) -> None:
-    text, wanted = DECKS[case]
-    path = tmp_path / "pinion.inp"
-    path.write_text(text + "\n", encoding="utf-8")
+FILES = {  # content, None of a file that is not there
+    "brick.msh": (b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "brick.msh: not a gmsh file that can be read"),
+    "brick.stl": (b"solid", "'.stl' is no mesh file that is read here"),
+    "cards.bdf": (b"GRID,1,,0.,0.,0.\n", "BEGIN BULK"),
+    "system.bdf": (b"BEGIN BULK\nGRID,1,5,0.,0.,0.\nENDDATA\n", "system.bdf:2: a GRID in coordinate system 5"),
+    "k.op2": (b"x", "is no matrix file that is read here: .mtx"),
+    "k.op4": (b"\x18\x00\x00\x00\x06\x00", "a binary OUTPUT4 file; ask for FORMATTED"),
+    "k.mtx": (b"no header", "no sound .mtx matrix"),
+    "k.npz": (b"no zip", "no sound .npz matrix|cannot be read"),
+    "k.sti": (b"1 2\n", "no sound .sti matrix"),
+    "k.pch": (b"$ nothing\n", "expected one DMIG matrix, found 0"),
+    "nowhere.mtx": (None, "nowhere.mtx: the file cannot be read"),
+}
+UNREADABLE = [(name, *case) for name, case in FILES.items()]
+UNREADABLE += [("pinion.inp", f"{text}\n".encode(), wanted) for text, wanted in DECKS.values()]
+
+
+@pytest.mark.parametrize(("name", "content", "wanted"), UNREADABLE, ids=[*FILES, *DECKS])
+def test_files_that_cannot_be_read_or_would_be_read_wrongly_are_refused(
+    tmp_path: Path, name: str, content: bytes | None, wanted: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=wanted):
-        read_mesh(path, MM)
+        if Path(name).suffix in (".inp", ".msh", ".stl", ".bdf"):
+            read_mesh(tmp_path / name, MM)
+        else:
+            read_matrix(tmp_path / name, None, np.array([7, 11]))
 
 
 @pytest.mark.parametrize(("whole", "size"), [(False, "unknowns a sector"), (True, "unknowns")])
