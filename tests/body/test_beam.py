@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import scipy.linalg as sl
-from scipy.optimize import brentq
+from timoshenko import free_bending
 
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft, rigid_mass
 
@@ -92,21 +91,11 @@ def test_stepped_shaft_stretches_and_twists_as_rods_do(direction, stiffness):
 
 
 def exact_bending(section, length, near):
-    """Free-free frequency (rad/s) of the uniform Timoshenko beam next to `near`: zero of the end forces'
-    determinant."""
-    e_i, shear = STEEL.youngs_modulus * section.second_moment, STEEL.shear_modulus * section.area
-    shear *= section.shear_factor(STEEL.poisson_ratio)
-
-    def determinant(omega):
-        a = np.zeros((4, 4))  # w, θ, M, Q along the beam
-        a[0, 1], a[0, 3], a[1, 2] = 1.0, 1 / shear, 1 / e_i
-        a[2, 3], a[2, 1] = -1.0, -STEEL.density * section.second_moment * omega**2
-        a[3, 0] = -STEEL.density * section.area * omega**2
-        scale = np.array([length, 1.0, e_i / length, e_i / length**2])
-        transfer = sl.expm(a * length * scale / scale[:, None])
-        return np.linalg.det(transfer[2:, :2])
-
-    return brentq(determinant, 0.995 * near, 1.005 * near, xtol=1e-6, rtol=1e-14)
+    """Free-free frequency (rad/s) of the uniform Timoshenko beam next to `near`."""
+    shear = STEEL.shear_modulus * section.area * section.shear_factor(STEEL.poisson_ratio)
+    mass, inertia = STEEL.density * section.area, STEEL.density * section.second_moment
+    bending = STEEL.youngs_modulus * section.second_moment
+    return free_bending(length, bending, shear, mass, inertia, (0.995 * near, 1.005 * near))
 
 
 def test_uniform_shaft_has_the_frequencies_of_the_exact_beam():

@@ -16,6 +16,7 @@ from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Ramp
 
 J1, J2 = 0.2, 0.7
+BOTH = 1 / J1 + 1 / J2
 
 
 def two_inertias(capacity, torque=lambda t, phi, w: 0.0, w1=0.0, w2=0.0, peak=1.0) -> PyUnit:
@@ -44,7 +45,7 @@ def test_constant_capacity_locks_at_the_closed_form_instant(slip):
     capacity, drive = 40.0, 7.0
     unit = two_inertias(constant(capacity), lambda t, phi, w: drive, w1=slip)
     sign = math.copysign(1.0, slip)
-    instant = abs(slip) / (capacity * (1 / J1 + 1 / J2) - sign * drive / J1)
+    instant = abs(slip) / (capacity * BOTH - sign * drive / J1)
     advance(unit, 1e-2, 100)
     assert [(event.part, event.what) for event in unit.state.events] == [("clutch", "lock")]
     assert unit.state.events[0].time == pytest.approx(instant, abs=1e-13)
@@ -54,12 +55,18 @@ def test_constant_capacity_locks_at_the_closed_form_instant(slip):
     assert torque == pytest.approx(drive * J2 / (J1 + J2), abs=1e-12)
 
 
-def test_capacity_ramp_locks_at_the_closed_form_instant():
-    """T = r t: slip Δw − r t²/2 (1/J1 + 1/J2)."""
-    rate = 900.0
-    unit = two_inertias(Ramp(((0.0, 0.0), (1.0, rate))), w1=30.0)
-    advance(unit, 3e-3, 200)
-    assert unit.state.events[0].time == pytest.approx(math.sqrt(2 * 30.0 / (rate * (1 / J1 + 1 / J2))), abs=1e-12)
+@pytest.mark.parametrize(
+    ("points", "slip", "instant"),
+    [
+        (((0.0, 0.0), (1.0, 900.0)), 30.0, math.sqrt(2 * 30.0 / (900.0 * BOTH))),  # slip Δw − r t²/2 (1/J1 + 1/J2)
+        (((0.1, 0.0), (0.1, 20.0)), 10.0, 0.1 + 10.0 / (20.0 * BOTH)),  # nothing before a jump
+    ],
+    ids=["ramp", "jump"],
+)
+def test_changing_capacity_locks_at_the_closed_form_instant(points, slip, instant):
+    unit = two_inertias(Ramp(points), w1=slip)
+    advance(unit, 1e-2, 100)
+    assert unit.state.events[0].time == pytest.approx(instant, abs=1e-12)
 
 
 @pytest.mark.parametrize("peak", [1.0, 1.3])
@@ -83,13 +90,6 @@ def test_sticks_through_a_reversal_of_torque_and_slips_both_ways():
     assert [event.what for event in unit.state.events] == ["slip", "lock"] * 5 + ["slip"]
     loose = [event.time for event in unit.state.events[::2]]
     assert loose[0] == pytest.approx(math.asin(30.0 * (J1 + J2) / J2 / 60.0) / (2 * math.pi), abs=1e-6)
-
-
-def test_a_jump_of_capacity_between_steps_is_exact():
-    """Nothing before the jump, the closed form after it."""
-    unit = two_inertias(Ramp(((0.1, 0.0), (0.1, 20.0))), w1=10.0)
-    advance(unit, 1e-2, 100)
-    assert unit.state.events[0].time == pytest.approx(0.1 + 10.0 / (20.0 * (1 / J1 + 1 / J2)), abs=1e-12)
 
 
 @settings(max_examples=30)

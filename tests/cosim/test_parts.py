@@ -67,15 +67,6 @@ def scene_of(folder: Path, text: str) -> SceneSpec:
     return load_scene(folder / "scene.toml")
 
 
-def test_ports_of_the_stage_that_nothing_hangs_on_and_ports_it_has_not(tmp_path: Path, pair: Stage) -> None:
-    scene = scene_of(tmp_path, PAIR.replace("ports.wheel", "ports.whel").replace('damping = "0.2 N*m*s/rad"\n', ""))
-    with pytest.raises(SpecError) as told:
-        ports_of(scene, pair)
-    remedies = {problem.field: problem.remedy for problem in told.value.problems}
-    assert remedies["drivetrain.ports.whel"].endswith("it has pinion, wheel")
-    assert remedies["ports.wheel.kind"] == "nothing drives it: write [drivetrain.ports.wheel]"
-
-
 def test_what_a_port_does_not_say_is_the_stage_s(tmp_path: Path, pair: Stage) -> None:
     ports = ports_of(scene_of(tmp_path, PAIR.replace('stiffness = "2e4 N*m/rad"\n', "")), pair)
     assert ports["pinion"].k == pair.ports["pinion"].k and ports["pinion"].c == 0.2 and ports["wheel"].k == 5e4

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from analytic_stage import energy_of
 from pydantic import BaseModel
-from scipy.linalg import eigh
 
 from evidence.pages.drivetrain import page
 from gearfmu.cosim.drive import Drive, car_drive, engine_torque, rig_drive, road_load
@@ -101,39 +100,6 @@ def test_kinetic_energy_is_that_of_the_moving_vehicle():
         + 0.5 * CAR.disc_inertia * scene.start.pinion_speed**2,
         rel=1e-12,
     )
-
-
-def test_vehicle_side_frequencies():
-    """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to
-    slip."""
-    network = network_of(drive_of(closure(chain_in_fmu=False, tyre_slip_stiffness=1e-6, dmf_stiffness=1e-6)))
-    unit = PyUnit(network)
-    mass = np.diag([node.inertia for node in network.nodes])
-    rows = unit.dynamics.extension
-    values = eigh(rows.T @ np.diag([spring.k for spring in network.springs]) @ rows, mass, eigvals_only=True)
-    referred = 1 / CAR.final_drive_ratio**2
-    k, j1, j2 = CAR.half_shaft_stiffness * referred, CAR.final_drive_inertia, 2 * CAR.road_wheel_inertia * referred
-    assert math.sqrt(values[-1]) == pytest.approx(math.sqrt(k * (1 / j1 + 1 / j2)), rel=1e-9)
-
-
-def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
-    """Chain inside or outside the FMU: the same sum of inertias, the same stiffnesses."""
-    inside, outside = closure(), closure(chain_in_fmu=False)
-    ports_in, ports_out = drive_of(inside).ports, drive_of(outside).ports
-    chains = [port.chain for port in ports_in.values()]
-    total_in = sum(node.inertia for node in network_of(drive_of(inside)).nodes)
-    total_in += sum(chain.inertia + chain.disc_inertia for chain in chains)
-    assert total_in == pytest.approx(sum(node.inertia for node in network_of(drive_of(outside)).nodes), rel=1e-14)
-    springs_out = [spring.k for spring in network_of(drive_of(outside)).springs] + [
-        port.k for port in ports_out.values()
-    ]
-    springs_in = (
-        [spring.k for spring in network_of(drive_of(inside)).springs]
-        + [port.k for port in ports_in.values()]
-        + [chain.shaft_k for chain in chains]
-    )
-    assert sorted(springs_in) == pytest.approx(sorted(springs_out))
-    assert drive_of(outside).signals == () and drive_of(outside).start() == {}
 
 
 def test_rig_holds_speed_and_starts_twisted():

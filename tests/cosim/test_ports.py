@@ -53,14 +53,6 @@ def test_products_give_what_steps_give(name):
     assert np.abs(a - b).max(axis=0) == pytest.approx(np.zeros(8), abs=1e-7 * np.abs(b).max())
 
 
-def test_ahead_changes_nothing():
-    for unit in (drivetrain("clutch_closure"), PyUnit(clutch_network())):
-        unit.initialize(0.0)
-        before, motion = unit.state.x.copy(), np.zeros(3 * len(unit.ports))
-        unit.ahead(0.0, 1e-3, motion)
-        assert np.array_equal(unit.state.x, before) and unit.state.time == 0.0 and unit.state.events == ()
-
-
 def test_ahead_ends_where_the_step_ends():
     """φ + wH + ½aH² is the angle after the step under the held torque, with micro-steps too."""
     for micro_step in (None, 1e-4):

@@ -9,7 +9,7 @@ import numpy as np
 from gearfmu import fmu
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import run_once, stage_model, summary
-from gearfmu.scenefile.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.scenefile.scene import SceneSpec, load_scene
 
 
 def scene(**effects: bool) -> SceneSpec:
@@ -29,12 +29,6 @@ def test_a_scene_switches_effects(tmp_path: Path) -> None:
     for trace in traces:
         assert np.all(trace["pinion.gear.y"] == 0) and np.all(trace["bearing.pinion.fy"] != 0)
         assert np.array_equal(trace["mesh.te"], traces[0]["mesh.te"])
-
-
-def test_a_scene_without_effects_has_the_hash_of_before(tmp_path: Path) -> None:
-    text = (SHIPPED / "pair_loaded.toml").read_text(encoding="utf-8")
-    (tmp_path / "scene.toml").write_text(f"{text}\n[stage.effects]\n", encoding="utf-8")
-    assert load_scene(tmp_path / "scene.toml").hash == load_scene("pair_loaded").hash
 
 
 def test_the_summary_says_what_was_off() -> None:

@@ -74,26 +74,6 @@ def test_a_step_that_cannot_be_is_refused_before_the_run(unit, tmp_path):
 
 
 @pytest.mark.full
-def test_clutch_closure_locks_once_and_rings_down():
-    trace = cosim.run("clutch_closure", unit="fmu")
-    locked = trace["pinion.clutch.locked"]
-    assert (
-        trace.meta["outcome"] == OK and abs(trace.meta["energy_residual"]) < 1e-6 and trace.meta["retried_steps"] == 0
-    )
-    assert np.count_nonzero(np.diff(locked)) == 1 and trace.time[np.argmax(locked)] == pytest.approx(0.12, abs=0.01)
-    ripple = [np.ptp(trace.window(start, start + 0.05)["pinion.shaft.tau"]) for start in (0.125, 0.35)]
-    assert ripple[1] < ripple[0] and trace["mesh.contact"][trace.time > 0.05].min() == 1
-
-
-@pytest.mark.full
-def test_clutch_dump_hammers_through_the_backlash():
-    """Drive and coast flanks both carry more than 4 kN, the gears meet and part many times, the run stays whole."""
-    trace = cosim.run("clutch_dump", unit="fmu")
-    assert trace.meta["outcome"] == OK and abs(trace.meta["energy_residual"]) < 1e-5
-    assert trace["mesh.force"].min() < -4e3 and trace["mesh.force"].max() > 4e3 and trace["mesh.impacts"][-1] > 10
-
-
-@pytest.mark.full
 @pytest.mark.parametrize(("name", "torque"), [("pair_loaded", 302.0), ("pair_light", 80.0)])
 def test_pairs_reach_their_torque_and_speed_within_the_settling_time(name, torque):
     trace = cosim.run(name, unit="fmu")

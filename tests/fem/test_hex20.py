@@ -74,18 +74,6 @@ def test_a_folded_element_is_refused():
         hex20.assemble(nodes * [1, 1, -1], elements, STEEL)
 
 
-def test_boundary_faces_enclose_the_volume():
-    nodes, elements = box((3, 2, 2), (3.0, 2.0, 2.0))
-    faces = surface.boundary_faces(elements)
-    assert len(faces) == 2 * (6 + 6 + 4)
-    xi, weight = surface.gauss_quad(3)
-    area = (surface.surface_measure(nodes[faces], surface.shape_gradient(xi)) * weight).sum()
-    assert area == pytest.approx(2 * (6 + 6 + 4), rel=1e-12)
-    corners = nodes[faces[:, :4]]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
-    assert np.all((outward * corners.mean(axis=1)).sum(axis=1) > 0)
-
-
 @pytest.mark.parametrize("weighting", ["surface", "uniform"])
 def test_averaging_node_follows_rigid_motion_and_spreads_its_loads(weighting):
     nodes, elements = ring((2, 8, 2), 0.02, 0.05, 0.02)

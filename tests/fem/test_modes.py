@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from blocks import STEEL, box, free_body, grid_mesh, ring, ring_sector
-from scipy.optimize import brentq
+from timoshenko import free_bending
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20
@@ -51,29 +51,9 @@ def timoshenko_free(length: float, side: float, material) -> float:
     e, nu, rho = material.youngs_modulus, material.poisson_ratio, material.density
     area, second = side**2, side**4 / 12
     shear = 10 * (1 + nu) / (12 + 11 * nu) * e / (2 * (1 + nu)) * area
-
-    def residual(omega: float) -> float:
-        return _free_determinant(
-            omega, length, SimpleNamespace(ei=e * second, ga=shear, ma=rho * area, mi=rho * second)
-        )
-
     euler = (4.730040744862704 / length) ** 2 * np.sqrt(e * second / (rho * area))
-    return brentq(residual, 0.7 * euler, 1.0001 * euler) / (2 * np.pi)
-
-
-def _free_determinant(omega: float, length: float, beam) -> float:
-    """Determinant of the free–free conditions: state (w, ψ, M, Q) carried over the length by the matrix exponential."""
-    from scipy.linalg import expm
-
-    a = np.array(
-        [
-            [0, 1, 0, 1 / beam.ga],
-            [0, 0, 1 / beam.ei, 0],
-            [0, -beam.mi * omega**2, 0, -1],
-            [-beam.ma * omega**2, 0, 0, 0],
-        ]
-    )
-    return float(np.linalg.det(expm(a * length)[2:, :2]))
+    bracket = (0.7 * euler, 1.0001 * euler)
+    return free_bending(length, e * second, shear, rho * area, rho * second, bracket) / (2 * np.pi)
 
 
 @pytest.mark.parametrize(("length", "cells", "tolerance"), [(0.1, 10, 2e-3), (0.6, 24, 5e-4)])

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from handmade import mass_matrix, toothed
 
+from evidence.fmu_probes.probes import Subject
 from gearfmu.body import Body
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.forms.expand import rewritten, with_ports
@@ -29,6 +30,11 @@ def small_model(stage: str = "fzg_c/stage_relief", name: str | None = None, **po
     spec = rewritten(with_ports(spec, changed), name=name or spec.name)
     geometry = spec.written.geometry
     return assemble(spec, [body(spec.gears[i], geometry.gears[i]) for i in (0, 1)])
+
+
+def references(subject: Subject) -> dict[str, int]:
+    """Value references of an FMU's variables by name."""
+    return {v.name: v.valueReference for v in subject.variables}
 
 
 def unpack(fmu: Path, target: Path) -> str:

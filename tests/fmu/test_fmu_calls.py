@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from fmpy.fmi2 import fmi2CallbackLoggerTYPE
+from small_stage import references
 
 from evidence.fmu_probes.everything import exchange_functions
 from evidence.fmu_probes.probes import ERROR, OK, Subject
@@ -34,13 +36,12 @@ ALLOWED = {
 }
 
 
-def reference(subject: Subject, name: str) -> int:
-    return next(v.valueReference for v in subject.variables if v.name == name)
-
-
 def in_mode(folder: str, mode: str) -> Subject:
     """A fresh instance brought into `mode`; a discarded step comes from a torque that no tooth can carry."""
-    subject = Subject(folder)
+    return brought(Subject(folder), mode)
+
+
+def brought(subject: Subject, mode: str) -> Subject:
     if mode == "instantiated":
         return subject
     subject.fmu.setupExperiment(startTime=0.0)
@@ -49,7 +50,7 @@ def in_mode(folder: str, mode: str) -> Subject:
         return subject
     subject.fmu.exitInitializationMode()
     if mode == "discarded":
-        subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
+        subject.fmu.setReal([references(subject)["wheel.tau"]], [-1e7])
         statuses = [subject.status("doStep", k * 1e-4, 1e-4) for k in range(40)]
         assert 2 in statuses, "the overload was not noticed"
     if mode == "terminated":
@@ -58,7 +59,7 @@ def in_mode(folder: str, mode: str) -> Subject:
 
 
 def arguments(subject: Subject, call: str) -> tuple:
-    real, level, truth = (reference(subject, name) for name in ("pinion.phi", "level", "effect.hertz"))
+    real, level, truth = map(references(subject).get, ("pinion.phi", "level", "effect.hertz"))
     time, c = ctypes.c_double(), subject.fmu.component
     return {
         "doStep": (0.0, 1e-4),
@@ -89,7 +90,7 @@ def test_discarded_step_tells_how_far_it_came_and_can_be_taken_back(unpacked_oth
     plain = Subject(unpacked_other).initialized().run()
     subject.excite()
     state = subject.fmu.getFMUstate()
-    subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
+    subject.fmu.setReal([references(subject)["wheel.tau"]], [-1e7])
     steps = 0
     while subject.status("doStep", steps * 1e-4, 1e-4) == OK:
         steps += 1
@@ -107,18 +108,9 @@ def test_discarded_step_tells_how_far_it_came_and_can_be_taken_back(unpacked_oth
     subject.close()
 
 
-def test_refused_set_call_changes_no_value_of_it(unpacked):
-    subject = in_mode(unpacked, "step")
-    names = [reference(subject, name) for name in ("pinion.phi", "pinion.w", "pinion.phi", "wheel.w")]
-    subject.fmu.setReal(names[:2], [0.25, 3.0])
-    assert subject.status("setReal", names, [0.5, 4.0, 0.75, math.nan]) == ERROR
-    assert subject.fmu.getReal(names[:2]) == [0.25, 3.0]
-    subject.close()
-
-
 def test_outputs_in_initialization_mode_follow_the_inputs(unpacked):
     subject = in_mode(unpacked, "initialization")
-    phi, te = reference(subject, "pinion.phi"), reference(subject, "mesh.te")
+    phi, te = map(references(subject).get, ("pinion.phi", "mesh.te"))
     before = subject.fmu.getReal([te])
     subject.fmu.setReal([phi], [2e-3])
     loaded = subject.fmu.getReal([te])
@@ -136,62 +128,36 @@ def test_stop_time_is_kept(unpacked):
     subject.close()
 
 
-def test_refusals_say_why(unpacked):
-    messages: list[tuple[int, str, str]] = []
-    subject = Subject(unpacked)
+def instantiated(
+    folder: str, location: bytes | None, name: bytes | None = b"x", kind: int = 1, guid: bytes = b""
+) -> bool:
+    """Whether fmi2Instantiate gives an instance, which is freed."""
+    subject = Subject(folder)
+    given = (name, kind, guid or subject.description.guid.encode(), location, ctypes.byref(subject.callbacks), 0, 0)
+    component = subject.fmu.fmi2Instantiate(*given)
+    if component:
+        subject.fmu.fmi2FreeInstance(component)
     subject.close()
-    subject.callbacks.logger = fmi2CallbackLoggerTYPE(
-        lambda _, name, status, category, text: messages.append((status, category.decode(), text.decode()))
-    )
-    subject.fmu.instantiate(callbacks=subject.callbacks, loggingOn=False)
-    subject.status("setReal", [reference(subject, "level")], [1.0])
-    subject.status("doStep", 0.0, 1e-4)
-    subject.status("setReal", [reference(subject, "pinion.phi")], [math.nan])
-    assert [m[:2] for m in messages] == [(ERROR, "logStatusError")] * 3, "errors are told even with logging off"
-    for message, reason in zip(messages, ("is Integer or Enumeration", "'instantiated'", "nan"), strict=True):
-        assert reason in message[2]
-    subject.fmu.setDebugLogging(True, ["logEvents"])
-    subject.fmu.setupExperiment()
-    subject.fmu.enterInitializationMode()
-    subject.fmu.exitInitializationMode()
-    assert messages[-1][1] == "logEvents"
-    assert subject.status("setDebugLogging", True, ["logNonsense"]) == ERROR
-    subject.close()
+    return bool(component)
 
 
 @pytest.mark.parametrize("spelling", ["{uri}", "{uri}/", "file://localhost{path}", "file:{path}", "{plain}"])
 def test_resource_locations(unpacked, spelling):
     resources = Path(unpacked) / "resources"
     uri = resources.as_uri()
-    location = spelling.format(uri=uri, path=uri.removeprefix("file://"), plain=resources)
     assert "%" in uri, "the folder's name needs escapes"
-    subject = Subject(unpacked)
-    component = subject.fmu.fmi2Instantiate(
-        b"x", 1, subject.description.guid.encode(), location.encode(), ctypes.byref(subject.callbacks), 0, 0
-    )
-    assert component
-    subject.fmu.fmi2FreeInstance(component)
-    subject.close()
+    location = spelling.format(uri=uri, path=uri.removeprefix("file://"), plain=resources)
+    assert instantiated(unpacked, location.encode())
 
 
 @pytest.mark.parametrize("location", [b"", b"file:///%zz", b"file:///%00", b"file:///no/such/place", b"x" * 9000, None])
 def test_bad_resource_locations(unpacked, location):
-    subject = Subject(unpacked)
-    assert not subject.fmu.fmi2Instantiate(
-        b"x", 1, subject.description.guid.encode(), location, ctypes.byref(subject.callbacks), 0, 0
-    )
-    subject.close()
+    assert not instantiated(unpacked, location)
 
 
-@pytest.mark.parametrize(
-    "name, kind, guid", [(b"", 1, None), (None, 1, None), (b"x", 0, None), (b"x", 1, b"?"), (b"x", 1, b"")]
-)
-def test_bad_instantiation(unpacked, name, kind, guid):
-    subject = Subject(unpacked)
-    location = (Path(unpacked) / "resources").as_uri().encode()
-    guid = subject.description.guid.encode() if guid is None else guid
-    assert not subject.fmu.fmi2Instantiate(name, kind, guid, location, ctypes.byref(subject.callbacks), 0, 0)
-    subject.close()
+@pytest.mark.parametrize("wrong", [{"name": b""}, {"name": None}, {"kind": 0}, {"guid": b"?"}])
+def test_bad_instantiation(unpacked, wrong):
+    assert not instantiated(unpacked, (Path(unpacked) / "resources").as_uri().encode(), **wrong)
 
 
 def test_many_instances_live_side_by_side(unpacked):
@@ -203,57 +169,66 @@ def test_many_instances_live_side_by_side(unpacked):
         subject.close()
 
 
-def listening(folder: str) -> tuple[Subject, list[str]]:
-    """A fresh instance and the messages it sends."""
-    messages: list[str] = []
-    subject = Subject(folder)
+# ---- what it says ----------------------------------------------------------------------------------------------------
+@pytest.fixture
+def heard(unpacked_other) -> Iterator[tuple[Subject, list[tuple[int, str, str]]]]:
+    """A fresh instance and status, category and text of the messages it sends; with logging off."""
+    messages: list[tuple[int, str, str]] = []
+    subject = Subject(unpacked_other)
     subject.close()
     subject.callbacks.logger = fmi2CallbackLoggerTYPE(
-        lambda _, name, status, kind, text: messages.append(text.decode())
+        lambda _, name, status, category, text: messages.append((status, category.decode(), text.decode()))
     )
     subject.fmu.instantiate(callbacks=subject.callbacks, loggingOn=False)
-    return subject, messages
-
-
-def test_refused_values_name_the_variable_and_what_it_takes(unpacked):
-    subject, messages = listening(unpacked)
-    known = {v.name: v for v in subject.variables}
-    for name, setter, value, said in (
-        ("pinion.phi", "setReal", 1e12, "allowed are from -1e+09 to 1e+09 rad"),
-        ("slices", "setInteger", 21, "allowed are whole numbers from 1 to 20"),
-        ("level", "setInteger", 9, "allowed are 0, 1, ... for rigid|fast|standard|full|paper|explicit"),
-        ("mesh.te", "setReal", 0.0, "is an output"),
-    ):
-        assert subject.status(setter, [known[name].valueReference], [value]) == ERROR
-        assert f"{name} (value reference {known[name].valueReference})" in messages[-1] and said in messages[-1]
-    subject.fmu.setupExperiment()
-    subject.fmu.enterInitializationMode()
-    subject.fmu.exitInitializationMode()
-    subject.status("setInteger", [known["level"].valueReference], [1])
-    assert "level (value reference" in messages[-1] and "before the initialisation ends" in messages[-1]
+    yield subject, messages
     subject.close()
 
 
-def test_after_a_discarded_step_it_says_what_may_follow(unpacked_other):
-    subject, messages = listening(unpacked_other)
-    subject.fmu.setupExperiment()
-    subject.fmu.enterInitializationMode()
-    subject.fmu.exitInitializationMode()
-    subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
-    assert 2 in [subject.status("doStep", k * 1e-4, 1e-4) for k in range(40)]
-    told = next(text for text in messages if "stopped at" in text)
+REFUSALS = [  # mode, call, variable, value, words
+    ("instantiated", "setReal", "level", 1.0, "is Integer or Enumeration"),
+    ("instantiated", "setReal", "pinion.phi", math.nan, "nan"),
+    ("instantiated", "setReal", "pinion.phi", 1e12, "allowed are from -1e+09 to 1e+09 rad"),
+    ("instantiated", "setInteger", "slices", 21, "allowed are whole numbers from 1 to 20"),
+    ("instantiated", "setInteger", "level", 9, "are 0, 1, ... for rigid|fast|standard|full|paper|explicit"),
+    ("instantiated", "setReal", "mesh.te", 0.0, "is an output"),
+    ("step", "setInteger", "level", 1, "before the initialisation ends"),
+]
+
+
+@pytest.mark.parametrize(("mode", "call", "name", "value", "words"), REFUSALS)
+def test_refused_values_name_the_variable_and_what_it_takes(heard, mode, call, name, value, words):
+    """Errors are told even with logging off."""
+    subject, messages = heard
+    reference = references(subject)[name]
+    assert brought(subject, mode).status(call, [reference], [value]) == ERROR
+    status, category, text = messages[-1]
+    assert (status, category) == (ERROR, "logStatusError")
+    assert f"{name} (value reference {reference})" in text and words in text
+
+
+def test_calls_out_of_order_are_refused_in_words_and_events_are_told_on_request(heard):
+    subject, messages = heard
+    assert subject.status("doStep", 0.0, 1e-4) == ERROR and "'instantiated'" in messages[-1][2]
+    subject.fmu.setDebugLogging(True, ["logEvents"])
+    brought(subject, "step")
+    assert messages[-1][1] == "logEvents"
+    assert subject.status("setDebugLogging", True, ["logNonsense"]) == ERROR
+
+
+def test_after_a_discarded_step_it_says_what_may_follow(heard):
+    subject, messages = heard
+    brought(subject, "discarded")
+    told = next(text for _, _, text in messages if "stopped at" in text)
     assert "restore a saved state (fmi2SetFMUstate) or fmi2Reset, else fmi2Terminate" in told
-    refused = messages[-1]
+    refused = messages[-1][2]
     assert "fmi2DoStep is not allowed in mode 'after a discarded step'; allowed are Terminate, Get, " in refused
     assert refused.endswith("SetFMUstate, Reset and FreeInstance") and "DoStep," not in refused
-    subject.close()
 
 
-def test_model_exchange_is_refused_in_words(unpacked):
+def test_model_exchange_is_refused_in_words(heard):
     """Some loaders look these functions up in every FMU."""
-    subject, messages = listening(unpacked)
+    subject, messages = heard
     library = ctypes.CDLL(subject.fmu.dll._name)
     for name in sorted(exchange_functions()):
         assert getattr(library, name)(ctypes.c_void_p(subject.fmu.component), None, 0, None) == ERROR
-        assert messages[-1] == f"{name}: this FMU does not offer it (see modelDescription.xml)"
-    subject.close()
+        assert messages[-1][2] == f"{name}: this FMU does not offer it (see modelDescription.xml)"

@@ -9,12 +9,19 @@ import re
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
+from small_stage import references, unpack
 
+import gearfmu as gf
 from evidence.fmu_probes.probes import Subject
+from gearfmu.fmu import export
+from gearfmu.stage import StageModel
 
 STEPS, H = 200, 1e-4
 TURN, RATIO = 2e-2, 16 / 24  # rad per step; the wheel turns the other way
@@ -49,40 +56,61 @@ def inputs_at(step: int, wrapped: bool = False) -> dict[str, float]:
     }
 
 
-def fmu_run(folder: str, outputs: list[str], wrapped: bool = False) -> np.ndarray:
+@dataclass(frozen=True)
+class Drive:
+    """Inputs of every step; integer and real parameters of the start; number of steps."""
+
+    inputs: Callable[[int], dict[str, float]] = inputs_at
+    whole: dict[str, int] = field(default_factory=dict)
+    real: dict[str, float] = field(default_factory=dict)
+    steps: int = STEPS
+
+
+PAIR, WRAPPED = Drive(), Drive(lambda step: inputs_at(step, True))
+
+
+def fmu_run(folder: str, outputs: list[str], drive: Drive = PAIR) -> np.ndarray:
     subject = Subject(folder)
-    by_name = {v.name: v.valueReference for v in subject.variables}
-    references = [by_name[name] for name in INPUTS]
+    by_name = references(subject)
+
+    def give(values: dict[str, float]) -> None:
+        subject.fmu.setReal([by_name[name] for name in values], list(values.values()))
+
+    subject.fmu.setInteger([by_name[name] for name in drive.whole], list(drive.whole.values()))
+    give(drive.inputs(0) | drive.real)
     subject.fmu.setupExperiment(startTime=0.0)
     subject.fmu.enterInitializationMode()
-    subject.fmu.setReal(references, list(inputs_at(0).values()))
     subject.fmu.exitInitializationMode()
     rows = []
-    for k in range(STEPS):
-        subject.fmu.setReal(references, list(inputs_at(k, wrapped).values()))
+    for k in range(drive.steps):
+        give(drive.inputs(k))
         subject.fmu.doStep(k * H, H)
         rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
     subject.close()
     return np.array(rows)
 
 
-def kernel_run(model, outputs: list[str]) -> np.ndarray:
+def kernel_run(model: StageModel, outputs: list[str], drive: Drive = PAIR) -> np.ndarray:
     kernel = model.kernel()
-    for name, value in inputs_at(0).items():
+    for name, value in (drive.inputs(0) | drive.real | drive.whole).items():
         kernel.set(name, value)
     kernel.initialize(0.0)
     rows = []
-    for k in range(STEPS):
-        for name, value in inputs_at(k).items():
+    for k in range(drive.steps):
+        for name, value in drive.inputs(k).items():
             kernel.set(name, value)
         kernel.step(k * H, H)
         rows.append([kernel.get(name) for name in outputs])
     return np.array(rows)
 
 
-@pytest.fixture(scope="module")
-def outputs(model) -> list[str]:
+def real_outputs(model: StageModel) -> list[str]:
     return [v.name for v in model.kernel_variables() if v.causality == "output" and v.type == "Real"]
+
+
+@pytest.fixture(scope="module")
+def outputs(model: StageModel) -> list[str]:
+    return real_outputs(model)
 
 
 def test_fmu_is_the_kernel_bit_for_bit(model, unpacked, unpacked_python, outputs):
@@ -92,9 +120,32 @@ def test_fmu_is_the_kernel_bit_for_bit(model, unpacked, unpacked_python, outputs
         assert fmu_run(folder, outputs).tobytes() == expected.tobytes()
 
 
+SETS = {  # torques and twists of the ports and speeds at the start; a mesh that they load
+    "planetary54/stage_housed": ({"carrier.tau": 600.0, "sun.tau": -150.0}, (85.0, 340.0), "ring_planet3.force"),
+    "two_stage/stage_housed": ({"input.phi": 0.1}, (), "stage2.force"),
+    "helical_set": ({"carrier.tau": 400.0, "sun.tau": -115.6}, (85.0, 294.2), "sun_planet1.force"),
+}
+
+
+@pytest.mark.parametrize("name", [*list(SETS)[:2], pytest.param("helical_set", marks=pytest.mark.full)])
+def test_fmus_of_sets_and_housed_stages_are_their_kernel_bit_for_bit(name: str, tmp_path: Path) -> None:
+    """With rigid bodies; sensors and mounts of a housing feel the run."""
+    given, speeds, force = SETS[name]
+    own = gf.assemble(name, ports={port.partition(".")[0]: "torque" for port in given} if speeds else None)
+    start = dict(zip(("carrier.w_start", "sun.w_start"), speeds, strict=False))
+    drive, names = Drive(lambda step: given, {"level": 0, "slices": 1}, start, 10), real_outputs(own)
+    expected = kernel_run(own, names, drive)
+    assert np.abs(expected[:, names.index(force)]).min() > 1000, "the run loads the teeth"
+    assert fmu_run(unpack(export(own, tmp_path / "stage.fmu"), tmp_path / "open"), names, drive).tobytes() == (
+        expected.tobytes()
+    )
+    felt = [np.ptp(expected[:, k]) for k, of in enumerate(names) if of.startswith(("sensor.", "mount."))]
+    assert bool(felt) == bool(own.stage.housings) and min(felt, default=1.0) > 0
+
+
 def test_angles_may_be_wrapped(unpacked, outputs):
     """To ±π, as some hosts give them: taken literally they ended the run as tooth penetration. Rounding remains."""
-    straight, wrapped = (fmu_run(unpacked, outputs, wrap) for wrap in (False, True))
+    straight, wrapped = (fmu_run(unpacked, outputs, drive) for drive in (PAIR, WRAPPED))
     assert max(abs(inputs_at(STEPS)[name]) for name in INPUTS if name.endswith(".phi")) > math.pi
     names = [i for i, name in enumerate(outputs) if name.startswith(("pinion", "wheel", "mesh"))]
     size = np.abs(straight).max(axis=0)

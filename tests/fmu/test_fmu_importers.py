@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import read_model_description, simulate_fmu
-from test_fmu_equal import STEPS, H, fmu_run, inputs_at
+from test_fmu_equal import STEPS, Drive, H, fmu_run, inputs_at
 
 import gearfmu as gf
-from evidence.fmu_probes.probes import Subject
 
 NAMES = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
 HELD = {"pinion.phi": 2e-3, "pinion.w": 1.0}  # inputs
@@ -50,19 +49,9 @@ def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
 
 
 def held_run(folder: str) -> np.ndarray:
-    """NAMES after each of STEPS steps with HELD, set after the initialisation."""
-    subject = Subject(folder)
-    by_name = {v.name: v.valueReference for v in subject.variables}
-    subject.fmu.setupExperiment(startTime=0.0)
-    subject.fmu.enterInitializationMode()
-    subject.fmu.exitInitializationMode()
-    subject.fmu.setReal([by_name[name] for name in HELD], list(HELD.values()))
-    rows = []
-    for k in range(STEPS):
-        subject.fmu.doStep(k * H, H)
-        rows.append(subject.fmu.getReal([by_name[name] for name in NAMES]))
-    subject.close()
-    return np.array(rows)
+    """NAMES after each of STEPS steps with HELD, which is set after the initialisation."""
+    at_rest = dict.fromkeys(HELD, 0.0)
+    return fmu_run(folder, NAMES, Drive(lambda step: HELD, real=at_rest))
 
 
 ECOS = """

@@ -3,15 +3,14 @@ gives the finding that names it."""
 
 from __future__ import annotations
 
-import struct
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
 import pytest
-from builds import leaky_library
+from builds import edited_library, leaky_library
 
+import gearfmu as gf
 from evidence.fmu_probes.everything import findings
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu import export, validate
@@ -50,6 +49,13 @@ def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDesc
 
 def test_good_fmus_have_no_problems(native, python, other):
     assert [findings(fmu) for fmu in (native, python, other)] == [[], [], []]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "kind"), [("planetary54", "torque"), ("planetary54", "spring"), ("two_stage", "")])
+def test_fmus_of_sets_and_trains_have_none_either(name, kind, tmp_path):
+    ports = {"carrier": kind, "sun": kind} if kind else None
+    assert findings(export(gf.assemble(name, ports=ports), tmp_path / "stage.fmu")) == []
 
 
 @pytest.fixture
@@ -117,25 +123,10 @@ def test_leaked_symbols_are_found(unrun, members, tmp_path):
 @pytest.mark.needs("gcc")
 def test_a_crash_is_a_finding(members, tmp_path):
     """A binary whose fmi2DoStep holds an invalid instruction."""
-    library = tmp_path / "library.so"
-    library.write_bytes(members[binary_of(members)])
-    listed = subprocess.run(["nm", "-D", str(library)], capture_output=True, text=True, check=True).stdout
-    address = int(next(line.split()[0] for line in listed.splitlines() if line.endswith(" fmi2DoStep")), 16)
-    data = bytearray(library.read_bytes())
-    place = file_offset(data, address)
-    data[place : place + 2] = b"\x0f\x0b"
-    (problem,) = problems_of(members, {binary_of(members): bytes(data)}, tmp_path)
+    step = r"(fmi2Status fmi2DoStep\([^)]*\)\s*\{)"
+    crashing = edited_library("crashing", {step: r"\1 __builtin_trap();"}, "double").read_bytes()
+    (problem,) = problems_of(members, {binary_of(members): crashing}, tmp_path)
     assert problem.field == "a run of 10 steps" and "ended with code -" in problem.value
-
-
-def file_offset(data: bytearray, address: int) -> int:
-    """Place in an ELF file of a virtual address (program headers)."""
-    table, size, count = struct.unpack_from("<Q", data, 32)[0], *struct.unpack_from("<HH", data, 54)
-    for k in range(count):
-        kind, _, offset, start, _, length = struct.unpack_from("<IIQQQQ", data, table + k * size)
-        if kind == 1 and start <= address < start + length:
-            return address - start + offset
-    raise AssertionError("the address lies in no segment")
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 cut"])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fzg import ALPHA, MODULE, PINION, WHEEL, gear
+from fzg import ALPHA, MODULE, PINION, WHEEL
 
 from gearfmu.geometry import GearGeometry, involute
 
@@ -25,17 +25,6 @@ def test_tip_edge_rounding_touches_flank_and_tip_circle() -> None:
         centre = PINION.flank_point(PINION.s_tip, sg) - PINION.tip_edge * PINION.flank_normal(PINION.s_tip, sg)
         assert np.linalg.norm(centre) + PINION.tip_edge == pytest.approx(PINION.r_a, rel=1e-14)
         assert sg * math.atan2(centre[1], centre[0]) == pytest.approx(PINION.tip_land_half_angle, abs=1e-14)
-
-
-def test_undercut_limit_is_the_textbook_one() -> None:
-    """Sharp rack (no rounding beyond the straight flank): x_min = h_f − z sin²α/2 with the straight dedendum."""
-    straight = 1.25 - 0.38 * (1 - math.sin(ALPHA))
-    limit = straight - 16 * math.sin(ALPHA) ** 2 / 2
-    assert gear(16, limit, 82e-3, 30e-3).s_form == pytest.approx(0, abs=1e-15)
-    for shift, cut in ((limit - 0.01, True), (limit + 0.01, False)):
-        shape = gear(16, shift, 82e-3, 30e-3)
-        assert bool(shape.rounding.form_roll < 0) is cut and shape.s_form > 0
-    assert gear(16, 0.5, 82e-3, 30e-3).least_shift(straight) == pytest.approx(limit, abs=1e-15)
 
 
 def left_by_the_rack(shape: GearGeometry, radius: np.ndarray) -> np.ndarray:
@@ -68,12 +57,3 @@ def test_a_tooth_is_what_the_rack_leaves_of_it(z: int, x: float, fillet: float) 
     assert left_by_the_rack(shape, above) == pytest.approx(involutes, abs=1e-8)
     radius, angle = shape.rounding.polar(np.linspace(shape.form_angle + 1e-3, math.pi / 2 - 0.2, 12))
     assert left_by_the_rack(shape, radius) == pytest.approx(angle, abs=1e-8)
-
-
-def test_the_form_circle_goes_through_the_limit_of_undercut_without_a_jump() -> None:
-    """On either side of it the roll is that of the common tangent and that of the crossing; both end at the base
-    circle."""
-    limit = gear(16, 0.0, 82e-3, 30e-3).least_shift(1.25 - 0.38 * (1 - math.sin(ALPHA)))
-    rolls = [gear(16, limit + step, 82e-3, 30e-3).s_form for step in (-2e-3, -1e-3, -1e-6, -1e-12, 1e-6, 1e-3)]
-    assert all(0 <= roll < 4e-3 * MODULE for roll in rolls)
-    assert rolls[0] > rolls[1] > rolls[2] and rolls[5] > rolls[4]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
-from fzg import without_backlash
+from fzg import PAIR, without_backlash
 from hypothesis import given
 from hypothesis import strategies as st
 from sections import half_outline
@@ -45,31 +45,43 @@ def test_reference_diameters_and_overlap_as_published() -> None:
     assert without_backlash(EXAMPLE) == pytest.approx(0.5, abs=5e-6)
 
 
-def test_pair_in_50_digits() -> None:
-    """Written down again with mpmath, by way of tooth thickness on the working circle instead of ψ_b."""
+@pytest.mark.parametrize(
+    ("pair", "module", "beta", "distance", "tips", "shifts"),
+    [
+        (EXAMPLE, "8", "15.8", "500", ("159.66", "872.35"), ("0.145", "0")),
+        (PAIR, "4.5", "0", "91.5", ("82.46", "118.36"), ("0.1817", "0.1715")),
+    ],
+    ids=["ISO/TR 6336-30", "FZG type C"],
+)
+def test_pair_in_50_digits(
+    pair: PairGeometry, module: str, beta: str, distance: str, tips: tuple[str, str], shifts: tuple[str, str]
+) -> None:
+    """Written down again with mpmath, by way of tooth thickness on the working circle instead of ψ_b; mm."""
+    first, second = pair.gears
     with mpmath.workdps(50):
-        m, a, z = mpmath.mpf(8), mpmath.mpf(500), (17, 103)
-        alpha, beta = mpmath.radians(20), mpmath.radians(mpmath.mpf("15.8"))
-        alpha_t = mpmath.atan(mpmath.tan(alpha) / mpmath.cos(beta))
-        m_t = m / mpmath.cos(beta)
+        m, a, z = mpmath.mpf(module), mpmath.mpf(distance), (first.z, second.z)
+        alpha, helix = mpmath.radians(20), mpmath.radians(mpmath.mpf(beta))
+        alpha_t = mpmath.atan(mpmath.tan(alpha) / mpmath.cos(helix))
+        m_t = m / mpmath.cos(helix)
         r_b = [m_t * k / 2 * mpmath.cos(alpha_t) for k in z]
         alpha_wt = mpmath.acos(sum(r_b) / a)
-        rolls = [mpmath.sqrt((mpmath.mpf(d) / 2) ** 2 - r**2) for d, r in zip(("159.66", "872.35"), r_b, strict=True)]
+        length = a * mpmath.sin(alpha_wt)
+        rolls = [mpmath.sqrt((mpmath.mpf(d) / 2) ** 2 - r**2) for d, r in zip(tips, r_b, strict=True)]
         pitch = mpmath.pi * m_t * mpmath.cos(alpha_t)
-        ratio = (sum(rolls) - a * mpmath.sin(alpha_wt)) / pitch
         inv = [mpmath.tan(angle) - angle for angle in (alpha_t, alpha_wt)]
-        s_t = [m_t * (mpmath.pi / 2 + 2 * x * mpmath.tan(alpha)) for x in (mpmath.mpf("0.145"), mpmath.mpf(0))]
-        half_b = s_t[0] / (m_t * 17) + inv[0]
+        s_t = [m_t * (mpmath.pi / 2 + 2 * mpmath.mpf(x) * mpmath.tan(alpha)) for x in shifts]
+        half_b = s_t[0] / (m_t * z[0]) + inv[0]
         working = [r / mpmath.cos(alpha_wt) for r in r_b]
         thick = [2 * rw * (s / (m_t * k) + inv[0] - inv[1]) for rw, s, k in zip(working, s_t, z, strict=True)]
-        backlash = 2 * mpmath.pi * working[0] / 17 - sum(thick)
-    assert FIRST.alpha_t == pytest.approx(float(alpha_t), rel=1e-14)
-    assert (FIRST.r_b, SECOND.r_b) == pytest.approx([float(r) / 1e3 for r in r_b], rel=1e-14)
-    assert FIRST.psi_b == pytest.approx(float(half_b), rel=1e-14)
-    assert EXAMPLE.alpha_wt == pytest.approx(float(alpha_wt), rel=1e-13)
-    assert EXAMPLE.base_pitch == pytest.approx(float(pitch) / 1e3, rel=1e-14)
-    assert EXAMPLE.tip_circle_contact_ratio == pytest.approx(float(ratio), rel=1e-12)
-    assert EXAMPLE.nominal_backlash == pytest.approx(float(backlash) / 1e3, abs=1e-15)
+        backlash = 2 * mpmath.pi * working[0] / z[0] - sum(thick)
+    assert first.alpha_t == pytest.approx(float(alpha_t), rel=1e-14)
+    assert (first.r_b, second.r_b) == pytest.approx([float(r) / 1e3 for r in r_b], rel=1e-14)
+    assert first.psi_b == pytest.approx(float(half_b), rel=1e-14)
+    assert pair.alpha_wt == pytest.approx(float(alpha_wt), rel=1e-14)
+    assert pair.length == pytest.approx(float(length) / 1e3, rel=1e-13)
+    assert pair.base_pitch == pytest.approx(float(pitch) / 1e3, rel=1e-14)
+    assert pair.tip_circle_contact_ratio == pytest.approx(float((sum(rolls) - length) / pitch), rel=1e-12)
+    assert pair.nominal_backlash == pytest.approx(float(backlash) / 1e3, abs=1e-15 * pair.a)
 
 
 @given(z=teeth, beta=angles, alpha=normal_angles, x=st.floats(-0.5, 1))
@@ -138,11 +150,15 @@ class TestRoot:
 
 
 def test_undercut_limit_in_the_transverse_section() -> None:
-    """Sharp rack: x_min = h_f − z sin² α_t / (2 cos β), ISO 21771."""
+    """Sharp rack: x_min = h_f − z sin² α_t / (2 cos β), ISO 21771, with the straight dedendum."""
+    straight = 1.4 - 0.39 * (1 - math.sin(ALPHA))
     for beta in (0.0, BETA, math.radians(32)):
-        straight = 1.4 - 0.39 * (1 - math.sin(ALPHA))
         limit = straight - 14 * math.sin(gear(14, 0.0, beta).alpha_t) ** 2 / (2 * math.cos(beta))
         assert gear(14, limit, beta).s_form == pytest.approx(0, abs=1e-14)
+        assert gear(14, 0.5, beta).least_shift(straight) == pytest.approx(limit, abs=1e-15)
+        for shift, cut in ((limit - 0.01, True), (limit + 0.01, False)):
+            shape = gear(14, shift, beta)
+            assert bool(shape.rounding.form_roll < 0) is cut and shape.s_form > 0
 
 
 def test_normal_backlash_and_wheel_phase() -> None:

@@ -48,21 +48,6 @@ def test_tip_edge_rounding_touches_flank_and_tip_circle():
     assert np.hypot(*centre) == pytest.approx(RING.r_a + RING.tip_edge, rel=1e-13)
 
 
-def test_planet_and_ring_touch_where_the_gap_vanishes():
-    """s_ring = s_planet + L: the two flank points coincide, with opposite normals."""
-    mesh = SET.ring_mesh
-    t = -math.acos((mesh.ring.r_b - mesh.planet.r_b) / mesh.a)  # direction of the tangent points, planet on +x, sg = +1
-    for s in np.linspace(mesh.path["A"], mesh.path["E"], 7):
-        point, normal = [], []
-        for shape, roll, centre in ((mesh.planet, s, mesh.a), (mesh.ring, s + mesh.length, 0.0)):
-            turn = t - (shape.psi_b - roll / shape.r_b)
-            q = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-            point.append(q @ shape.flank_point(roll) + [centre, 0])
-            normal.append(q @ shape.flank_normal(roll))
-        assert point[0] == pytest.approx(point[1], abs=1e-12)
-        assert normal[0] == pytest.approx(-normal[1], abs=1e-12)
-
-
 def test_least_tip_radius_is_where_the_planets_form_circle_is_met():
     assert SET.ring_mesh.least_tip_radius == pytest.approx(65.36e-3, abs=5e-6)
     edge = replace(RING, r_a=SET.ring_mesh.least_tip_radius, tip_edge=0.0)

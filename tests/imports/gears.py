@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from decks import write_deck
+import scipy.sparse as sp
+from decks import STEEL, write_deck
 
 from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
@@ -50,6 +52,22 @@ def hex20_deck(path: Path, nodes: np.ndarray | None = None, whole: bool = True) 
     mesh = pinion(whole)
     points = 1e3 * (mesh.nodes if nodes is None else nodes)
     return write_deck(path, points, {"hexahedron20": mesh.elements}, {"BORE": mesh.sets["bore"]})
+
+
+def without(mesh: FeMesh, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and elements of a mesh of which these elements are left."""
+    used, new = np.unique(cells, return_inverse=True)
+    return mesh.nodes[used], new.reshape(cells.shape)
+
+
+def write_matrices(
+    folder: Path,
+    mesh: FeMesh,
+    change: Callable[[sp.csr_array, sp.csr_array], tuple[sp.csr_array, sp.csr_array]] = lambda k, m: (k, m),
+) -> None:
+    """k.npz and m.npz (SI) of a steel body, changed."""
+    for name, matrix in zip("km", change(*hex20.assemble(mesh.nodes, mesh.elements, STEEL)), strict=True):
+        sp.save_npz(folder / f"{name}.npz", sp.csr_matrix(matrix))
 
 
 def tetrahedra(mesh: FeMesh) -> tuple[np.ndarray, np.ndarray]:

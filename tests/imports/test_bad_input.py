@@ -11,12 +11,13 @@ import pytest
 import scipy.sparse as sp
 from blocks import free_body
 from decks import STEEL, brick, write_deck
-from gears import hex20_deck, pinion, stage
+from gears import hex20_deck, pinion, stage, without, write_matrices
 
 from gearfmu.body import reduce_bodies
-from gearfmu.errors import GearfmuError, MeshError, SpecError
+from gearfmu.errors import GearfmuError, MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.factor import FactorError
+from gearfmu.fem.matrices import read_matrix
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction import memory
 from gearfmu.reduction.imported.gear import hinge_problem
@@ -37,134 +38,87 @@ def refused(folder: Path, section: str = SECTION) -> str:
     return text
 
 
-def deck(folder: Path, nodes: np.ndarray, cells: np.ndarray, **sets: np.ndarray) -> Path:
-    return write_deck(folder / "pinion.inp", 1e3 * nodes, {"hexahedron20": cells}, sets)
+Mesh = tuple[np.ndarray, np.ndarray]  # nodes (N, 3) m, elements (E, 20)
 
 
-def inverted(folder: Path) -> str:
-    nodes = pinion(False).nodes.copy()
-    corner = pinion(False).elements[40, 6]
-    nodes[corner] += 3 * (nodes[pinion(False).elements[40, 0]] - nodes[corner])
-    deck(folder, nodes, pinion(False).elements)
-    return "inverted or folded"
+def inverted(nodes: np.ndarray, cells: np.ndarray) -> Mesh:
+    moved, corner = nodes.copy(), cells[40, 6]
+    moved[corner] += 3 * (nodes[cells[40, 0]] - nodes[corner])
+    return moved, cells
 
 
-def mirrored(folder: Path) -> str:
-    deck(folder, pinion(False).nodes * [1, 1, -1], pinion(False).elements)
-    return "all 128 elements .* inside out"
+def unmerged(nodes: np.ndarray, cells: np.ndarray) -> Mesh:
+    """One element with nodes of its own."""
+    own = cells.copy()
+    own[7] = len(nodes) + np.arange(20)
+    return np.concatenate([nodes, nodes[cells[7]]]), own
 
 
-def duplicate_nodes(folder: Path) -> str:
-    """One element with nodes of its own, as an unmerged part has them."""
-    cells = pinion(False).elements.copy()
-    extra = pinion(False).nodes[cells[7]]
-    cells[7] = len(pinion(False).nodes) + np.arange(20)
-    deck(folder, np.concatenate([pinion(False).nodes, extra]), cells)
-    return "20 pairs of nodes lie at the same place .* merge"
-
-
-def disconnected(folder: Path) -> str:
-    nodes, cells = pinion(False).nodes, pinion(False).elements
-    far = nodes + np.array([0.0, 0.0, 0.1])
-    deck(folder, np.concatenate([nodes, far]), np.concatenate([cells, cells + len(nodes)]))
-    return "2 parts that share no node"
-
-
-def hinge_by_an_edge(folder: Path) -> str:
+def hinged(*_: np.ndarray) -> Mesh:
     """Two bricks that meet in one edge."""
     nodes, cells = brick("hexahedron20", (1, 1, 1), (10.0, 10.0, 10.0))
     other = nodes + [10.0, 10.0, 0.0]
     distance = np.abs(other[:, None] - nodes[None]).sum(axis=2)
     same = np.where(distance.min(axis=1) < 1e-9, distance.argmin(axis=1), -1)
     new = np.where(same >= 0, same, len(nodes) + np.cumsum(same < 0) - 1)
-    write_deck(
-        folder / "pinion.inp",
-        np.concatenate([nodes, other[same < 0]]),
-        {"hexahedron20": np.vstack([cells, new[cells]])},
-    )
-    return "2 parts of the mesh hang together only by nodes or edges"
+    return MM * np.concatenate([nodes, other[same < 0]]), np.vstack([cells, new[cells]])
 
 
-def loose_node(folder: Path) -> str:
-    deck(folder, np.concatenate([pinion(False).nodes, [[0, 0, 0.1]]]), pinion(False).elements)
-    return "1 nodes belong to no element .* `ignore`"
-
-
-def wrong_length(folder: Path) -> str:
-    write_deck(folder / "pinion.inp", pinion(False).nodes, {"hexahedron20": pinion(False).elements})
-    return "base circle|not the gear|no involute"
-
-
-def other_gear(folder: Path) -> str:
-    deck(folder, 1.01 * pinion(False).nodes, pinion(False).elements)
-    return "not the gear of the stage file: base radius 34.16. mm instead of 33.829 mm|no involutes"
-
-
-def narrow_gear(folder: Path) -> str:
-    deck(folder, pinion(False).nodes * [1, 1, 0.9], pinion(False).elements)
-    return "face width 12.6 mm instead of 14 mm"
-
-
-def no_involute(folder: Path) -> str:
+def hollowed(nodes: np.ndarray, cells: np.ndarray) -> Mesh:
     """Flanks hollowed by 30 µm between form and tip."""
-    mesh = pinion(False)
-    nodes = mesh.nodes.copy()
-    for side, grid in mesh.flank.items():
+    moved = nodes.copy()
+    for side, grid in pinion(False).flank.items():
         low, high = grid.roll.min(), grid.roll.max()
         depth = 30e-6 * np.sin(np.pi * (grid.roll - low) / (high - low))
         t = 0.1213458 - grid.roll / 0.0338289
-        nodes[grid.quads] = mesh.nodes[grid.quads] - depth[..., None] * np.stack(
-            [-np.sin(t), (1 - 2 * side) * np.cos(t), 0 * t], axis=-1
-        )
-    deck(folder, nodes, mesh.elements)
-    return r"the flanks are no involutes: nodes lie up to \d+(\.\d+)? µm .* allowed are 5 µm"
+        normal = np.stack([-np.sin(t), (1 - 2 * side) * np.cos(t), 0 * t], axis=-1)
+        moved[grid.quads] = nodes[grid.quads] - depth[..., None] * normal
+    return moved, cells
 
 
-def half_a_gear(folder: Path) -> str:
+def halved(*_: np.ndarray) -> Mesh:
     middle = pinion().nodes[pinion().elements].mean(axis=1)
-    cells = pinion().elements[middle[:, 1] > 0]
-    used = np.unique(cells)
-    new = np.full(len(pinion().nodes), -1)
-    new[used] = np.arange(len(used))
-    deck(folder, pinion().nodes[used], new[cells])
-    return "neither a whole gear nor one sector|cut faces|one pitch"
+    return without(pinion(), pinion().elements[middle[:, 1] > 0])
 
 
-@pytest.mark.parametrize(
-    "make",
-    [inverted, mirrored, duplicate_nodes, disconnected, hinge_by_an_edge, loose_node, wrong_length, other_gear,
-    narrow_gear, no_involute, half_a_gear],
-    ids=lambda make: make.__name__,
-)  # fmt: skip
-def test_a_bad_mesh_is_refused(tmp_path: Path, make: Callable[[Path], str]) -> None:
-    wanted = make(tmp_path)
-    text = refused(tmp_path)
-    print(text)
-    assert re.search(wanted, text), text
+BAD_MESHES: dict[str, tuple[Callable[[np.ndarray, np.ndarray], Mesh], str]] = {  # what is made of the pinion's sector
+    "inverted": (inverted, "inverted or folded"),
+    "mirrored": (lambda nodes, cells: (nodes * [1, 1, -1], cells), "all 128 elements .* inside out"),
+    "unmerged": (unmerged, "20 pairs of nodes lie at the same place .* merge"),
+    "twice": (
+        lambda nodes, cells: (
+            np.concatenate([nodes, nodes + [0, 0, 0.1]]),
+            np.concatenate([cells, cells + len(nodes)]),
+        ),
+        "2 parts that share no node",
+    ),
+    "hinged": (hinged, "2 parts of the mesh hang together only by nodes or edges"),
+    "a loose node": (
+        lambda nodes, cells: (np.concatenate([nodes, [[0, 0, 0.1]]]), cells),
+        "1 nodes belong to no element .* `ignore`",
+    ),
+    "in metres": (lambda nodes, cells: (MM * nodes, cells), "base circle|not the gear|no involute"),
+    "another gear": (
+        lambda nodes, cells: (1.01 * nodes, cells),
+        "not the gear of the stage file: base radius 34.16. mm instead of 33.829 mm|no involutes",
+    ),
+    "narrow": (lambda nodes, cells: (nodes * [1, 1, 0.9], cells), "face width 12.6 mm instead of 14 mm"),
+    "hollowed": (hollowed, r"the flanks are no involutes: nodes lie up to \d+(\.\d+)? µm .* allowed are 5 µm"),
+    "half a gear": (halved, "neither a whole gear nor one sector|cut faces|one pitch"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MESHES)
+def test_a_bad_mesh_is_refused(tmp_path: Path, case: str) -> None:
+    make, wanted = BAD_MESHES[case]
+    nodes, cells = make(pinion(False).nodes, pinion(False).elements)
+    write_deck(tmp_path / "pinion.inp", 1e3 * nodes, {"hexahedron20": cells})
+    assert re.search(wanted, refused(tmp_path)), refused(tmp_path)
 
 
 def test_a_missing_set_names_those_there_are(tmp_path: Path) -> None:
     hex20_deck(tmp_path / "pinion.inp", whole=False)
     assert "there is no node set 'HUB'; sets in the file: BORE, NALL" in refused(tmp_path, SECTION + 'bore = "HUB"')
-
-
-def test_a_missing_file_and_a_wrong_pair_of_fields(tmp_path: Path) -> None:
-    text = refused(tmp_path)
-    assert "gears.pinion.import.file = pinion.inp" in text and "relative to the stage file" in text
-    with pytest.raises(SpecError, match="stiffness and mass come together"):
-        stage(tmp_path, SECTION + 'mass = "m.npz"')
-    with pytest.raises(SpecError, match='gears.pinion.import.lenght = "1 mm": unknown key: did you mean "length"'):
-        stage(tmp_path, SECTION + 'lenght = "1 mm"')
-
-
-def test_missing_files_are_told_at_load_with_all_other_problems(tmp_path: Path) -> None:
-    """Also where the file could not be read for another reason."""
-    files = READY + 'unknowns = "pinion.dof"\n'
-    for wrong, also in (("bore_coupling = 3", "bore_coupling"), ('flank_tolerance = "5 kg"', "flank_tolerance")):
-        with pytest.raises(SpecError) as caught:
-            stage(tmp_path, files + wrong)
-        fields = [problem.field.removeprefix("gears.pinion.import.") for problem in caught.value.problems]
-        assert sorted(fields) == sorted([also, "file", "stiffness", "mass", "unknowns"])
 
 
 def test_paths_are_relative_to_the_file_that_holds_them(tmp_path: Path) -> None:
@@ -177,57 +131,35 @@ def test_paths_are_relative_to_the_file_that_holds_them(tmp_path: Path) -> None:
     assert Path(load_stage(variant).gears[0].imported.file).resolve() == (tmp_path / "pinion.inp").resolve()
 
 
-@pytest.fixture(scope="module")
-def matrices() -> tuple[sp.csr_array, sp.csr_array]:
-    mesh = pinion(False)
-    return solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, STEEL)
-
-
 READY = SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
-
-
-def grounded(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return (
-        k + sp.diags_array(np.where(np.arange(k.shape[0]) < 30, 1e9, 0.0)),
-        m,
+BAD_MATRICES: dict[str, tuple[Callable[[sp.csr_array, sp.csr_array], tuple[sp.csr_array, sp.csr_array]], str]] = {
+    "grounded": (
+        lambda k, m: (k + sp.diags_array(np.where(np.arange(k.shape[0]) < 30, 1e9, 0.0)), m),
         r"rigid motion \(x, y, z.*export the free body",
-    )
-
-
-def light(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return k, 1e-3 * m, "mass matrix weighs .* `mass_unit`"
-
-
-def soft(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return 1e-3 * k, m, "waves of 2.* m/s, the material 5.1e\\+03 m/s: check `force_unit`"
-
-
-def shuffled(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    order = np.arange(k.shape[0])[::-1]
-    return k[order][:, order], m[order][:, order], "rigid motion .* rows belong to these nodes"
-
-
-def short(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return (
-        k[:-3][:, :-3],
-        m[:-3][:, :-3],
+    ),
+    "light": (lambda k, m: (k, 1e-3 * m), "mass matrix weighs .* `mass_unit`"),
+    "soft": (
+        lambda k, m: (1e-3 * k, m),
+        "waves of 2.* m/s, the material 5.1e\\+03 m/s: check `force_unit`",
+    ),
+    "in another order": (
+        lambda k, m: (k[::-1][:, ::-1], m[::-1][:, ::-1]),
+        "rigid motion .* rows belong to these nodes",
+    ),
+    "short": (
+        lambda k, m: (k[:-3][:, :-3], m[:-3][:, :-3]),
         "2628 rows, but the mesh has 877 nodes, that is 2631 unknowns: give `unknowns`",
-    )
+    ),
+    "lopsided": (lambda k, m: (sp.tril(k), m), "the matrix is not symmetric: write both halves"),
+}
 
 
-def lopsided(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return sp.csr_array(sp.tril(k)), m, "the matrix is not symmetric: write both halves"
-
-
-@pytest.mark.parametrize("spoil", [grounded, light, soft, shuffled, short, lopsided], ids=lambda spoil: spoil.__name__)
-def test_bad_matrices_are_refused(tmp_path: Path, matrices, spoil) -> None:
-    stiffness, mass, wanted = spoil(*matrices)
+@pytest.mark.parametrize("case", BAD_MATRICES)
+def test_bad_matrices_are_refused(tmp_path: Path, case: str) -> None:
+    spoil, wanted = BAD_MATRICES[case]
     hex20_deck(tmp_path / "pinion.inp", whole=False)
-    sp.save_npz(tmp_path / "k.npz", sp.csr_matrix(stiffness))
-    sp.save_npz(tmp_path / "m.npz", sp.csr_matrix(mass))
-    text = refused(tmp_path, READY)
-    print(text)
-    assert re.search(wanted, text), text
+    write_matrices(tmp_path, pinion(False), spoil)
+    assert re.search(wanted, refused(tmp_path, READY)), refused(tmp_path, READY)
 
 
 def test_a_body_that_is_no_solid_is_told_by_its_first_frequency() -> None:
@@ -265,13 +197,34 @@ DECKS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", DECKS)
-def test_decks_that_would_be_read_wrongly_are_refused(tmp_path: Path, case: str) -> None:
-    text, wanted = DECKS[case]
-    path = tmp_path / "pinion.inp"
-    path.write_text(text + "\n", encoding="utf-8")
+FILES = {  # content, None of a file that is not there
+    "brick.msh": (b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "brick.msh: not a gmsh file that can be read"),
+    "brick.stl": (b"solid", "'.stl' is no mesh file that is read here"),
+    "cards.bdf": (b"GRID,1,,0.,0.,0.\n", "BEGIN BULK"),
+    "system.bdf": (b"BEGIN BULK\nGRID,1,5,0.,0.,0.\nENDDATA\n", "system.bdf:2: a GRID in coordinate system 5"),
+    "k.op2": (b"x", "is no matrix file that is read here: .mtx"),
+    "k.op4": (b"\x18\x00\x00\x00\x06\x00", "a binary OUTPUT4 file; ask for FORMATTED"),
+    "k.mtx": (b"no header", "no sound .mtx matrix"),
+    "k.npz": (b"no zip", "no sound .npz matrix|cannot be read"),
+    "k.sti": (b"1 2\n", "no sound .sti matrix"),
+    "k.pch": (b"$ nothing\n", "expected one DMIG matrix, found 0"),
+    "nowhere.mtx": (None, "nowhere.mtx: the file cannot be read"),
+}
+UNREADABLE = [(name, *case) for name, case in FILES.items()]
+UNREADABLE += [("pinion.inp", f"{text}\n".encode(), wanted) for text, wanted in DECKS.values()]
+
+
+@pytest.mark.parametrize(("name", "content", "wanted"), UNREADABLE, ids=[*FILES, *DECKS])
+def test_files_that_cannot_be_read_or_would_be_read_wrongly_are_refused(
+    tmp_path: Path, name: str, content: bytes | None, wanted: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=wanted):
-        read_mesh(path, MM)
+        if Path(name).suffix in (".inp", ".msh", ".stl", ".bdf"):
+            read_mesh(tmp_path / name, MM)
+        else:
+            read_matrix(tmp_path / name, None, np.array([7, 11]))
 
 
 @pytest.mark.parametrize(("whole", "size"), [(False, "unknowns a sector"), (True, "unknowns")])

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from decks import write_deck
-from gears import hex20_deck, pinion, stage, tetrahedra
+from gears import hex20_deck, pinion, stage, tetrahedra, without, write_matrices
+from scipy.spatial import cKDTree
 
 from gearfmu.body import Body, reduce_body
+from gearfmu.body.imported import imported_full_order
 from gearfmu.body.layout import value_of
-from gearfmu.fem import solids
 from gearfmu.femesh.quality import write_vtu
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.toothed import gear_full_order
 from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
@@ -39,24 +42,6 @@ def assert_same(body: Body, native: Body, tolerance: float) -> None:
     assert body.error.max_error == pytest.approx(native.error.max_error, rel=1e-3)
 
 
-@pytest.mark.parametrize("whole", [True, pytest.param(False, marks=pytest.mark.full)])
-def test_our_own_mesh_comes_back_as_the_same_body(tmp_path: Path, native: Body, whole: bool) -> None:
-    """Cut into sectors again, or one sector as such."""
-    hex20_deck(tmp_path / "pinion.inp", whole=whole)
-    body = imported(tmp_path, SECTION + 'bore = "bore"')
-    assert body.how.mesh["method"] == "cyclic"
-    assert_same(body, native, 1e-9)
-
-
-def test_a_gear_that_lies_elsewhere_is_found(tmp_path: Path, native: Body) -> None:
-    """Axis along x, off the origin, tilted by 0.2°, tooth 0 anywhere."""
-    points = pinion().nodes @ turn(2, 0.7) @ turn(0, np.radians(0.2)) + np.array([3e-4, -2e-4, 0.1])
-    hex20_deck(tmp_path / "pinion.inp", points[:, [2, 0, 1]])
-    body = imported(tmp_path, SECTION + 'bore = "BORE"\naxis = "x"')
-    assert body.how.mesh["method"] == "cyclic" and body.how.mesh["fit"]["residual_max_um"] < 1e-3
-    assert_same(body, native, 1e-7)
-
-
 def turn(axis: int, angle: float) -> np.ndarray:
     a, b = (axis + 1) % 3, (axis + 2) % 3
     matrix = np.eye(3)
@@ -64,25 +49,30 @@ def turn(axis: int, angle: float) -> np.ndarray:
     return matrix
 
 
-def test_exported_vtu_comes_back(tmp_path: Path, native: Body) -> None:
-    write_vtu(pinion(whole=False), tmp_path / "pinion.vtu")
-    assert_same(imported(tmp_path, 'file = "pinion.vtu"\nlength = "1 m"\nbore = "bore"'), native, 1e-9)
+def elsewhere(folder: Path) -> None:
+    """Axis along x, off the origin, tilted by 0.2°, tooth 0 anywhere."""
+    points = pinion().nodes @ turn(2, 0.7) @ turn(0, np.radians(0.2)) + np.array([3e-4, -2e-4, 0.1])
+    hex20_deck(folder / "pinion.inp", points[:, [2, 0, 1]])
 
 
-@pytest.mark.full
-def test_ready_made_matrices_give_the_same_body_by_the_mean_tooth(tmp_path: Path, native: Body) -> None:
-    """The whole gear without any symmetry, its 60 lowest modes sorted by nodal diameter: two methods, one answer."""
-    hex20_deck(tmp_path / "pinion.inp")
-    material = stage(tmp_path).gears[0].material
-    stiffness, mass = solids.assemble(pinion().nodes, {"hexahedron20": pinion().elements}, material)
-    sp.save_npz(tmp_path / "k.npz", sp.csr_matrix(1e-3 * stiffness))
-    sp.save_npz(tmp_path / "m.npz", sp.csr_matrix(1e-3 * mass))
-    body = imported(tmp_path, SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\nmass_unit = "1 t"')
-    assert body.how.mesh["method"] == "mean tooth" and body.how.mesh["teeth_deviation"] < 1e-9
-    assert_same(body, native, 1e-8)
-    assert np.array_equal(body.flank.diameter, native.flank.diameter) and np.array_equal(
-        body.flank.parity, native.flank.parity
-    )
+MATRICES = SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\n'
+VTU = 'file = "pinion.vtu"\nlength = "1 m"\nbore = "bore"'
+ROADS: dict[str, tuple[Callable[[Path], object], str, float]] = {  # writes the files, section, tolerance
+    "whole": (lambda folder: hex20_deck(folder / "pinion.inp"), SECTION + 'bore = "bore"', 1e-9),
+    "sector": (lambda folder: hex20_deck(folder / "pinion.inp", whole=False), SECTION + 'bore = "bore"', 1e-9),
+    "elsewhere": (elsewhere, SECTION + 'bore = "BORE"\naxis = "x"', 1e-7),
+    "vtu": (lambda folder: write_vtu(pinion(whole=False), folder / "pinion.vtu"), VTU, 1e-9),
+}
+
+
+@pytest.mark.parametrize("road", ROADS)
+def test_our_own_mesh_comes_back_as_the_same_body(tmp_path: Path, native: Body, road: str) -> None:
+    """Cut into sectors again, or one sector as such."""
+    write, section, tolerance = ROADS[road]
+    write(tmp_path)
+    body = imported(tmp_path, section)
+    assert_same(body, native, tolerance)
+    assert body.how.mesh["method"] == "cyclic" and body.how.mesh["fit"]["residual_max_um"] < 1e-3
 
 
 @pytest.mark.full
@@ -110,10 +100,8 @@ def keyway_cells() -> np.ndarray:
 def test_a_keyway_is_the_mean_tooth_and_its_error_is_stated(tmp_path: Path, native: Body) -> None:
     cells = keyway_cells()
     assert 0 < len(pinion().elements) - len(cells) < 20
-    used = np.unique(cells)
-    new = np.full(len(pinion().nodes), -1)
-    new[used] = np.arange(len(used))
-    write_deck(tmp_path / "pinion.inp", 1e3 * pinion().nodes[used], {"hexahedron20": new[cells]})
+    nodes, left = without(pinion(), cells)
+    write_deck(tmp_path / "pinion.inp", 1e3 * nodes, {"hexahedron20": left})
     body = imported(tmp_path)
     assert body.how.mesh["method"] == "mean tooth"
     assert 1e-4 < body.how.mesh["teeth_deviation"] < 0.2 and body.how.mesh["compliance_left_to_residual"] < 0.02
@@ -141,3 +129,39 @@ def test_the_hash_covers_the_contents_of_the_file(tmp_path: Path) -> None:
     assert expected_hash(spec, "pinion") != before
     moved = deck.rename(tmp_path / "other.inp")
     assert expected_hash(stage(tmp_path, SECTION.replace("pinion.inp", moved.name)), "pinion") != before
+
+
+# ---- the full model, for every method that reduces it ----------------------------------------------------------------
+def places(body: FullOrder) -> np.ndarray:
+    """(N, 3) m of the nodes, from the rigid rotations of the body."""
+    turn_x, turn_z = body.rigid[:, 3].reshape(-1, 3), body.rigid[:, 5].reshape(-1, 3)
+    return np.column_stack([turn_z[:, 1], -turn_z[:, 0], -turn_x[:, 1]])
+
+
+@pytest.fixture(scope="module")
+def exact(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
+    return gear_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("whole", "ready"),
+    [(True, False), (False, True), *(pytest.param(both, both, marks=pytest.mark.full) for both in (False, True))],
+)
+def test_the_same_full_model_whatever_the_road(tmp_path: Path, exact: FullOrder, whole: bool, ready: bool) -> None:
+    """Whole mesh or sector, our elements or ready-made matrices: K, M and the rows of all interfaces."""
+    hex20_deck(tmp_path / "pinion.inp", whole=whole)
+    if ready:
+        write_matrices(tmp_path, pinion(whole))
+    section = MATRICES + 'force_unit = "1e-3 N"\n' if ready else SECTION
+    body = imported_full_order(stage(tmp_path, section).by_file["pinion"])
+    assert [i.name for i in body.interfaces] == [i.name for i in exact.interfaces] and body.ground == ("bore",)
+    assert body.length == exact.length and body.size == exact.size
+    for own, other in zip(body.interfaces, exact.interfaces, strict=True):
+        assert np.allclose(own.point, other.point, atol=1e-8)
+    distance, order = cKDTree(places(body)).query(places(exact))
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    assert distance.max() < 1e-8 and len(np.unique(order)) == len(order)
+    for name in ("stiffness", "mass"):
+        own, other = getattr(body, name)[dofs][:, dofs], getattr(exact, name)
+        assert np.abs(own - other).max() < 1e-6 * np.abs(other).max(), name
+    assert np.abs(body.rows()[:, dofs] - exact.rows()).max() < 1e-6 * np.abs(exact.rows("bore")).max()

@@ -54,17 +54,6 @@ def unequal() -> WholeGear:
     return WholeGear(FullOrder(mass=sp.csr_array(mass), **values), whole().flank_rows, whole().points)
 
 
-def test_loads_on_any_surface_are_those_on_our_own() -> None:
-    """Gauss points looked up on the surface against integration element by element, every tooth in its place."""
-    own = coarse().flank_rows
-    mesh = coarse().mesh
-    rows = tooth_loads(mesh.nodes, solids.boundary({"hexahedron20": mesh.elements}), flank(), coarse().points)
-    assert np.abs(rows.toarray() - own).max() < 1e-9 * np.abs(own).max()
-    force = np.array([row @ whole().body.rigid[:, :3] for row in whole().flank_rows])
-    uniform = force[:, :: coarse().points.functions]
-    assert np.allclose(np.linalg.norm(uniform[0], axis=1), np.linalg.norm(uniform[5], axis=1), rtol=1e-12, atol=0)
-
-
 def test_a_cyclic_body_is_its_own_mean() -> None:
     space = Elastic(whole().body)
     modes, left = mean_modes(whole(), space, COUNT)

@@ -8,7 +8,7 @@ from blocks import free_body
 from decks import STEEL, brick
 
 from gearfmu.errors import MeshError
-from gearfmu.fem import solids, tet10
+from gearfmu.fem import solids
 from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, rigid_fields, rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
 
@@ -17,16 +17,6 @@ from gearfmu.fem.lanczos import lowest_modes
 def bar() -> tuple[np.ndarray, dict[str, np.ndarray]]:
     nodes, cells = brick("tetra10", (3, 2, 2), (0.03, 0.01, 0.012))
     return nodes, {"tetra10": cells}
-
-
-def test_rules_and_shape_functions() -> None:
-    for _, weights in (tet10.rule_4(), tet10.rule_24()):
-        assert weights.sum() == pytest.approx(1 / 6, rel=1e-13)
-    points, weights = tet10.rule_24()
-    x, y, z = points.T
-    assert weights @ (x**2 * y**2 * z**2) == pytest.approx(8 / 362880, rel=1e-12)  # 2!2!2!/(6 + 3)!
-    assert np.allclose(tet10.shape(tet10.NATURAL), np.eye(10), atol=1e-14)
-    assert np.allclose(tet10.shape_gradient(points).sum(axis=2), 0, atol=1e-14)
 
 
 def test_rigid_motion_stretch_and_pure_bending_are_exact(bar) -> None:

@@ -21,7 +21,7 @@ from gearfmu.femesh.sector import gear_sector
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.modes.vtu import write_series
 from gearfmu.reduction.cyclic.modal import elastic_modes
-from gearfmu.stage.run.deformation import Deformation, DeformationError, GearMotion
+from gearfmu.stage.run.deformation import DeformationError, GearMotion
 from gearfmu.stagefile.stage import load_stage
 
 
@@ -100,17 +100,3 @@ def test_a_series_reads_back(body: Any, tmp_path: Path) -> None:
     assert len(found.points) == len(gear.surface[0]) and len(found.cells[0].data) == len(gear.surface[1])
     assert np.allclose(found.point_data["elastic"], gear.elastic(0), atol=1e-12)
     assert np.allclose(found.point_data["displacement"][:, 2] - found.point_data["elastic"][:, 2], 1e-6, atol=1e-12)
-
-
-def test_the_file_of_a_run_reads_back_and_a_damaged_one_is_refused(body: Any, tmp_path: Path) -> None:
-    motion = moved(body, {0: 1e-6, 5: 2e-6}).motion
-    kept = Deformation(np.array([0.0]), np.array([0]), np.array([0]), {"ring": motion}, {"stage": "planetary54"})
-    kept.save(tmp_path / "deformation.h5")
-    again = Deformation.load(tmp_path / "deformation.h5")
-    assert np.array_equal(again.gears["ring"].amplitude, motion.amplitude) and again.meta == kept.meta
-    assert again.gears["ring"].body_hash == body.how.hash
-    bytes_ = bytearray((tmp_path / "deformation.h5").read_bytes())
-    bytes_[len(bytes_) // 2] ^= 1
-    (tmp_path / "deformation.h5").write_bytes(bytes_)
-    with pytest.raises(DeformationError, match="deformation.h5"):
-        Deformation.load(tmp_path / "deformation.h5")

@@ -8,6 +8,7 @@ import pytest
 import gearfmu as gf
 from gearfmu.modes.housed import Housing, housed, paths, seat_forces
 from gearfmu.modes.rings import Rings, rings_of, stage_rings
+from gearfmu.stagefile.forms.turning import turns
 
 LINES = 2 * np.pi * np.array([20.0, 150.0, 410.0, 1300.0])
 
@@ -137,3 +138,24 @@ def test_rings_that_move_together_meet_the_stages_mass_and_no_stiffness(
         along = np.array([float(own.endswith(f".f{direction}")) for own in rings.names])
         assert -(along @ found @ along).real / omega[0] ** 2 == pytest.approx(mass, rel=1e-3)
         assert np.abs(found @ along).max() < 1e-4 * (along @ np.abs(rings.stiffness) @ along)
+
+
+@pytest.mark.parametrize("name", ["helical_demo", pytest.param("two_stage", marks=pytest.mark.full)])
+def test_rings_that_tilt_together_meet_the_angular_momentum_of_the_stage(name: str) -> None:
+    """About x and y, slowly: the moment about y per rate about x is Σ I_zz Ω, but for what shows of bodies in their
+    patterns of nodal diameter 0 and 1 (1.3 % missing with shafts, .4 % without)."""
+    stage = gf.load(name)
+    speeds = {rotor: 300.0 * float(turned) for rotor, turned in turns(stage, next(iter(stage.ports))).items()}
+    rings = stage_rings(gf.assemble(stage), 100.0, speeds)
+    tilted = np.zeros((2, len(rings.names)))
+    for column, own in zip(tilted.T, rings.names, strict=True):
+        support = next(s for s in stage.supports if s.name == own.split(".")[1])
+        height = support.at if support.at is not None else stage.place(support.body, None)
+        place = np.array([*stage.rotors[stage.rotor_of(support.body)].axis, height])
+        fields = np.hstack([np.cross(np.eye(3)[:2], place), np.eye(3)[:2]])  # (2, 6): x, y, z, r_x, r_y, r_z
+        column[:] = fields[:, ["fx", "fy", "fz", "mx", "my", "mz"].index(own.split(".")[2])]
+    omega = 2 * np.pi * 5.0
+    moment = tilted @ rings.dynamic_stiffness(np.array([omega]))[0] @ tilted.T
+    bodies = stage.by_name(gf.reduce(stage))
+    momentum = sum(body.inertia[2, 2] * speeds[stage.rotor_of(own)] for own, body in bodies.items())
+    assert (moment[0, 1] - moment[1, 0]).imag / (2 * omega) == pytest.approx(momentum, rel=0.02)

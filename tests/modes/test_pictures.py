@@ -62,17 +62,6 @@ def test_pictures_are_coloured_and_framed_alike(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.tmp*"))
 
 
-def test_outline_is_made_of_sharp_edges_only() -> None:
-    """The contours of both end faces are among them, and nothing inside these flat faces."""
-    body = pinion_modes()
-    edges = pictures._sharp_edges(body)
-    z = body.points[:, 2]
-    flat = (np.abs(np.abs(z[body.faces]) - z.max()) < 1e-9).all(axis=1)
-    contour = np.intersect1d(body.faces[flat], body.faces[~flat])
-    on_end = (np.abs(np.abs(z[edges]) - z.max()) < 1e-9).all(axis=1)
-    assert set(np.unique(edges[on_end])) == set(contour)
-
-
 @pytest.mark.parametrize(
     ("energy", "parity", "diameter", "motion", "name"),
     [

@@ -1,6 +1,6 @@
-"""A train of helical gears on elastic shafts at rest in mesh, put together in numpy from its spec, its reduced gears
-and finite-element shafts: equation (29) in six freedoms a body, gears in their unloaded places. Of the kernel it takes
-which slices carry load, and how much.
+"""A pair, or a train of helical gears on elastic shafts, at rest in mesh, put together in numpy from its spec, its
+reduced gears and finite-element shafts: equation (29) in six freedoms a body, gears in their unloaded places. Of the
+kernel it takes which slices carry load, and how much.
 
 Every body has its rigid motion x, y, z, r_x, r_y, r_z in the axes of the stage and elastic coordinates; a shaft has the
 unknowns of its finite elements instead. Links are loaded slices, seats, bearings and ports: with their elongations R q
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
+from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import Body
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
@@ -27,6 +27,7 @@ from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.tables.bodies import ShaftBody
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
+LEAST_HALF_WIDTH = 5e-6  # m: below it the local law is a parabola (docs/theory.md 2.4)
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out
 FINE = 16  # elements along a shaft
 
@@ -154,6 +155,25 @@ def gear_part(stage: Stage, body: Body, touches: Sequence[tuple[Load, Touch, int
     )
 
 
+def weights_between(edges: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """(slices, A): (2a + 1) × mean of P_a over each slice between ascending `edges` on −1 … 1."""
+    columns = []
+    for a in degrees:
+        integral = Legendre.basis(int(a)).integ()(edges)
+        columns.append((2 * a + 1) * np.diff(integral) / np.diff(edges))
+    return np.stack(columns, axis=1)
+
+
+def on_tooth(row: np.ndarray, body: Body, chosen: np.ndarray, tooth: int) -> np.ndarray:
+    """Row (n,) of tooth 0 on another tooth (docs/theory.md eq. 3)."""
+    theta = 2 * np.pi * body.flank.diameter[chosen] * tooth / body.flank.teeth
+    first, second = np.flatnonzero(body.flank.part[chosen] == 1), np.flatnonzero(body.flank.part[chosen] == 2)
+    result = row * np.cos(theta)
+    result[first] -= row[second] * np.sin(theta[first])
+    result[second] += row[first] * np.sin(theta[first])
+    return result
+
+
 def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:
     """A shaft of finite elements, nodes at `places` (m, in the stage)."""
     origin, m = stage.place(shaft.name, None), shaft.material
@@ -214,7 +234,9 @@ def frequencies(
                 ends = [(node_of[support.body, at] + direction, 1.0)]
                 ends += [(node_of[support.to, at] + direction, -1.0)] if support.to else []
                 links.append((ends, 0.0 if stiffness == "rigid" else 1 / stiffness))
-    links += [([(node_of[port.body, port.at] + 5, 1.0)], 1 / port.k) for port in stage.ports.values()]
+    for port in stage.ports.values():
+        at = port.at if port.at is not None else stage.place(port.body, None)
+        links.append(([(node_of[port.body, at] + 5, 1.0)], 1 / port.k))
     fold = np.zeros((len(links), first))
     for row, (ends, _) in zip(fold, links, strict=True):
         for place, sign in ends:

@@ -44,17 +44,6 @@ def test_a_body_of_the_other_hand_is_the_mirror_image(kind: str) -> None:
 
 
 @KINDS
-def test_modes_of_the_other_hand_are_the_mirror_image(kind: str) -> None:
-    here, there = (elastic_modes(MAKERS[kind](sign * BETA), 40) for sign in (1, -1))
-    assert np.allclose(here.frequency, there.frequency, rtol=1e-9)
-    single, sign = here.part == 0, (-1.0) ** np.arange(3)
-    rows = (there.flank_rows.reshape(8, 3, -1) * sign[:, None]).reshape(here.flank_rows.shape)
-    mine, theirs = here.flank_rows[:, single], rows[:, single]
-    same = np.sign((mine * theirs).sum(axis=0))
-    assert np.abs(mine - theirs * same).max() < 1e-6 * np.abs(mine).max()
-
-
-@KINDS
 def test_a_vanishing_helix_is_the_spur_body(kind: str) -> None:
     """β = 1e-6°, reduced without mirror symmetry: tables, rows and frequencies of the spur body to 1e-6."""
     nearly, spur = MAKERS[kind](math.radians(1e-6)), MAKERS[kind](0.0)
@@ -111,26 +100,6 @@ def test_resultants_are_the_closed_forms(kind: str, beta: float) -> None:
         turn = (-sg if body.internal else sg) * shape.r_b * math.cos(shape.beta_b)
         assert along_normal[:, 0, 5] == pytest.approx(turn, rel=1e-12)
         assert turn / shape.r * math.tan(beta) == pytest.approx(-along_normal[:, 0, 2], abs=1e-14)
-
-
-def test_the_profile_direction_lies_in_the_flank_and_in_the_transverse_plane() -> None:
-    shape = gear(BETA)
-    own = small_gear.flank(shape=shape)
-    roll, z, step = np.linspace(shape.s_form, shape.s_tip, 7)[:, None], np.linspace(-1, 1, 5) * WIDTH / 2, 1e-7
-    for side, sg in ((0, 1), (1, -1)):
-        n, p = own.normal(roll, side, z), own.tangent(roll, side, z)
-        assert np.abs((n * p).sum(axis=-1)).max() < 1e-14 and np.abs(p[..., 2]).max() == 0
-        assert np.abs(np.linalg.norm(n, axis=-1) - 1).max() < 1e-14
-
-        def point(s: np.ndarray, at: np.ndarray, sg: int = sg) -> np.ndarray:
-            flat = shape.flank_point(np.broadcast_to(s, (7, 5)), sg)
-            place = np.concatenate([flat, np.broadcast_to(at, (7, 5))[..., None]], axis=-1)
-            return np.einsum("ijkl,ijl->ijk", turns(np.broadcast_to(shape.twist * at, (7, 5))), place)
-
-        along = (point(roll + step, z) - point(roll - step, z)) / (2 * step)
-        across = (point(roll, z + step) - point(roll, z - step)) / (2 * step)
-        assert np.abs((n * along).sum(axis=-1)).max() < 1e-8 and np.abs((n * across).sum(axis=-1)).max() < 1e-8
-        assert np.allclose(along / np.linalg.norm(along, axis=-1, keepdims=True), p, atol=1e-6)
 
 
 def planet_in_ring() -> tuple[tuple[Shape, Shape], tuple[float, float], RingMesh]:

@@ -49,20 +49,6 @@ def test_vectors_are_orthonormal_in_mass_and_free_of_rigid_motion(body, basis):
     assert np.abs(space.rigid.T @ (body.mass @ basis.vectors)).max(initial=0) < 1e-10
 
 
-def test_six_rigid_modes_are_exact_for_every_method(basis, body):
-    """[R V]: no energy in R, no coupling to V in K and M, mass and rows of R those of the full body."""
-    model = oscillators(body, basis, 0.01)
-    assert model.rigid_rows.shape[1] == body.rigid.shape[1] * (body is small())
-    if not model.rigid_rows.shape[1]:
-        return
-    everything = np.hstack([elastic(body).rigid, basis.vectors])
-    stiffness = everything.T @ (body.stiffness @ everything)
-    values = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
-    assert np.abs(values[:6]).max() < 1e-9 * values[6]
-    assert np.allclose(model.rigid_mass, body.rigid.T @ (body.mass @ body.rigid), rtol=0, atol=1e-12)
-    assert np.allclose(model.rigid_rows, body.rows() @ body.rigid, rtol=0, atol=1e-12)
-
-
 def test_oscillators_answer_as_the_basis_does(basis, body):
     """Decoupled, with rigid motion and ground as the kernel sees them, against the projected matrices solved whole."""
     model = oscillators(body, basis, 0.01)

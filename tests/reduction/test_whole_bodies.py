@@ -167,19 +167,6 @@ def test_pictures_are_the_static_displacement_of_every_sector() -> None:
             assert np.abs(mine - theirs).max() < 1e-9 * np.abs(full).max()
 
 
-@pytest.mark.full
-def test_all_modes_together_are_the_static_compliance() -> None:
-    """Modes + residual = static compliance: with every mode of the model the residual vanishes."""
-    everything, statics = elastic_modes(SPUR.sector, 10**6), SPUR.statics
-    assert len(everything.frequency) == SPUR.whole.free.elastic
-    squared = (2 * np.pi * everything.frequency) ** 2
-    for tooth in (0, 1, 7):
-        total = (everything.flank_rows / squared) @ on_tooth(everything, everything.flank_rows, tooth, GEAR.z).T
-        assert np.abs(total - matrix(statics.static_ff[:, :, tooth])).max() < 1e-8 * np.abs(statics.static_ff).max()
-    bore = (everything.bore_rows / squared) @ everything.bore_rows.T
-    assert np.abs(bore - statics.static_bb).max() < 1e-8 * np.abs(statics.static_bb).max()
-
-
 def test_frf_error_is_that_of_a_direct_solution_of_the_whole_gear() -> None:
     """Reference by Taylor series = reference by a direct solution of all equations, at the end of the band and
     beyond."""

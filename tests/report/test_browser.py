@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -60,19 +60,29 @@ def test_nothing_hangs_over_the_edge(page: Path, tmp_path: Path, width: int) -> 
         assert browser.value(f"{wide}.length") == 0 and browser.errors == []
 
 
-@pytest.mark.parametrize("kind", ["set", "sweep"])
-def test_sets_and_sweeps_fit_a_telephone(kind: str, tmp_path: Path) -> None:
-    if kind == "set":
-        trace = set_run()
-        report.write(trace, trace.meta, tmp_path)
-    else:
-        table = gf.sweep("fzg_c", {"torque": [50.0, 100.0], "positions": [4, 8]}, tmp_path, on=1)
-        write_page(table, "fzg_c", tmp_path)
-    page = tmp_path / {"set": "report.html", "sweep": "sweep.html"}[kind]
+def of_set(trace: Trace, folder: Path) -> Path:
+    own = set_run()
+    return report.write(own, own.meta, folder)
+
+
+def of_sweep(trace: Trace, folder: Path) -> Path:
+    write_page(gf.sweep("fzg_c", {"torque": [50.0, 100.0], "positions": [4, 8]}, folder, on=1), "fzg_c", folder)
+    return folder / "sweep.html"
+
+
+def of_comparison(trace: Trace, folder: Path) -> Path:
+    return gf.compare({"a": trace, "b": trace}, folder / "page.html")
+
+
+@pytest.mark.parametrize("page_of", [of_set, of_sweep, of_comparison])
+def test_other_pages_are_drawn_and_fit_a_telephone(
+    page_of: Callable[[Trace, Path], Path], trace: Trace, tmp_path: Path
+) -> None:
     with Browser(tmp_path / "profile", 420, 900) as browser:
-        browser.open(page)
+        browser.open(page_of(trace, tmp_path))
         browser.draw_all()
         assert browser.value("document.documentElement.scrollWidth") <= 420 and browser.errors == []
+        assert browser.value("gearfmuPage.drawn") == browser.value("document.querySelectorAll('.plot').length") > 0
 
 
 def test_a_zoomed_curve_shows_the_samples_and_the_other_figures_follow(opened: Browser, trace: Trace) -> None:
@@ -133,12 +143,3 @@ def test_it_turns(opened: Browser) -> None:
     opened.value(f"new Promise(done => {{ {look}; look(); }}).then(() => 1)")
     assert opened.value("gearfmuPage.stage.state.at") > 1
     opened.value("gearfmuPage.stage.run(false), 1")
-
-
-def test_a_comparison_is_drawn(trace: Trace, tmp_path: Path) -> None:
-    found = gf.compare({"a": trace, "b": trace}, tmp_path / "page.html")
-    with Browser(tmp_path / "profile", 420, 900) as browser:
-        browser.open(found)
-        browser.draw_all()
-        assert browser.value("document.documentElement.scrollWidth") <= 420 and browser.errors == []
-        assert browser.value("gearfmuPage.drawn") == browser.value("document.querySelectorAll('.plot').length") > 5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -132,16 +133,6 @@ def test_every_plot_has_its_data(folder: Path) -> None:
     assert [float(r[1]) for r in rows[1:]] == coupled_run()["mesh.force"].tolist()
 
 
-def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing_where_not(
-    folder: Path, tmp_path: Path
-) -> None:
-    run_up = coupled_run().window(0, 0.09)
-    unsteady = report.write(run_up, SUMMARY, tmp_path).read_text(encoding="utf-8")
-    steady = (folder / "report.html").read_text(encoding="utf-8")
-    assert "Dotted: mesh orders" in steady and "Mesh orders are not marked" not in steady
-    assert "Mesh orders are not marked" in unsteady and "Dotted: mesh orders" not in unsteady
-
-
 def test_summary_is_strict_json_with_results(folder: Path) -> None:
     found = json.loads(
         (folder / "summary.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name)
@@ -174,40 +165,62 @@ def test_short_traces_make_a_report(tmp_path: Path, samples: int) -> None:
     assert (tmp_path / "report.html").is_file()
 
 
-def test_uneven_sampling_is_said_and_the_rest_is_shown(tmp_path: Path) -> None:
+def without_clutch() -> Trace:
+    kept = {n: c for n, c in coupled_run().channels.items() if "clutch" not in n}
+    kept["pinion.tau"] = Channel(np.full(SAMPLES, 120.0), "N.m")
+    return Trace(coupled_run().time, kept, coupled_run().meta)
+
+
+def uneven() -> Trace:
     whole = coupled_run()
-    t = whole.time + 2e-5 * np.sin(np.arange(SAMPLES))
-    page = report.write(Trace(t, whole.channels, whole.meta), SUMMARY, tmp_path).read_text(encoding="utf-8")
-    assert (
-        "not evenly spaced" in page
-        and (tmp_path / "data" / "mesh.csv").is_file()
-        and not (tmp_path / "data" / "spectrum.csv").exists()
-    )
+    return Trace(whole.time + 2e-5 * np.sin(np.arange(SAMPLES)), whole.channels, whole.meta)
 
 
-def test_heading_names_stage_and_operating_point_of_the_window(folder: Path) -> None:
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    assert "<h1>pair, 1910 rpm<" in text and "<p>closure</p>" in text
-
-
-def test_without_a_clutch_there_is_no_chapter_of_its_slip(folder: Path, tmp_path: Path) -> None:
-    whole = coupled_run()
-    kept = {n: c for n, c in whole.channels.items() if "clutch" not in n}
-    alone = Trace(whole.time, {**kept, "pinion.tau": Channel(np.full(SAMPLES, 120.0), "N.m")}, whole.meta)
-    page = report.write(alone, SUMMARY, tmp_path).read_text(encoding="utf-8")
-    assert "<h2>Torques</h2>" in page and "slip" not in page[: page.index("<h2>Accuracy")]
-    assert "<h2>Torques and slip</h2>" in (folder / "report.html").read_text(encoding="utf-8")
-    assert "<h1>pair, 120 N·m, " in page
-
-
-def test_axial_forces_and_tilting_moments_have_a_figure_where_there_are_any(folder: Path, tmp_path: Path) -> None:
+def axial() -> Trace:
     whole = coupled_run()
     loads = {f"bearing.pinion.{end}": Channel(0.3 * whole["mesh.force"], unit) for end, unit in AXIAL.items()}
-    trace = Trace(whole.time, {**whole.channels, **loads}, whole.meta)
-    page = report.write(trace, SUMMARY, tmp_path).read_text(encoding="utf-8")
-    assert "<h2>Axial forces and tilting moments</h2>" in page
-    assert "tilting moment on bearings in N·m" in page and (tmp_path / "data" / "axial.csv").is_file()
-    assert not (folder / "data" / "axial.csv").exists()
+    return Trace(whole.time, {**whole.channels, **loads}, whole.meta)
+
+
+def fast() -> Trace:
+    """16 teeth at 14 000 rpm mesh at 3.7 kHz; samples every 200 µs tell orders up to 2.25 kHz."""
+    t = np.arange(SAMPLES) * 2 * STEP
+    speed = np.full(SAMPLES, 14000 * np.pi / 30)
+    channels = {"pinion.gear.w": Channel(speed, "rad/s"), "mesh.force": Channel(np.sin(16 * speed * t), "N")}
+    return Trace(t, channels, {"meshes": {"mesh": ("pinion", 16)}})
+
+
+def force_at(interval: float) -> Trace:
+    t = np.arange(4000) * interval
+    force = {"mesh.force": 1000 + np.sin(2 * np.pi * 800 * t), "mesh.force_mean": 1000 + np.cos(t)}
+    return Trace(t, {name: Channel(values, "N") for name, values in force.items()}, {})
+
+
+MARKED, UNMARKED, WARNED = "Dotted: mesh orders", "Mesh orders are not marked", '<p class="warning">'
+SLIP, TILT = "<h2>Torques and slip</h2>", "<h2>Axial forces and tilting moments</h2>"
+SAID: dict[str, tuple[Callable[[], Trace], tuple[str, ...], tuple[str, ...]]] = {  # run, what its page has and has not
+    "locked": (coupled_run, ("<h1>pair, 1910 rpm<", "<p>closure</p>", SLIP, MARKED), (UNMARKED, 'id="axial"')),
+    "run-up": (lambda: coupled_run().window(0, 0.09), (UNMARKED,), (MARKED,)),
+    "uneven": (uneven, ("not evenly spaced", 'id="mesh"'), ('id="spectrum"',)),
+    "no clutch": (without_clutch, ("<h2>Torques</h2>", "<h1>pair, 120 N·m, "), (SLIP,)),
+    "axial": (axial, (TILT, 'id="axial"', "tilting moment on bearings in N·m"), ()),
+    "coarse": (lambda: force_at(1e-4), (WARNED + "Sampled every 100 µs",), ()),
+    "fine": (lambda: force_at(2e-5), (), (WARNED,)),
+    "fast": (
+        fast,
+        (UNMARKED, "its mesh frequency, 3733 Hz and more, lies above 0.45 of the sampling rate, 2250 Hz",
+         "communication step of 24 µs"),
+        ('id="orders"',),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SAID)
+def test_a_page_says_what_its_run_holds_and_what_it_lacks(tmp_path: Path, case: str) -> None:
+    run, words, absent = SAID[case]
+    page = report.write(run(), SUMMARY, tmp_path).read_text(encoding="utf-8")
+    assert [text for text in words if text not in page] == []
+    assert [text for text in absent if text in page] == []
 
 
 def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:
@@ -218,9 +231,8 @@ def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:
 def test_text_from_outside_cannot_become_markup(tmp_path: Path) -> None:
     nasty = "<script>alert(1)</script>"
     trace = Trace(np.arange(3.0), {f"{nasty[:8]}.w": Channel(np.zeros(3), "rad/s", nasty)}, {})
-    page = report.write(
-        trace, {"scene": nasty, "stage": nasty, "outcome": nasty, "hashes": {nasty: nasty}}, tmp_path
-    ).read_text(encoding="utf-8")
+    said = {"scene": nasty, "stage": nasty, "outcome": nasty, "hashes": {nasty: nasty}}
+    page = report.write(trace, said, tmp_path).read_text(encoding="utf-8")
     assert "<script>alert" not in page and "alert(1)&lt;/script&gt;" in page
 
 
@@ -255,39 +267,10 @@ def test_strict_json_has_no_nan() -> None:
     }
 
 
-def force_at(interval: float) -> Trace:
-    t = np.arange(4000) * interval
-    return Trace(
-        t,
-        {
-            "mesh.force": Channel(1000 + np.sin(2 * np.pi * 800 * t), "N"),
-            "mesh.force_mean": Channel(1000 + np.cos(t), "N"),
-        },
-        {},
-    )
-
-
-def test_coarse_sampling_warns_where_spectra_are_read(tmp_path: Path) -> None:
-    coarse = report.write(force_at(1e-4), {}, tmp_path / "a").read_text(encoding="utf-8")
-    fine = report.write(force_at(2e-5), {}, tmp_path / "b").read_text(encoding="utf-8")
-    assert '<p class="warning">Sampled every 100 µs' in coarse and '<p class="warning">' not in fine
-
-
 def test_a_signal_seen_twice_is_drawn_once() -> None:
     t = np.arange(4.0)
     trace = Trace(t, {"a.w": Channel(t, "rad/s"), "b.w": Channel(t.copy(), "rad/s"), "c.w": Channel(-t, "rad/s")}, {})
     assert distinct(trace, trace.channels) == ["a.w", "c.w"]
-
-
-def test_a_mesh_frequency_above_the_sampling_limit_is_said_instead_of_drawn(tmp_path: Path) -> None:
-    """16 teeth at 14 000 rpm mesh at 3.7 kHz; samples every 200 µs tell orders up to 2.25 kHz."""
-    t = np.arange(SAMPLES) * 2 * STEP
-    speed = np.full(SAMPLES, 14000 * np.pi / 30)
-    channels = {"pinion.gear.w": Channel(speed, "rad/s"), "mesh.force": Channel(np.sin(16 * speed * t), "N")}
-    page = report.write(Trace(t, channels, {"meshes": {"mesh": ("pinion", 16)}}), {}, tmp_path).read_text("utf-8")
-    assert "its mesh frequency, 3733 Hz and more, lies above 0.45 of the sampling rate, 2250 Hz" in page
-    assert "communication step of 24 µs" in page and "Mesh orders are not marked" in page
-    assert not (tmp_path / "data" / "orders.csv").exists()
 
 
 def test_a_run_says_where_its_time_went(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearfmu import report
-from gearfmu.report import plots, plots_nvh
+from gearfmu.report import plots
 from gearfmu.report.chart import Chart
 from gearfmu.report.heading import of_set, phasing, planet_phases
 from gearfmu.report.planets import LEAST_SPAN, planets, sharing
@@ -76,15 +76,6 @@ def test_shares_that_differ_by_rounding_are_a_line() -> None:
         assert isinstance(plot.picture, Chart)
         limits = [panel.limits or (0.0, 0.0) for panel in plot.picture.panels if "share" in panel.label]
         assert limits and all(high - low == pytest.approx(LEAST_SPAN) for low, high in limits)
-
-
-def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:
-    trace = set_run()
-    swinging = Channel(CARRIER * (1.0 + 0.2 * np.sin(40.0 * trace.time)), "rad/s")
-    trace = Trace(trace.time, {**trace.channels, "carrier.gear.w": swinging}, trace.meta)
-    own = planet_set(trace, known_meshings(trace))
-    assert own is not None
-    assert "the speed is not steady" in plots_nvh.spectra_by_central(Run(trace, {}), own).caption
 
 
 def test_a_pair_is_no_set() -> None:

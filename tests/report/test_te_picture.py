@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gearfmu as gf
 from gearfmu.report.te import peak_to_peak, write_flanks, write_plot
-from gearfmu.stage import loaded_te
 from gearfmu.stage.assembly.teeth import FlankField
 from gearfmu.stage.run.te import TeResult
 from gearfmu.stagefile.forms.expand import rewritten
@@ -48,12 +46,6 @@ def test_a_set_has_its_load_factor_over_the_torque(tmp_path: Path) -> None:
     write_plot(of_set(te, sharing), tmp_path / "te.svg")
     seen = (tmp_path / "te.svg").read_text(encoding="utf-8")
     assert "mesh load factor K_γ" in seen and "planet 3" in seen
-
-
-def test_load_over_the_width_of_a_spur_pair_is_even_about_its_middle() -> None:
-    found = loaded_te(gf.assemble("fzg_c"), [302.0], positions=4).over_width
-    assert found.shape == (1, 5) and found.mean() == pytest.approx(1.0)
-    assert found[0] == pytest.approx(found[0, ::-1], rel=1e-6) and np.ptp(found) > 0
 
 
 def test_rounding_is_no_error_of_transmission() -> None:

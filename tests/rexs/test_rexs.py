@@ -71,17 +71,12 @@ def test_a_set_is_the_one_whose_data_the_file_holds(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", [PAIR, SET], ids=["pair", "set"])
-def test_every_value_says_where_it_is_from(path: Path, tmp_path: Path) -> None:
-    draft = draft_from_rexs(path)
+def test_every_value_says_where_it_is_from_and_every_attribute_is_used_or_listed(path: Path, tmp_path: Path) -> None:
+    draft, model = draft_from_rexs(path), read_rexs(path)
     text = write_drafted("made", draft.tables, draft.marks, "a test", tmp_path).read_text(encoding="utf-8")
     values = [line for line in text.splitlines() if re.match(r"\w+ = ", line)][3:]
     assert len(values) > 60
     assert not [line for line in values if not re.search(r"; (REXS \w+|assumed)", line)]
-
-
-@pytest.mark.parametrize("path", [PAIR, SET], ids=["pair", "set"])
-def test_every_attribute_is_used_or_listed(path: Path) -> None:
-    draft, model = draft_from_rexs(path), read_rexs(path)
     every = sum(len(place) for c in model.components.values() for place in (c.attributes, *c.cases))
     assert len(list(model.unread())) == every, "nothing is read before somebody asks"
     assert 0 < len(draft.unread) < 0.5 * every
@@ -166,23 +161,22 @@ def test_either_sign_of_the_rings_profile_shift_is_understood(tmp_path: Path, si
     assert made.ring.profile_shift == pytest.approx(internal, abs=1e-8)
 
 
-def test_planets_that_differ_are_refused(tmp_path: Path) -> None:
-    path = changed(tmp_path, SET, (r'(name="planet 2">\n *<attribute id="number_of_teeth" unit="none">)18', r"\g<1>19"))
-    with pytest.raises(SpecError, match='cylindrical_gear 120 "planet 2": differs'):
-        draft_from_rexs(path)
+DISTANCE = r'(id="center_distance" unit="mm">)[-\d.]+'
+TEETH = r'(name="planet 2">\n *<attribute id="number_of_teeth" unit="none">)18'
 
 
 @pytest.mark.parametrize(
-    "path, distance, why",
+    ("path", "pattern", "value", "why"),
     [
-        (PAIR, "-91.5", "-91.5 mm: must be above"),
-        (PAIR, "0", "0 mm: must"),
-        (SET, "0", "needs cylindrical_stage parts"),
+        (PAIR, DISTANCE, "-91.5", "-91.5 mm: must be above"),
+        (PAIR, DISTANCE, "0", "0 mm: must"),
+        (SET, DISTANCE, "0", "needs cylindrical_stage parts"),
+        (SET, TEETH, "19", 'cylindrical_gear 120 "planet 2": differs'),
     ],
 )
-def test_a_centre_distance_that_no_stage_has_is_refused(tmp_path: Path, path: Path, distance: str, why: str) -> None:
+def test_numbers_that_no_stage_has_are_refused(tmp_path: Path, path: Path, pattern: str, value: str, why: str) -> None:
     with pytest.raises(SpecError, match=why):
-        draft_from_rexs(changed(tmp_path, path, (r'(id="center_distance" unit="mm">)[-\d.]+', rf"\g<1>{distance}")))
+        draft_from_rexs(changed(tmp_path, path, (pattern, rf"\g<1>{value}")))
 
 
 def test_planets_that_are_not_equally_spaced_keep_their_places(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from gearfmu.errors import SpecError
 from gearfmu.rexs.stage import draft_from_rexs
 
 SECTIONS = ((40, 26, 26, 0, 0), (40, 28, 34, 6, 10), (40, 38, 38, 12, 12))  # length, outer and inner begin and end, mm
+ONE_PIECE = ((60, 30, 30, 0, 0), (60, 60, 60, 10, 18))
 
 
 def sections(shaft: int, rows: tuple[tuple[float, ...], ...]) -> list[tuple[str, str]]:
@@ -51,21 +52,13 @@ def test_every_gear_of_a_set_has_its_own_width(tmp_path: Path) -> None:
     assert {name: tables[name]["face_width"] for name in widths} == {name: f"{w} mm" for name, w in widths.items()}
 
 
-@pytest.mark.parametrize(
-    ("at", "bore"), [("20", 26), ("50", 29.5), ("60", 31), ("80", 34), ("81", 38)], ids=lambda value: str(value)
-)
+@pytest.mark.parametrize(("at", "bore"), [("20", 26), ("50", 29.5), ("60", 31), ("80", 34), ("81", 38), ("90", 14)])
 def test_the_bore_is_that_of_the_section_under_the_gear(tmp_path: Path, at: str, bore: float) -> None:
-    """Of a shaft of three sections, the middle one a cone; the first section served wherever the gear was, and the
-    other gear's shaft is another."""
-    edits = [*sections(10, SECTIONS), attribute_of("20", "u_coordinate_on_shaft", at)]
+    """Of a shaft of three sections, the middle one a cone, and of a gear of one piece with its shaft. The first section
+    served wherever the gear was, and the other gear's shaft is another."""
+    edits = [*sections(10, ONE_PIECE if at == "90" else SECTIONS), attribute_of("20", "u_coordinate_on_shaft", at)]
     made = stage_of(changed(tmp_path, PAIR, *edits), tmp_path)
     assert [gear.bore_diameter for gear in made.gears] == [pytest.approx(1e-3 * bore), 0.040]
-
-
-def test_a_gear_of_one_piece_with_its_shaft_has_the_shafts_bore(tmp_path: Path) -> None:
-    edits = sections(10, ((60, 30, 30, 0, 0), (60, 60, 60, 10, 18)))
-    made = stage_of(changed(tmp_path, PAIR, *edits, attribute_of("20", "u_coordinate_on_shaft", "90")), tmp_path)
-    assert made.gears[0].bore_diameter == pytest.approx(14e-3)
 
 
 def test_shafts_keep_bores_round_and_edges_follow_the_module(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from surfaces import box, rigid
 
-from gearfmu.sound import SoundError, envelope, memory_needed, radiation, refined, skin_of
+from gearfmu.sound import SoundError, memory_needed, radiation, refined, skin_of
 from gearfmu.sound.skin import patches
 
 SIZE = (0.3, 0.2, 0.1)
@@ -42,14 +42,6 @@ def test_gram_of_rigid_motion_is_that_of_the_box() -> None:
     exact[4] = b * a**3 / 6 + b * c**3 / 6
     assert np.abs(np.diag(gram) / exact - 1).max() < 1e-12
     assert np.abs(gram - np.diag(np.diag(gram))).max() < 1e-15
-
-
-def test_envelope_is_that_of_the_outermost_points() -> None:
-    points, _ = box(SIZE, (3, 2, 1))
-    within = np.vstack([0.3 * points, points, [[0.01, 0.02, 0.03]]])
-    found = envelope(within, 0.04)
-    assert found.volume == pytest.approx(np.prod(SIZE), rel=1e-12)
-    assert np.linalg.norm(found.corners - np.roll(found.corners, 1, axis=1), axis=2).max() <= 0.04
 
 
 def test_refining_changes_neither_volume_nor_gram_of_linear_shapes() -> None:
