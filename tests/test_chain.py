@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-import re
 import subprocess
 import sys
 import venv
@@ -13,7 +11,6 @@ import zipfile
 from contextlib import chdir
 from pathlib import Path
 
-import numpy as np
 import pytest
 from verbs import call
 
@@ -24,41 +21,12 @@ ROOT = Path(__file__).resolve().parents[1]
 LARGEST_WHEEL = 20e6  # bytes, with both kernels
 
 
-def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
+def gearfmu(*arguments: object, cwd: Path | None = None) -> str:
     """Standard output of the verb."""
     with chdir(cwd or Path.cwd()):
         code, out, err = call(*arguments)
-    assert code == expect, err + out
+    assert code == 0, err + out
     return out
-
-
-def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
-    out = tmp_path / "te.csv"
-    gearfmu(
-        "te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out
-    )
-    rows = list(csv.reader(out.open(encoding="utf-8")))
-    stiffness = ["mesh_stiffness_N_per_um", "stage_stiffness_N_per_um"]
-    assert rows[0][:6] == ["torque_Nm", "position", "te_um", *stiffness, "share_1"]
-    data = np.array(rows[1:], dtype=float)
-    assert data[:, 0].tolist() == [302.0] * 8 + [100.0] * 8
-    assert data[:8, 1].tolist() == [i / 8 for i in range(8)]
-    assert np.all(data[:, 2] > 0) and np.all(data[:8, 2] > data[8:, 2]) and np.all(data[:, 3] > 0)
-    assert np.array_equal(data[:, 3], data[:, 4]), "with rigid bearings the stage is its mesh"
-    assert np.allclose(data[:, 5:].sum(axis=1), 1, atol=1e-9)
-    assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_te_names_mesh_and_stage_stiffness_alike_in_table_and_on_the_console(tmp_path: Path) -> None:
-    order = ("te", "fzg_c", "--torque", "302 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
-    alone, both = (
-        {name: float(number) for name, number in re.findall(r"(mesh|stage) stiffness ([0-9.]+) N/µm", shown)}
-        for shown in (gearfmu(*order, *more) for more in (("--rigid-bearings",), ()))
-    )
-    table = np.genfromtxt(tmp_path / "te.csv", delimiter=",", names=True)
-    written = {name: table[f"{name}_stiffness_N_per_um"].mean() for name in ("mesh", "stage")}
-    assert both == pytest.approx(written, abs=0.06)
-    assert alone == {"mesh": both["mesh"]} and both["stage"] < 0.6 * both["mesh"]
 
 
 def test_export_and_validate(tmp_path: Path) -> None:
