@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,32 +19,8 @@ POINTS, KILL_AFTER = 200, 0.2
 TORQUES = np.linspace(10.0, 600.0, POINTS)
 
 
-def killing(pids: Callable[[], list[int]]) -> tuple[Callable[..., None], list[int]]:
-    """A progress function that kills the first of the workers once a fifth of the points is there; and whom it
-    killed."""
-    killed: list[int] = []
-
-    def progress(part: float, text: str = "") -> None:
-        if part >= KILL_AFTER and not killed:
-            killed.append(pids()[0])
-            os.kill(killed[0], signal.SIGKILL)
-
-    return progress, killed
-
-
-def assert_nothing_is_lost(table: gf.SweepTable, folder: Path, killed: list[int]) -> None:
-    """Every point is there once, with the number that the function for one point gives."""
-    assert len(killed) == 1 and len(table) == POINTS and table.failures == []
-    lines = (folder / "points.jsonl").read_text(encoding="utf-8").splitlines()
-    assert len({json.loads(line)["identity"] for line in lines}) == len(lines) == POINTS
-    assert np.all(np.diff(table["te_mean_um"]) > 0)
-    some = [0, 57, 123, 199]
-    alone = gf.te("fzg_c/stage_relief", TORQUES[some], 4)
-    assert table["te_mean_um"][some] == pytest.approx(1e6 * alone.te.mean(axis=1), rel=1e-12)
-
-
 @contextmanager
-def cluster_of_two() -> Iterator[object]:
+def cluster_of_two() -> Iterator[Any]:
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
@@ -51,29 +28,36 @@ def cluster_of_two() -> Iterator[object]:
 
 
 @pytest.mark.full
-@pytest.mark.needs("distributed")
-def test_a_dask_cluster_loses_a_worker_and_no_point(tmp_path: Path) -> None:
-    """By the address of the scheduler, as `gearfmu sweep --scheduler` has it."""
-    with cluster_of_two() as cluster:
-        progress, killed = killing(lambda: [worker.pid for worker in cluster.workers.values()])
-        over = {"torque": TORQUES, "positions": 4}
-        table = gf.sweep("fzg_c/stage_relief", over, tmp_path, on=cluster.scheduler_address, progress=progress)
-        assert_nothing_is_lost(table, tmp_path, killed)
-
-
-@pytest.mark.full
-@pytest.mark.needs("psutil")
-def test_this_machine_loses_a_worker_and_no_point(tmp_path: Path) -> None:
+@pytest.mark.needs("distributed", "psutil")
+@pytest.mark.parametrize("where", ["cluster", "machine"])
+def test_a_worker_is_lost_and_no_point(where: str, tmp_path: Path) -> None:
+    """Killed once a fifth of the points is there; on a cluster by the address of the scheduler, as `gearfmu sweep
+    --scheduler` has it. Every point is there once, with the number that the function for one point gives."""
     import psutil
 
-    def workers() -> list[int]:
-        own = psutil.Process().children(recursive=True)
-        return [child.pid for child in own if "gearfmu.sweeps.worker" in child.cmdline()]
+    killed: list[int] = []
+    with cluster_of_two() if where == "cluster" else nullcontext() as cluster:
 
-    progress, killed = killing(workers)
-    over = {"torque": TORQUES, "positions": 4}
-    table = gf.sweep("fzg_c/stage_relief", over, tmp_path, on=2, progress=progress)
-    assert_nothing_is_lost(table, tmp_path, killed)
+        def workers() -> list[int]:
+            if cluster:
+                return [worker.pid for worker in cluster.workers.values()]
+            own = psutil.Process().children(recursive=True)
+            return [child.pid for child in own if "gearfmu.sweeps.worker" in child.cmdline()]
+
+        def progress(part: float, text: str = "") -> None:
+            if part >= KILL_AFTER and not killed:
+                killed.append(workers()[0])
+                os.kill(killed[0], signal.SIGKILL)
+
+        over, on = {"torque": TORQUES, "positions": 4}, cluster.scheduler_address if cluster else 2
+        table = gf.sweep("fzg_c/stage_relief", over, tmp_path, on=on, progress=progress)
+    assert len(killed) == 1 and len(table) == POINTS and table.failures == []
+    lines = (tmp_path / "points.jsonl").read_text(encoding="utf-8").splitlines()
+    assert len({json.loads(line)["identity"] for line in lines}) == len(lines) == POINTS
+    assert np.all(np.diff(table["te_mean_um"]) > 0)
+    some = [0, 57, 123, 199]
+    alone = gf.te("fzg_c/stage_relief", TORQUES[some], 4)
+    assert table["te_mean_um"][some] == pytest.approx(1e6 * alone.te.mean(axis=1), rel=1e-12)
 
 
 @pytest.mark.full
