@@ -11,7 +11,7 @@ import pytest
 
 from evidence.study import cuts
 from evidence.study.limits import limit_rows
-from evidence.study.refined import BodyRow, body_rows, cheap, write_bodies_chart
+from evidence.study.refined import body_rows, cheap
 from gearfmu.kernel import Kernel
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.assembly.teeth import ROLLS
@@ -122,17 +122,6 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert all(20e-6 / p.h == pytest.approx(round(20e-6 / p.h)) for p in found if p.h)
     assert min(p.h for p in found if p.h) == pytest.approx(min(STEPS))
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
-
-
-def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
-    rows = [
-        BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
-        for scene in ("one", "other")
-        for text in ("slices 10", "mesh × 1.3")
-    ]
-    svg, png = write_bodies_chart(rows, tmp_path / "bodies.csv")
-    text = svg.read_text(encoding="utf-8")
-    assert png.stat().st_size > 1000 and all(word in text for word in ("one", "other", "slices 10", "mesh × 1.3"))
 
 
 def test_cheap_refinements_of_a_few_milliseconds(scene: SceneSpec) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from evidence.study.__main__ import main as program
 from evidence.study.sets import SetRow, at_speed, ladder, with_planets
 from gearfmu.report.study import write_chart
 from gearfmu.scenefile.scene import load_scene
@@ -60,19 +58,3 @@ def test_only_levels_and_steps_are_drawn(tmp_path: Path) -> None:
     assert "fast" in svg.read_text(encoding="utf-8")
     write_rows(tmp_path / "sets.csv", SetRow, [ROW, finer])
     assert read_rows(tmp_path / "sets.csv", SetRow) == [ROW, finer]
-
-
-@pytest.mark.full
-def test_the_program_makes_a_quick_list_and_keeps_it(tmp_path: Path) -> None:
-    arguments = ["sets", "planetary_paper", "--quick", "--out", str(tmp_path)]
-    program(arguments)
-    made = (tmp_path / "sets.csv").read_bytes()
-    program(arguments)
-    assert (tmp_path / "sets.csv").read_bytes() == made
-    with open(tmp_path / "sets.csv", newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert {row["level"] for row in rows} == {"rigid", "fast"} and (tmp_path / "planetary_paper.svg").is_file()
-    by_step = {row["h_s"]: row for row in rows if row["level"] == "fast" and row["against"].startswith("full")}
-    assert float(by_step["5e-06"]["force_error"]) < float(by_step["1e-05"]["force_error"])
-    off = {row["off"]: float(row["force_error"]) for row in rows}
-    assert 0 < off["coriolis"] < 0.05 and 0 < off["centrifugal"] < 0.05
