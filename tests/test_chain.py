@@ -60,14 +60,15 @@ def test_demo_ends_with_a_report_and_the_fmu_is_the_solver_all_the_way(tmp_path:
     assert all(fmu[name].tobytes() == kernel[name].tobytes() for name in fmu.channels)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert str(tmp_path / "report.html") in out
-    assert (
-        summary["scene"],
-        summary["level"],
-        summary["slices"],
-        summary["master"],
-        summary["H"],
-        summary["unit"],
-    ) == ("clutch_closure", "standard", 5, "gs_mean", 2e-5, "fmu")
+    wanted = {
+        "scene": "clutch_closure",
+        "level": "standard",
+        "slices": 5,
+        "master": "gs_mean",
+        "H": 2e-5,
+        "unit": "fmu",
+    }
+    assert wanted.items() <= summary.items()
     assert 'class="warning"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
 

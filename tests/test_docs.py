@@ -106,14 +106,6 @@ def test_every_theme_of_decisions_is_listed_once_with_its_newest_record() -> Non
     assert len(headings) == len(set(headings))
 
 
-def test_every_page_is_in_the_site() -> None:
-    """The navigation of mkdocs.yml holds the pages of docs/, and those that the site takes from outside."""
-    listed = re.findall(r"- ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
-    assert len(listed) == len(set(listed))
-    assert set(listed) == pages | {"index.md", "changelog.md", "contributing.md"}
-
-
 def test_version_and_date_are_the_same_everywhere() -> None:
     """pyproject.toml has the version; the newest release of the changelog and CITATION.cff say the same."""
     version = re.search(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), flags=re.M)
