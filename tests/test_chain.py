@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from verbs import call
 
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.scenefile.scene import SHIPPED
 from gearfmu.stage.run.trace import Trace
 
@@ -73,36 +74,26 @@ def test_demo_ends_with_a_report_and_the_fmu_is_the_solver_all_the_way(tmp_path:
     assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
 
 
-@pytest.fixture(scope="module")
-def wheel() -> Path:
-    """The wheel for Linux and Windows, made as users are told."""
+@pytest.mark.full
+@pytest.mark.needs("ziglang", "build")
+def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None:
+    """Small, for Linux and Windows, made as users are told: both kernels export the same names, the Windows one is not
+    loaded here. Installed without compiler and away from the checkout; needs a package index for the dependencies."""
     subprocess.run(["make", "wheel", f"VENV={sys.prefix}"], cwd=ROOT, check=True, capture_output=True)
-    return max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
-
-
-@pytest.mark.full
-@pytest.mark.needs("ziglang", "build")
-def test_the_wheel_runs_the_demo_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
-    """Installed without compiler and away from the checkout; needs a package index for the dependencies."""
-    venv.create(tmp_path / "venv", with_pip=True)
-    python = tmp_path / "venv" / "bin" / "python"
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    subprocess.run([python, "-m", "pip", "install", "--quiet", wheel], check=True, capture_output=True, env=environment)
-    command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
-    subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
-    assert (tmp_path / "out" / "report.html").is_file()
-
-
-@pytest.mark.full
-@pytest.mark.needs("ziglang", "build")
-def test_the_wheel_is_small_and_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
-    """Both kernels are in it and export the same names; the Windows one is not loaded here."""
-    from evidence.fmu_probes.symbols import exported_symbols
-
+    wheel = max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
     assert wheel.stat().st_size <= LARGEST_WHEEL
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
     with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(tmp_path)
-    folder = tmp_path / "gearfmu" / "kernel" / "lib"
+        archive.extractall(tmp_path / "wheel")
+    folder = tmp_path / "wheel" / "gearfmu" / "kernel" / "lib"
     names = [exported_symbols(folder / file) for file in ("linux64/gearfmu_kernel.so", "win64/gearfmu_kernel.dll")]
     assert names[0] == names[1] and len(names[0]) > 40
+    venv.create(tmp_path / "venv", with_pip=True)
+    binaries = tmp_path / "venv" / "bin"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | {"CC": "false"}
+    for command in (
+        [binaries / "python", "-m", "pip", "install", "--quiet", wheel],
+        [binaries / "gearfmu", "demo", "--out", tmp_path / "out"],
+    ):
+        subprocess.run(command, check=True, cwd=tmp_path, env=environment, capture_output=True)
+    assert (tmp_path / "out" / "report.html").is_file()
