@@ -23,10 +23,9 @@ COARSEST = COARSE.model_copy(
     update={"modes": 12, "mesh": COARSE.mesh.model_copy(update={"flank": 2, "rim": 1, "width": 2})}
 )
 SMALL = 1e-3  # rad: the flank leans by 7 µm over half the width
-HELIX = (
-    5e-4  # of the transmission error: slices of helical gears yield as their own patches, those of spur gears as the
-)
-# width functions say; 1.3e-4 on these bodies
+# of the transmission error: slices of helical gears yield as their own patches, those of spur gears as the width
+# functions say; 1.3e-4 on these bodies
+HELIX = 5e-4
 LEAN = 1e-5  # of it, from a tenth of the angle to all of it
 TEETH = 0.01  # of the mean transmission error, second difference over one tooth
 COUNTS = COARSEST.model_dump(exclude={"strip_half_width"}, exclude_unset=True)
