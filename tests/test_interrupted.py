@@ -56,20 +56,21 @@ def left_over(folder: Path) -> list[str]:
     return [path.name for path in folder.rglob(".*") if path.is_file()]
 
 
-SLOW = pytest.param("study", marks=pytest.mark.full)
 OVER = ["--over", "torque=10:300:200 N*m", "--over", "positions=4"]
-WORK = {  # verb with its arguments, the file that shows that it is at work, and what that holds then
-    "reduce": (["reduce", "tiny"], "told", "reducing"),
-    "sweep": (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
-    "study": (["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", ""),
-}
 
 
-@pytest.mark.parametrize("verb", ["reduce", "sweep", SLOW])
-def test_interrupted_work_is_one_line_and_whole_files(verb: str, tmp_path: Path) -> None:
-    if verb == "reduce":
-        made_tiny(tmp_path)
-    (words, file, sign), told = WORK[verb], tmp_path / "told"
+@pytest.mark.parametrize(
+    ("words", "file", "sign"),  # the file that shows that it is at work, and what that holds then
+    [
+        (["reduce", "tiny"], "told", "reducing"),
+        (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
+        pytest.param(["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", "", marks=pytest.mark.full),
+    ],
+    ids=["reduce", "sweep", "study"],
+)
+def test_interrupted_work_is_one_line_and_whole_files(words: list[str], file: str, sign: str, tmp_path: Path) -> None:
+    made_tiny(tmp_path)
+    told = tmp_path / "told"
     work, end = forked(words, tmp_path, told), time.monotonic() + LATEST
     while not (found := [path for path in tmp_path.rglob(file) if sign in path.read_text("utf-8")]):
         assert os.waitpid(work, os.WNOHANG) == (0, 0) and time.monotonic() < end, "it ended by itself"

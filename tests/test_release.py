@@ -16,20 +16,14 @@ ROOT = Path(__file__).resolve().parents[1]
 LINK = re.compile(r"(!?)\[[^\[\]]*\]\(([^)\s]+)\)")
 
 
-@pytest.fixture
-def handed_to_setup(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The arguments that setup.py gives to setuptools."""
+def test_links_of_the_package_page_are_addresses_of_files_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
     monkeypatch.setattr(setuptools, "setup", given.update)
     runpy.run_path(str(ROOT / "setup.py"))
-    return given
-
-
-def test_links_of_the_package_page_are_addresses_of_files_that_exist(handed_to_setup: dict[str, Any]) -> None:
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     source, version = (re.search(rf'^{key} = "(.+)"$', project, re.M) for key in ("Source", "version"))
     assert source and version
-    ours, theirs = (ROOT / "README.md").read_text(encoding="utf-8"), handed_to_setup["long_description"]
+    ours, theirs = (ROOT / "README.md").read_text(encoding="utf-8"), given["long_description"]
     assert LINK.sub("", ours) == LINK.sub("", theirs), "nothing else of the page changes"
     links = LINK.findall(theirs)
     assert len(links) == len(LINK.findall(ours)) > 40 and all("://" in link for _, link in links)
