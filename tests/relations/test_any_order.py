@@ -59,25 +59,6 @@ def shuffled(values: Mapping[str, Any] | tuple[Any, ...], seed: int) -> Any:
     return dict(entries[i] for i in order)
 
 
-def supports(stage: Stage) -> Stage:
-    return stage.model_copy(update={"supports": shuffled(stage.supports, 1)})
-
-
-def bodies(stage: Stage) -> Stage:
-    return stage.model_copy(update={"bodies": shuffled(stage.bodies, 2)})
-
-
-def rotors(stage: Stage) -> Stage:
-    each = {
-        name: rotor.model_copy(update={"bodies": shuffled(rotor.bodies, 3)}) for name, rotor in stage.rotors.items()
-    }
-    return stage.model_copy(update={"rotors": shuffled(each, 4)})
-
-
-def ports(stage: Stage) -> Stage:
-    return stage.model_copy(update={"ports": shuffled(stage.ports, 5)})
-
-
 def engagements(stage: Stage) -> Stage:
     """Shuffled; where gears have several, internal ones stay behind the external ones, and the first stays first."""
     if not shares_gears(stage):
@@ -108,10 +89,17 @@ def shares_gears(stage: Stage) -> bool:
 
 def everything(stage: Stage) -> Stage:
     """All of it; of a set the gears too, where its teeth are alike."""
-    alike = bool(stage.carriers) and even(stage).bodies == stage.bodies
-    for change in (supports, bodies, rotors, ports, engagements, *[gears] * alike):
-        stage = change(stage)
-    return stage
+    rotors = {
+        name: rotor.model_copy(update={"bodies": shuffled(rotor.bodies, 3)}) for name, rotor in stage.rotors.items()
+    }
+    tables = {
+        "supports": shuffled(stage.supports, 1),
+        "bodies": shuffled(stage.bodies, 2),
+        "rotors": shuffled(rotors, 4),
+        "ports": shuffled(stage.ports, 5),
+    }
+    other = engagements(stage.model_copy(update=tables))
+    return gears(other) if stage.carriers and even(stage).bodies == stage.bodies else other
 
 
 @cache
