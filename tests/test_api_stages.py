@@ -119,7 +119,4 @@ def test_bearings_prints_the_table_of_the_function(tmp_path: Path, capsys: pytes
     for row, state in zip(rows, found.states, strict=True):
         assert float(row["load_z"]) == pytest.approx(state.load[2], rel=1e-5)
         assert float(row["pressure_MPa"]) == pytest.approx(1e-6 * state.pressure, rel=1e-5)
-
-
-def test_the_torque_of_a_file_of_bearings_is_the_default() -> None:
-    assert gf.bearings(BEARINGS).torque == 100.0
+    assert gf.bearings(BEARINGS).torque == 100.0, "that of the file, where none is asked"

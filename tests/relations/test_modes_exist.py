@@ -34,11 +34,6 @@ def one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(linear, "full_kernel", kernel)
 
 
-def modes_of(kind: Kind, model: StageModel, positions: int) -> linear.StageModes:
-    bodies = listed(kind.stage, bodies_of(kind.file))
-    return linear.stage_modes(model, bodies, kind.torque, COUNT, positions)
-
-
 def free_rotations(kind: Kind, system: linear.Linearised) -> int:
     loaded = {e for e in system.linear.label[:, 0].tolist() if e >= 0}
     touching = {gear for e in loaded for gear in kind.stage.engagements[e].gears}
@@ -66,7 +61,7 @@ def test_reported_modes_exist_at_every_position_and_none_is_missing(kind: Kind, 
     """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means
     over the positions ("1197 Hz") were those of different modes."""
     model = kind.model()
-    found = modes_of(kind, model, positions)
+    found = linear.stage_modes(model, listed(kind.stage, bodies_of(kind.file)), kind.torque, COUNT, positions)
     numbers = []
     for position, own in zip(found.position, found.frequency, strict=True):
         real, free = frequencies(kind, model, position)
