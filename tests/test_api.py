@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.metadata
 import inspect
 import os
@@ -20,6 +19,7 @@ from gearfmu import cli
 from gearfmu.stagefile.proposals.new import new_stage
 
 SMALL = {"modes": 12, "roll_points": 8, "width_functions": 3, "mesh.scale": 0.4}
+STIFF = ("mesh", "stage")
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "pydantic", "pint", "xarray", "pandas", "pyarrow", "dask", "fmpy")
 
@@ -34,23 +34,25 @@ def python(code: str) -> str:
 
 def test_import_is_quick_and_loads_nothing_heavy() -> None:
     """Processor time of the import alone, which does not wait for a busy machine; 0.02 s where it was written."""
-    code = (
-        "import sys, time; start = time.process_time(); import gearfmu; spent = time.process_time() - start\n"
-        "print(spent, *(name.split('.')[0] for name in sys.modules))"
-    )
-    spent, *loaded = python(code).split()
+    spent = python("import time; start = time.process_time(); import gearfmu; print(time.process_time() - start)")
     assert float(spent) < 0.2
-    assert not set(HEAVY) & set(loaded)
 
 
-def test_figures_and_tables_are_loaded_when_they_are_wanted() -> None:
-    """A stage is assembled and its transmission error taken without any of the optional and drawing packages (but
-    dask.base, which pint imports where it finds it)."""
-    code = (
-        "import sys, gearfmu as gf; gf.te(gf.assemble('fzg_c'), 100.0, 2, level='rigid')\n"
-        "print(*(name.split('.')[0] for name in sys.modules))"
-    )
-    assert not {"matplotlib", "xarray", "pandas", "pyarrow", "distributed"} & set(python(code).split())
+LAZY = {  # code, and what it does not load
+    "import gearfmu": HEAVY,
+    "from gearfmu.cli import outcome; outcome(['--help'])": (*HEAVY[:6], "rich"),
+    "from gearfmu.quantities import to_si; to_si('3 m', 'm'); to_si('3 mm', 'm')": ("pint",),
+    # but dask.base, which pint imports where it finds it
+    "import gearfmu as gf; gf.te(gf.assemble('fzg_c'), 100.0, 2, level='rigid')": (
+        "matplotlib", "xarray", "pandas", "pyarrow", "distributed",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", LAZY)
+def test_packages_are_loaded_when_they_are_wanted(code: str) -> None:
+    *_, loaded = python(f"import sys; {code}\nprint(*(name.split('.')[0] for name in sys.modules))").splitlines()
+    assert not set(LAZY[code]) & set(loaded.split())
 
 
 def test_help_is_readable() -> None:
@@ -72,14 +74,27 @@ def test_help_is_readable() -> None:
         gf.simulat  # noqa: B018
 
 
-def test_te_is_that_of_the_command_line(tmp_path: Path) -> None:
-    out = tmp_path / "te.csv"
+def test_te_is_that_of_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Table, console and function. With rigid bearings the stage is its mesh, and the console names the mesh alone."""
+    out, model = tmp_path / "te.csv", gf.assemble(gf.load("fzg_c"))
     call = ["te", "fzg_c", "--torque", "80 N*m", "--torque", "302 N*m", "--positions", "6", "--out", str(out)]
-    assert cli.outcome(call) == 0
-    with out.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    for te in (gf.te("fzg_c", ["80 N*m", 302], 6), gf.te(gf.assemble(gf.load("fzg_c")), [80.0, "0.302 kN*m"], 6)):
-        assert [float(row["te_um"]) for row in rows] == (1e6 * te.te.ravel()).tolist()
+    shown = []
+    for more, effects in (([], {}), (["--rigid-bearings"], {"effect.bearings": 0.0})):
+        assert cli.outcome([*call, *more]) == 0
+        told = re.findall(r"(mesh|stage) stiffness ([0-9.]+) N/µm", capsys.readouterr().out)
+        shown.append({name: float(number) for name, number in told})
+        table = np.genfromtxt(out, delimiter=",", names=True)
+        assert table.dtype.names[:5] == ("torque_Nm", "position", "te_um", *(f"{n}_stiffness_N_per_um" for n in STIFF))
+        for te in (gf.te("fzg_c", ["80 N*m", 302], 6, **effects), gf.te(model, [80.0, "0.302 kN*m"], 6, **effects)):
+            assert table["te_um"].tolist() == (1e6 * te.te.ravel()).tolist()
+            assert table["mesh_stiffness_N_per_um"] == pytest.approx(1e-6 * te.mesh_stiffness.ravel(), rel=1e-9)
+        assert np.allclose(sum(table[n] for n in table.dtype.names if n.startswith("share_")), 1, atol=1e-9)
+        heavy = table[table["torque_Nm"] == 302.0]
+        for name, value in shown[-1].items():
+            assert value == pytest.approx(heavy[f"{name}_stiffness_N_per_um"].mean(), abs=0.06)
+    assert np.array_equal(table["mesh_stiffness_N_per_um"], table["stage_stiffness_N_per_um"])
+    assert set(shown[1]) == {"mesh"} and shown[0]["stage"] < 0.6 * shown[0]["mesh"]
+    assert out.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_harmonics_of_a_sum_of_cosines() -> None:

@@ -95,11 +95,6 @@ def test_options_of_one_name_take_the_same() -> None:
     assert {"--stage", "--torque", "--speed", "--step"} <= set(options("run")) & set(options("plan"))
 
 
-def test_a_verb_that_there_is_not_is_answered_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.outcome(["simulat", "fzg_c"]) == cli.USAGE_ERROR
-    assert "did you mean simulate?" in capsys.readouterr().err
-
-
 def test_names_of_stages_and_scenes_are_completed() -> None:
     context, param = click.Context(click.Command("te")), click.Argument(["stage"])
     assert "planetary54" in [item.value for item in stage_names(context, param, "plan")]
@@ -124,18 +119,4 @@ def test_bearings_prints_the_table_of_the_function(tmp_path: Path, capsys: pytes
     for row, state in zip(rows, found.states, strict=True):
         assert float(row["load_z"]) == pytest.approx(state.load[2], rel=1e-5)
         assert float(row["pressure_MPa"]) == pytest.approx(1e-6 * state.pressure, rel=1e-5)
-
-
-def test_the_torque_of_a_file_of_bearings_is_the_default() -> None:
-    assert gf.bearings(BEARINGS).torque == 100.0
-
-
-@pytest.mark.parametrize(("arguments", "says"), [
-    (["bearings", "fzg_c"], "has no rolling bearings"),
-    (["bearings", BEARINGS, "--torque", "80"], "N*m"),
-])  # fmt: skip
-def test_bearings_that_there_are_not_are_refused(
-    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.outcome(arguments) in (1, cli.USAGE_ERROR)
-    assert says in capsys.readouterr().err
+    assert gf.bearings(BEARINGS).torque == 100.0, "that of the file, where none is asked"

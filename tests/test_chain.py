@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-import re
 import subprocess
 import sys
 import venv
@@ -13,10 +11,10 @@ import zipfile
 from contextlib import chdir
 from pathlib import Path
 
-import numpy as np
 import pytest
 from verbs import call
 
+from evidence.fmu_probes.symbols import exported_symbols
 from gearfmu.scenefile.scene import SHIPPED
 from gearfmu.stage.run.trace import Trace
 
@@ -24,41 +22,12 @@ ROOT = Path(__file__).resolve().parents[1]
 LARGEST_WHEEL = 20e6  # bytes, with both kernels
 
 
-def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
+def gearfmu(*arguments: object, cwd: Path | None = None) -> str:
     """Standard output of the verb."""
     with chdir(cwd or Path.cwd()):
         code, out, err = call(*arguments)
-    assert code == expect, err + out
+    assert code == 0, err + out
     return out
-
-
-def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
-    out = tmp_path / "te.csv"
-    gearfmu(
-        "te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out
-    )
-    rows = list(csv.reader(out.open(encoding="utf-8")))
-    stiffness = ["mesh_stiffness_N_per_um", "stage_stiffness_N_per_um"]
-    assert rows[0][:6] == ["torque_Nm", "position", "te_um", *stiffness, "share_1"]
-    data = np.array(rows[1:], dtype=float)
-    assert data[:, 0].tolist() == [302.0] * 8 + [100.0] * 8
-    assert data[:8, 1].tolist() == [i / 8 for i in range(8)]
-    assert np.all(data[:, 2] > 0) and np.all(data[:8, 2] > data[8:, 2]) and np.all(data[:, 3] > 0)
-    assert np.array_equal(data[:, 3], data[:, 4]), "with rigid bearings the stage is its mesh"
-    assert np.allclose(data[:, 5:].sum(axis=1), 1, atol=1e-9)
-    assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_te_names_mesh_and_stage_stiffness_alike_in_table_and_on_the_console(tmp_path: Path) -> None:
-    order = ("te", "fzg_c", "--torque", "302 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
-    alone, both = (
-        {name: float(number) for name, number in re.findall(r"(mesh|stage) stiffness ([0-9.]+) N/µm", shown)}
-        for shown in (gearfmu(*order, *more) for more in (("--rigid-bearings",), ()))
-    )
-    table = np.genfromtxt(tmp_path / "te.csv", delimiter=",", names=True)
-    written = {name: table[f"{name}_stiffness_N_per_um"].mean() for name in ("mesh", "stage")}
-    assert both == pytest.approx(written, abs=0.06)
-    assert alone == {"mesh": both["mesh"]} and both["stage"] < 0.6 * both["mesh"]
 
 
 def test_export_and_validate(tmp_path: Path) -> None:
@@ -92,48 +61,39 @@ def test_demo_ends_with_a_report_and_the_fmu_is_the_solver_all_the_way(tmp_path:
     assert all(fmu[name].tobytes() == kernel[name].tobytes() for name in fmu.channels)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert str(tmp_path / "report.html") in out
-    assert (
-        summary["scene"],
-        summary["level"],
-        summary["slices"],
-        summary["master"],
-        summary["H"],
-        summary["unit"],
-    ) == ("clutch_closure", "standard", 5, "gs_mean", 2e-5, "fmu")
+    wanted = {
+        "scene": "clutch_closure",
+        "level": "standard",
+        "slices": 5,
+        "master": "gs_mean",
+        "H": 2e-5,
+        "unit": "fmu",
+    }
+    assert wanted.items() <= summary.items()
     assert 'class="warning"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
 
 
-@pytest.fixture(scope="module")
-def wheel() -> Path:
-    """The wheel for Linux and Windows, made as users are told."""
+@pytest.mark.full
+@pytest.mark.needs("ziglang", "build")
+def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None:
+    """Small, for Linux and Windows, made as users are told: both kernels export the same names, the Windows one is not
+    loaded here. Installed without compiler and away from the checkout; needs a package index for the dependencies."""
     subprocess.run(["make", "wheel", f"VENV={sys.prefix}"], cwd=ROOT, check=True, capture_output=True)
-    return max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
-
-
-@pytest.mark.full
-@pytest.mark.needs("ziglang", "build")
-def test_the_wheel_runs_the_demo_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
-    """Installed without compiler and away from the checkout; needs a package index for the dependencies."""
-    venv.create(tmp_path / "venv", with_pip=True)
-    python = tmp_path / "venv" / "bin" / "python"
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    subprocess.run([python, "-m", "pip", "install", "--quiet", wheel], check=True, capture_output=True, env=environment)
-    command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
-    subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
-    assert (tmp_path / "out" / "report.html").is_file()
-
-
-@pytest.mark.full
-@pytest.mark.needs("ziglang", "build")
-def test_the_wheel_is_small_and_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
-    """Both kernels are in it and export the same names; the Windows one is not loaded here."""
-    from evidence.fmu_probes.symbols import exported_symbols
-
+    wheel = max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
     assert wheel.stat().st_size <= LARGEST_WHEEL
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
     with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(tmp_path)
-    folder = tmp_path / "gearfmu" / "kernel" / "lib"
+        archive.extractall(tmp_path / "wheel")
+    folder = tmp_path / "wheel" / "gearfmu" / "kernel" / "lib"
     names = [exported_symbols(folder / file) for file in ("linux64/gearfmu_kernel.so", "win64/gearfmu_kernel.dll")]
     assert names[0] == names[1] and len(names[0]) > 40
+    venv.create(tmp_path / "venv", with_pip=True)
+    binaries = tmp_path / "venv" / "bin"
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | {"CC": "false"}
+    for command in (
+        [binaries / "python", "-m", "pip", "install", "--quiet", wheel],
+        [binaries / "gearfmu", "demo", "--out", tmp_path / "out"],
+    ):
+        subprocess.run(command, check=True, cwd=tmp_path, env=environment, capture_output=True)
+    assert (tmp_path / "out" / "report.html").is_file()

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 import re
-import subprocess
 import sys
 import unicodedata
 from pathlib import Path
@@ -28,6 +26,7 @@ VERBS = {
     "effects": ["effects"],
     "trace": ["inspect", "trace.h5"],
     "report": ["report", "."],
+    **{f"help of {verb}": [verb, "--help"] for verb in cli.VERBS},
 }
 
 
@@ -46,13 +45,6 @@ def written(encoding: str, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> 
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
-def test_help_of_every_verb(encoding: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for verb in cli.VERBS:
-        code, text = written(encoding, monkeypatch, verb, "--help")
-        assert code == 0 and "Usage: gearfmu" in text, verb
-
-
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_what_verbs_write(encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same text as in UTF-8 but for the signs that are spelled out. `effects` ended in an internal error."""
     monkeypatch.chdir(tmp_path)
@@ -67,13 +59,6 @@ def test_what_verbs_write(encoding: str, tmp_path: Path, monkeypatch: pytest.Mon
         wanted, full = written("utf-8", monkeypatch, *arguments)
         assert code == wanted and "internal error" not in text, name
         assert text.count("?") == full.count("?"), name
-
-
-def test_a_pipe_of_another_process_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
-    command = [sys.executable, "-m", "gearfmu.cli", "schema", "stage"]
-    done = subprocess.run(command, capture_output=True, env=environment, check=False)
-    assert done.returncode == 0 and b"gear" in done.stdout and not done.stderr
 
 
 def test_no_sign_of_the_product_is_lost() -> None:

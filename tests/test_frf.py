@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from verbs import call
 
 import gearfmu as gf
-from gearfmu import cli
 
 
 def errors(path: Path) -> dict[str, list[float]]:
@@ -31,24 +29,6 @@ def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path) -> None:
     found = errors(tmp_path / "pinion_frf.csv")
     assert set(found) == {"modal", "rubin"} and all(len(values) == 12 for values in found.values())
     assert "reduced free, judged with bore held" in out and found["rubin"][0] < 1e-6 < found["modal"][0]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["planetary54", "wheel"], "no body 'wheel'; the stage has sun, planet, ring, carrier"),
-        (
-            ["planetary54", "carrier", "--methods", "guyan"],
-            "methods = guyan: is no method; there are modal, craig_bampton",
-        ),
-        (["planetary54", "carrier", "--scale", 0.2, "--methods", "krylov", "--size", 20], "give at least that"),
-        (["planetary54", "carrier", "--band", "5 kHz", "1 kHz", "--scale", 0.2], "from a lower to a higher frequency"),
-    ],
-)
-def test_bad_input_is_one_clear_message_and_nothing_written(arguments, message, tmp_path) -> None:
-    code, _, err = call("frf", *arguments, "--out", tmp_path / "none")
-    assert code in (1, cli.USAGE_ERROR) and not (tmp_path / "none").exists()
-    assert re.search(message, " ".join(err.split()))
 
 
 def test_the_function_is_the_verb(tmp_path) -> None:

@@ -12,25 +12,20 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
+from verbs import tiny
 
 from gearfmu import cli
 from gearfmu.body import load_body
 from gearfmu.stagefile.proposals.numbers import Wish, new_from_numbers
 
 INTERRUPTED = "gearfmu: interrupted; files that were being written are as they were before"
-SMALL = {"modes": 40, "roll_points": 8, "width_functions": 3}
-SMALL |= {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
 LATEST = 120.0  # s until there is something to interrupt
 
 
-def tiny(folder: Path) -> Path:
+def made_tiny(folder: Path) -> Path:
     """A pair whose bodies are made in a second."""
     path = Path(new_from_numbers("tiny", Wish((17, 19), 1e-3, 5e-3), str(folder)))
-    lines = path.read_text(encoding="utf-8").splitlines()
-    for place, line in enumerate(lines):
-        key = line.split(" = ")[0]
-        lines[place] = f"{key} = {SMALL[key]}" if key in SMALL else line
-    path.write_text("\n".join(lines), encoding="utf-8")
+    tiny(path)
     return path
 
 
@@ -61,20 +56,21 @@ def left_over(folder: Path) -> list[str]:
     return [path.name for path in folder.rglob(".*") if path.is_file()]
 
 
-SLOW = pytest.param("study", marks=pytest.mark.full)
 OVER = ["--over", "torque=10:300:200 N*m", "--over", "positions=4"]
-WORK = {  # verb with its arguments, the file that shows that it is at work, and what that holds then
-    "reduce": (["reduce", "tiny"], "told", "reducing"),
-    "sweep": (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
-    "study": (["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", ""),
-}
 
 
-@pytest.mark.parametrize("verb", ["reduce", "sweep", SLOW])
-def test_interrupted_work_is_one_line_and_whole_files(verb: str, tmp_path: Path) -> None:
-    if verb == "reduce":
-        tiny(tmp_path)
-    (words, file, sign), told = WORK[verb], tmp_path / "told"
+@pytest.mark.parametrize(
+    ("words", "file", "sign"),  # the file that shows that it is at work, and what that holds then
+    [
+        (["reduce", "tiny"], "told", "reducing"),
+        (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
+        pytest.param(["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", "", marks=pytest.mark.full),
+    ],
+    ids=["reduce", "sweep", "study"],
+)
+def test_interrupted_work_is_one_line_and_whole_files(words: list[str], file: str, sign: str, tmp_path: Path) -> None:
+    made_tiny(tmp_path)
+    told = tmp_path / "told"
     work, end = forked(words, tmp_path, told), time.monotonic() + LATEST
     while not (found := [path for path in tmp_path.rglob(file) if sign in path.read_text("utf-8")]):
         assert os.waitpid(work, os.WNOHANG) == (0, 0) and time.monotonic() < end, "it ended by itself"
@@ -88,7 +84,7 @@ def test_interrupted_work_is_one_line_and_whole_files(verb: str, tmp_path: Path)
 
 
 def test_two_processes_may_reduce_one_stage(tmp_path: Path) -> None:
-    tiny(tmp_path)
+    made_tiny(tmp_path)
     told = [tmp_path / name for name in ("one", "other")]
     both = [forked(["reduce", "tiny"], tmp_path, path) for path in told]
     assert [exit_code(work) for work in both] == [0, 0], [path.read_text(encoding="utf-8") for path in told]

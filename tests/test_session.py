@@ -65,13 +65,6 @@ def test_a_trace_draws_the_part_and_the_channels_that_are_named(trace: gf.Trace)
         trace["zz"]
 
 
-def test_settings_say_what_they_nearly_are() -> None:
-    with pytest.raises(gf.GearfmuError, match=r"level = fasst: expected rigid \| fast .* \(did you mean fast\?\)"):
-        gf.simulate("fzg_c", 1.0, 1.0, **{"level": "fasst"})  # type: ignore[arg-type]
-    with pytest.raises(gf.GearfmuError, match=r"'effect.hert' is no parameter: did you mean \"effect.hertz\"\?"):
-        gf.te("fzg_c", 1.0, **{"effect.hert": 0.0})  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(("place", "reason"), [("/proc/x.fmu", "No such file"), (".", "it is a folder")])
 def test_a_place_that_cannot_be_written_is_named_itself(place: str, reason: str) -> None:
     with pytest.raises(gf.GearfmuError, match=f"^{place}: cannot be written, {reason}.*: .*(folder|file)") as refused:

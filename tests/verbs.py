@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 import sys
+from collections.abc import Mapping
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from types import MappingProxyType
 from unittest.mock import patch
 
 from gearfmu import cli
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+TINY = {"modes": 40, "roll_points": 8, "width_functions": 3}
+TINY |= {"flank": 3, "thickness": 1, "root": 2, "rim": 1, "width": 2}
+
+
+def words(line: str) -> list[str]:
+    """The words of a command line; a comment ends it."""
+    found = re.findall(r'"([^"]*)"|(\S+)', line.split(" #")[0])
+    return [quoted or plain for quoted, plain in found]
+
+
+def tiny(path: Path, counts: Mapping[str, int | None] = MappingProxyType({})) -> None:
+    """A stage file with so few modes and elements that its bodies are made in a second; None: as it is."""
+    text = path.read_text(encoding="utf-8")
+    for key, value in (TINY | dict(counts)).items():
+        text = re.sub(rf"^{key} = \d+", f"{key} = {value}", text, flags=re.MULTILINE) if value else text
+    path.write_text(text, encoding="utf-8")
 
 
 def call(*arguments: object) -> tuple[int, str, str]:

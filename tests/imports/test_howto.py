@@ -1,4 +1,4 @@
-"""Deck and section of docs/howto-import.md; its chain runs in tests/test_new_to_report.py."""
+"""Deck and section of docs/howto-import.md; its chain runs in tests/test_own_stage.py."""
 
 from __future__ import annotations
 

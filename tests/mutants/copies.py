@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from draw import Defect
@@ -110,24 +110,12 @@ class Copy:
         return next((self.root / "gearfmu" / "kernel" / "lib").rglob("gearfmu_kernel.so"))
 
     def lines(self, modules: Sequence[str], seconds: float) -> Iterator[tuple[str, Run]]:
-        """Runs each test module in a process of its own, forked from one that has imported what all of them import."""
-        result = self.objects / "result.json"
-        setting = self._setting(True) | {"MUTANTS_RESULT": str(result), "MUTANTS_SECONDS": str(seconds)}
-        line = [sys.executable, "-c", "import forks; forks.serve()"]
-        with subprocess.Popen(
-            line, cwd=self.root, env=setting, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        ) as server:
-            assert server.stdin and server.stdout
-            for name in modules:
-                result.unlink(missing_ok=True)
-                for old in self.objects.glob("*.gcda"):
-                    old.unlink()
-                print(name, file=server.stdin, flush=True)
-                server.stdout.readline()
-                found = json.loads(result.read_text(encoding="utf-8")) if result.exists() else {"failed": "no result"}
-                ran = found.get("lines", {}) | self._lines_of_c()
-                yield name, Run(found["failed"] or found.get("at", ""), found.get("seconds", 0.0), True, ran)
-            server.stdin.close()
+        """Runs each test module in a process of its own, and tells which lines it ran."""
+        for name in modules:
+            for old in self.objects.glob("*.gcda"):
+                old.unlink()
+            run = self.run([name], seconds, coverage=True)
+            yield name, replace(run, whole=True, lines=run.lines | self._lines_of_c())
 
     def _lines_of_c(self) -> dict[str, list[int]]:
         """Lines of C sources that ran under coverage since the counts were last removed, by file."""

@@ -19,7 +19,7 @@ from gearfmu.planning.request import request
 from gearfmu.planning.run import planned_scene, planned_stage, run_planned
 from gearfmu.planning.table import plan_text, run_text
 from gearfmu.report.plan import plan_sections
-from gearfmu.scenefile.scene import load_scene
+from gearfmu.scenefile.scene import SHIPPED, load_scene
 from gearfmu.stage.effects import DISSIPATION, EFFECTS
 from gearfmu.sweeps.runners import in_this_process
 
@@ -27,6 +27,31 @@ BAND = ("500 Hz", "5 kHz")
 SCENE: dict[str, Any] = {"settle": "20 ms", "duration": "80 ms"}
 MEASURED = ("bound", "error", "noise", "price", "realtime", "price_full", "price_default", "error_default")
 NOTHING: dict[str, Any] = dict.fromkeys(MEASURED, 0.0)  # of a plan by hand
+
+
+def by_hand(path: Path, scene: str, duration: str, choice: Choice, bearing: bool, **of_segment: Any) -> Plan:
+    """A plan of the first 80 ms of a shipped scene, with one segment under load; written to `path`."""
+    text = (SHIPPED / f"{scene}.toml").read_text(encoding="utf-8")
+    assert (old := f'duration = "{duration}"') in text
+    path.write_text(text.replace(old, 'duration = "80 ms"'), encoding="utf-8")
+    segment = Segment("all", 0.0, 0.08, "loaded", choice, 0.02, safety=1.25, **NOTHING, **of_segment)
+    outputs = ["mesh.te", "bearing.pinion.fx"] if bearing else ["mesh.te"]
+    asked = {"outputs": outputs, "band": ["500 Hz", "5000 Hz"], "budget": "0.2 dB" if bearing else "1 dB"}
+    return Plan(str(path), "", load_scene(str(path)).coupling.step, asked, (segment,))
+
+
+@pytest.fixture
+def poor(tmp_path: Path) -> Plan:
+    """A plan whose set is far from its budget."""
+    choice = Choice("rigid", 2e-5, 1, ("tip_contact",))
+    return by_hand(tmp_path / "loaded.toml", "pair_loaded", "0.15 s", choice, True, window=0.012, settle=0.005)
+
+
+@pytest.fixture
+def made_by_hand(tmp_path: Path) -> Plan:
+    """A plan that takes the coast flank out where the clutch is dumped."""
+    choice = Choice("fast", 1e-5, 1, ("coast_flank",))
+    return by_hand(tmp_path / "dump.toml", "clutch_dump", "0.3 s", choice, False, window=0.01, settle=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -135,20 +160,6 @@ def test_what_keeps_its_budget_is_not_planned_anew(poor: Plan) -> None:
     assert len(checks) == 2 and all(check["kept"] and not check["answer"] for check in checks)
 
 
-@pytest.fixture
-def poor(tmp_path: Path) -> Plan:
-    """A plan by hand whose set is far from its budget."""
-    text = (Path(load_scene.__globals__["SHIPPED"]) / "pair_loaded.toml").read_text(encoding="utf-8")
-    path = tmp_path / "loaded.toml"
-    path.write_text(text.replace('duration = "0.15 s"', 'duration = "80 ms"'), encoding="utf-8")
-    scene = load_scene(str(path))
-    assert scene.duration == 0.08
-    choice = Choice("rigid", 2e-5, 1, ("tip_contact",))
-    segment = Segment("steady", 0.0, 0.08, "loaded", choice, 0.02, 0.012, 0.005, safety=1.25, **NOTHING)
-    asked = {"outputs": ["mesh.te", "bearing.pinion.fx"], "band": ["500 Hz", "5000 Hz"], "budget": "0.2 dB"}
-    return Plan(str(path), "", scene.coupling.step, asked, (segment,))
-
-
 def test_a_plan_takes_the_fmu_of_its_own_model_and_no_other(poor: Plan, tmp_path: Path) -> None:
     model = stage_model(planned_scene(poor))
     own = export(model, tmp_path / "own.fmu")
@@ -156,16 +167,3 @@ def test_a_plan_takes_the_fmu_of_its_own_model_and_no_other(poor: Plan, tmp_path
     other = export(model.with_starts({"slices": 3.0}), tmp_path / "other.fmu")
     with pytest.raises(SpecError, match="was made for another model"):
         planned_stage(poor, other)
-
-
-@pytest.fixture
-def made_by_hand(tmp_path: Path) -> Plan:
-    """A plan that takes the coast flank out where the clutch is dumped."""
-    scene = load_scene("clutch_dump", {"duration": "80 ms"})
-    choice = Choice("fast", 1e-5, 1, ("coast_flank",))
-    segment = Segment("all", 0.0, 0.08, "loaded", choice, 0.02, 0.01, 0.01, safety=1.25, **NOTHING)
-    path = tmp_path / "dump.toml"
-    text = (Path(load_scene.__globals__["SHIPPED"]) / "clutch_dump.toml").read_text(encoding="utf-8")
-    path.write_text(text.replace('duration = "0.3 s"', 'duration = "80 ms"'), encoding="utf-8")
-    asked = {"outputs": ["mesh.te"], "band": ["500 Hz", "5000 Hz"], "budget": "1 dB"}
-    return replace(Plan(str(path), "", scene.coupling.step, asked, (segment,)))

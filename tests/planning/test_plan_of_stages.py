@@ -44,16 +44,13 @@ def keeps_the_budget_at_a_longer_step(plan: Plan) -> bool:
     return segment.kept and segment.choice.h > FULL_STEP_OF_SETS
 
 
-def small_train() -> StageModel:
+@pytest.mark.full  # thirteen seconds
+def test_a_train_is_planned() -> None:
     """two_stage on invented bodies."""
     spec = load_stage("two_stage")
     gears = [gear.model_copy(update={"modal_damping": 0.1}) for gear in spec.gears]
-    return assemble(spec, [body(gear, gear_shape(gear)) for gear in gears])
-
-
-@pytest.mark.full  # thirteen seconds
-def test_a_train_is_planned() -> None:
-    plan = planned(load_scene("pair_loaded", SHORT | TRAIN), small_train())
+    model = assemble(spec, [body(gear, gear_shape(gear)) for gear in gears])
+    plan = planned(load_scene("pair_loaded", SHORT | TRAIN), model)
     assert keeps_the_budget_at_a_longer_step(plan)
     assert plan.request["outputs"] == ["stage1.te", "stage2.te"]
 

@@ -196,8 +196,14 @@ def at_level(model: StageModel, level: str = "fast", **parameters: float) -> dic
 
 def every(full: Iterable[str] = (), seeds: Iterable[int] = range(20)) -> list[ParameterSet]:
     """A test's parameters: each kind, those named `full` under make test-full, and there the drawn stages too."""
-    named = [pytest.param(kind, id=name, marks=[FULL] * (name in full)) for name, kind in KINDS.items()]
-    return named + [pytest.param(drawn(seed), id=f"drawn-{seed}", marks=FULL) for seed in seeds]
+    return some([name for name in KINDS if name not in full], full) + [
+        pytest.param(drawn(seed), id=f"drawn-{seed}", marks=FULL) for seed in seeds
+    ]
+
+
+def some(quick: Iterable[str], full: Iterable[str] = ()) -> list[ParameterSet]:
+    """A test's parameters: kinds by their names, and those that only make test-full has."""
+    return [pytest.param(KINDS[name], id=name, marks=[FULL] * (name not in quick)) for name in (*quick, *full)]
 
 
 def channels(trace: Trace) -> dict[str, np.ndarray]:
@@ -215,6 +221,13 @@ def differences(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) 
     return {
         name: float(np.abs(values - other[name]).max()) / (size[family(name)] or 1.0) for name, values in one.items()
     }
+
+
+def are_same(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray], within: float, where: str = "") -> None:
+    """Every channel differs by less than a part of the largest value of its family."""
+    apart = differences(one, other)
+    worst = max(apart, key=apart.__getitem__)
+    assert apart[worst] < within, f"{worst} differs by {apart[worst]:.2g} {where}"
 
 
 def family(name: str) -> str:

@@ -82,18 +82,15 @@ def switches(kind: str) -> dict[str, dict[str, float]]:
     return {f"effect.{name}": {f"effect.{name}": value} for name, value in over.items()}
 
 
+OTHERS = {f"level-{n:g}": ({"level": n}, STEP) for n in (0.0, 2.0, 3.0)}  # parameters and step of communication
+OTHERS |= {"h-5e-06": ({"h": 5e-6}, STEP), "h-0": ({"h": 0.0}, 2.5 * STEP)}
+
+
 def cases() -> Iterator[object]:
     for name, kind in KINDS.items():
-        for effect, switched in switches(name).items():
-            quick = name in CHEAP or effect in FEW.get(name, ())
-            marks = () if quick else (pytest.mark.full,)
-            yield pytest.param(kind, switched, STEP, id=f"{name}-{effect}", marks=marks)
-        for level in (0.0, 2.0, 3.0):
-            marks = () if name in CHEAP and level < 3.0 else (pytest.mark.full,)
-            yield pytest.param(kind, {"level": level}, STEP, id=f"{name}-level-{level:g}", marks=marks)
-        for h, step in ((5e-6, STEP), (0.0, 2.5 * STEP)):
-            marks = () if name in CHEAP else (pytest.mark.full,)
-            yield pytest.param(kind, {"h": h}, step, id=f"{name}-{h:g}-{step:g}", marks=marks)
+        for what, given in ({what: (own, STEP) for what, own in switches(name).items()} | OTHERS).items():
+            quick = what != "level-3" if name in CHEAP else what in FEW.get(name, ())
+            yield pytest.param(kind, *given, id=f"{name}-{what}", marks=() if quick else pytest.mark.full)
 
 
 @pytest.mark.parametrize("name", KINDS)

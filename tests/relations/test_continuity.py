@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import KINDS, Drawn, Kind, every
+from kinds import Drawn, Kind, every, some
 
 from gearfmu.stage import StageModel
 from gearfmu.stage.run.place import place_of
@@ -59,11 +59,10 @@ def test_transmission_error_does_not_jump_over_a_pitch(kind: Kind) -> None:
     assert jump(te_of(kind.model(), kind.torque), np.linspace(0, 1, count + 1))[0] == 0.0
 
 
-@pytest.mark.parametrize("name", ["pair", "helical", pytest.param("train", marks=pytest.mark.full)])
-def test_torque_through_zero_jumps_by_the_backlash_alone(name: str) -> None:
+@pytest.mark.parametrize("kind", some(["pair", "helical"], ["train"]))
+def test_torque_through_zero_jumps_by_the_backlash_alone(kind: Kind) -> None:
     """On either side of 0 the transmission error is continuous down to the last part of the load; between the sides
     lies the normal backlash (less what both flanks are relieved: the unloaded curves of drive and coast)."""
-    kind = KINDS[name]
     kernel, place = statics_of(kind.model()), place_of(kind.model(), None)
     for sign in (1, -1):
         at = 0.3 * place.pitch
@@ -75,10 +74,9 @@ def test_torque_through_zero_jumps_by_the_backlash_alone(name: str) -> None:
         assert abs(over(1e-7) - over(2e-7)) < 1e-10
 
 
-@pytest.mark.parametrize("name", ["pair", "internal", pytest.param("helical", marks=pytest.mark.full)])
-def test_clearance_through_zero_does_not_jump(name: str) -> None:
+@pytest.mark.parametrize("kind", some(["pair", "internal"], ["helical"]))
+def test_clearance_through_zero_does_not_jump(kind: Kind) -> None:
     """From teeth that are jammed to teeth with play: the coast flanks come and go without a jump."""
-    kind = KINDS[name]
     model = kind.model()
     place = place_of(model, None)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,54 +15,45 @@ from kinds import COARSE, KINDS, assembled
 from gearfmu.body import Body
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.stage.run.te import loaded_te
-from gearfmu.stagefile.tables.connections import SupportSpec
+from gearfmu.stagefile.stage import load_stage
+from gearfmu.stagefile.stored import expected_hash
 
 TORQUE, POSITIONS = 300.0, 8  # N·m, over a pitch
 COARSEST = COARSE.model_copy(
     update={"modes": 12, "mesh": COARSE.mesh.model_copy(update={"flank": 2, "rim": 1, "width": 2})}
 )
 SMALL = 1e-3  # rad: the flank leans by 7 µm over half the width
-HELIX = (
-    5e-4  # of the transmission error: slices of helical gears yield as their own patches, those of spur gears as the
-)
-# width functions say; 1.3e-4 on these bodies
+# of the transmission error: slices of helical gears yield as their own patches, those of spur gears as the width
+# functions say; 1.3e-4 on these bodies
+HELIX = 5e-4
 LEAN = 1e-5  # of it, from a tenth of the angle to all of it
 TEETH = 0.01  # of the mean transmission error, second difference over one tooth
-BODIES: dict[tuple[str, int, float], Body] = {}  # by gear, number of teeth of the wheel, helix angle
+COUNTS = COARSEST.model_dump(exclude={"strip_half_width"}, exclude_unset=True)
+BODIES: dict[str, Body] = {}  # by fingerprint
 
 
 @cache
 def transmission_error(teeth: int = 24, helix: float = 0.0, held: bool = False) -> np.ndarray:
     """(POSITIONS,) m of the FZG pair on coarse bodies: its wheel with other teeth at the distance that fits, or a helix
     angle (rad); held: bearings hold tilt and axial motion, as helical gears need."""
-    stage = KINDS["pair"].stage
-    pinion, wheel = stage.gears
-    more = (teeth - wheel.teeth) * wheel.normal_module
-    changed = {
-        pinion.name: pinion.model_copy(update={"body": COARSEST, "helix_angle": helix}),
-        wheel.name: wheel.model_copy(
-            update={
-                "body": COARSEST,
-                "helix_angle": -helix,
-                "teeth": teeth,
-                "tip_diameter": wheel.tip_diameter + more,
-                "bore_diameter": wheel.bore_diameter + more,
-            }
-        ),
+    spec = load_stage(KINDS["pair"].file)
+    wheel, more = spec.written.gears[1], (teeth - 24) * spec.written.pair.normal_module
+    changes: dict[str, Any] = {
+        "pair.helix_angle": helix,
+        "pair.center_distance": spec.written.pair.center_distance + 0.5 * more,
+        "gears.wheel.teeth": teeth,
+        "gears.wheel.tip_diameter": wheel.tip_diameter + more,
+        "gears.wheel.bore_diameter": wheel.bore_diameter + more,
     }
-    axes = {name: rotor.axis for name, rotor in stage.rotors.items()}
-    axes[stage.rotor_of(wheel.name)] = (axes[stage.rotor_of(wheel.name)][0] + 0.5 * more, 0.0)
-    rotors = {name: rotor.model_copy(update={"axis": axes[name]}) for name, rotor in stage.rotors.items()}
-
-    def support(old: SupportSpec) -> SupportSpec:
-        return old.model_copy(update={"axial": 1e9, "tilt": 1e7}) if held else old
-
-    other = stage.model_copy(
-        update={"bodies": changed, "rotors": rotors, "supports": tuple(map(support, stage.supports))}
-    )
-    found = {gear.name: BODIES.get((gear.name, teeth, helix)) or reduced_gear(gear) for gear in other.gears}
-    BODIES.update({(name, teeth, helix): body for name, body in found.items()})
-    return loaded_te(assembled(other, found), [TORQUE], POSITIONS).te[0]
+    for gear in ("pinion", "wheel"):
+        changes |= {f"gears.{gear}.body.{field}": number for field, number in COUNTS.items()}
+        changes |= {f"gears.{gear}.bearing.axial": 1e9, f"gears.{gear}.bearing.tilt": 1e7} if held else {}
+    stage = load_stage(KINDS["pair"].file, changes)
+    for gear in stage.gears:
+        if (known := expected_hash(stage, gear.name)) not in BODIES:
+            BODIES[known] = reduced_gear(gear)
+    found = {gear.name: BODIES[expected_hash(stage, gear.name)] for gear in stage.gears}
+    return loaded_te(assembled(stage, found), [TORQUE], POSITIONS).te[0]
 
 
 def test_a_vanishing_helix_angle_of_either_hand_is_a_spur_gear() -> None:

@@ -6,8 +6,6 @@ port is a spring, and one of each gear without any contact.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.linalg as sl
@@ -34,11 +32,6 @@ def one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
         return made[id(model)]
 
     monkeypatch.setattr(linear, "full_kernel", kernel)
-
-
-def modes_of(kind: Kind, model: StageModel, positions: int) -> linear.StageModes:
-    bodies = listed(kind.stage, bodies_of(kind.file))
-    return linear.stage_modes(model, bodies, kind.torque, COUNT, positions)
 
 
 def free_rotations(kind: Kind, system: linear.Linearised) -> int:
@@ -68,7 +61,7 @@ def test_reported_modes_exist_at_every_position_and_none_is_missing(kind: Kind, 
     """Fault: near-rigid rotation of a set counted as a mode at positions where it was faster than 1 Hz, so that means
     over the positions ("1197 Hz") were those of different modes."""
     model = kind.model()
-    found = modes_of(kind, model, positions)
+    found = linear.stage_modes(model, listed(kind.stage, bodies_of(kind.file)), kind.torque, COUNT, positions)
     numbers = []
     for position, own in zip(found.position, found.frequency, strict=True):
         real, free = frequencies(kind, model, position)
@@ -89,14 +82,6 @@ def test_modes_are_the_same_at_four_times_as_many_positions() -> None:
     assert (np.diff(coarse, axis=1) < 0).any(), "as two 39 kHz modes do"
     apart = np.abs(fine[::4, None, :] / coarse[:, :, None] - 1).max(axis=0).min(axis=1)
     assert (apart[:36] < 1e-6).all(), "the last of the list may leave it"
-
-
-@pytest.mark.full
-def test_the_torque_at_which_a_rotation_is_slow_somewhere_adds_no_mode() -> None:
-    """planetary54 at 599 … 601 N·m: free rotation at 1 Hz in one position, at 13 Hz in another."""
-    kinds = [replace(KINDS["set"], torque=torque) for torque in (599.0, 601.0)]
-    lists = [modes_of(kind, kind.model(), 3).frequency.mean(axis=0) for kind in kinds]
-    assert lists[0] == pytest.approx(lists[1], rel=1e-3)
 
 
 def test_equal_meshes_have_one_line_each() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, differences, drawn, held_as
+from kinds import KINDS, Kind, are_same, drawn, held_as
 from moved import each_vector, renamed, run, start_of, turned_vector
 
 from gearfmu.stage import Steady
@@ -85,9 +85,7 @@ def check_turned(kind: Kind, angles: tuple[float, ...]) -> None:
         other = renamed(other, behind)
         found = run(kind, kind.model(lambda _, moved=other: moved), steady, start)
         found = each_vector(found, lambda _, x, y, angle=angle: turned_vector((x, y), -angle))
-        apart = differences(expected, found)
-        worst = max(apart, key=apart.__getitem__)
-        assert apart[worst] < SAME, f"{worst} differs by {apart[worst]:.2g} where the layout is turned by {angle:.3g}"
+        are_same(expected, found, SAME, f"where the layout is turned by {angle:.3g}")
 
 
 @pytest.mark.parametrize("name", ["pair", "helical", "internal", pytest.param("train", marks=pytest.mark.full)])

@@ -3,11 +3,9 @@ reversal of the torque goes through it without an unsolved step and hits harder.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, assembled, bodies_of
+from kinds import KINDS, Kind, assembled, bodies_of, some
 
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.simulate import simulate
@@ -15,13 +13,8 @@ from gearfmu.stage.run.steady import Line, Profiled
 from gearfmu.stagefile.forms.expand import with_ports
 
 PLAY = 2e-3  # rad, of every port
-QUICK = ("pair", "helical")
+QUICK = {"pair", "helical"}
 FAST = {"level": 1.0}
-
-
-def every_kind() -> Iterable[object]:
-    full = (pytest.mark.full,)
-    return [pytest.param(kind, id=name, marks=() if name in QUICK else full) for name, kind in KINDS.items()]
 
 
 def pair_of(kind: Kind) -> tuple[StageModel, StageModel]:
@@ -39,7 +32,7 @@ def reversed_in(model: StageModel, kind: Kind) -> Trace:
     return simulate(model, Profiled(model, torque, speed), 4e-3, kind.step, FAST)
 
 
-@pytest.mark.parametrize("kind", every_kind())
+@pytest.mark.parametrize("kind", some(QUICK, KINDS.keys() - QUICK))
 def test_a_loaded_run_carries_its_torque_through_play(kind: Kind) -> None:
     plain, free = (kind.run(model) for model in pair_of(kind))
     port = f"{pair_of(kind)[0].shafts.input}.tau_mean"
@@ -48,7 +41,7 @@ def test_a_loaded_run_carries_its_torque_through_play(kind: Kind) -> None:
     assert free["solver.status"][-1] == 0
 
 
-@pytest.mark.parametrize("kind", every_kind())
+@pytest.mark.parametrize("kind", some(QUICK, KINDS.keys() - QUICK))
 def test_a_reversal_goes_through_play_and_hits_harder(kind: Kind) -> None:
     plain, free = (reversed_in(model, kind) for model in pair_of(kind))
     assert free["solver.status"][-1] == 0 and free["solver.retried_steps"][-1] == 0

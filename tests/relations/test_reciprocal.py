@@ -4,15 +4,16 @@ own. Gradients of gaps that are no derivatives break this; turning and mirroring
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from inner import Inner
-from kinds import KINDS, Kind
+from kinds import KINDS, Kind, some
 
 from gearfmu.stage import StageModel, Steady
-from gearfmu.stagefile.forms.general import Stage, ToothedBody
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.bodies import Eccentricity, Wobble
 
 STEP = 2e-6  # rad: of the angles of ports
@@ -20,14 +21,14 @@ RIGID = {"effect.elastic": 0.0, "effect.hertz": 0.0}
 SAME = 1e-4  # of the stiffness; 2e-5 and less as it is, 5e-4 with rates of the other sign
 
 
-def unsteady(stage: Stage) -> Stage:
-    """With toothings beside their axes."""
-    bodies = {
-        name: body.model_copy(update={"eccentricity": Eccentricity(amount=2e-5, angle=0.5 + i)})
-        if isinstance(body, ToothedBody)
-        else body
-        for i, (name, body) in enumerate(stage.bodies.items())
-    }
+def unsteady(stage: Stage, wobble: float = 0.0) -> Stage:
+    """With toothings beside their axes, and tilted by `wobble` (rad)."""
+    bodies = dict(stage.bodies)
+    for i, gear in enumerate(stage.gears):
+        update: dict[str, object] = {"eccentricity": Eccentricity(amount=2e-5, angle=0.5 + i)}
+        if wobble:
+            update["wobble"] = Wobble(amount=wobble, angle=0.7 - i)
+        bodies[gear.name] = gear.model_copy(update=update)
     return stage.model_copy(update={"bodies": bodies})
 
 
@@ -42,33 +43,21 @@ def torques(kind: Kind, model: StageModel, angles: tuple[float, float]) -> np.nd
     return np.array([kernel.get(f"{port}.tau") for port in ports])
 
 
-@pytest.mark.parametrize("name", ["pair", "internal"])
-def test_each_port_answers_the_other_alike(name: str) -> None:
+@pytest.mark.parametrize("kind", some(["pair", "internal"]))
+def test_each_port_answers_the_other_alike(kind: Kind) -> None:
     """Sees a toothing's runout whose rate over the angle has the wrong sign. Rigid spur teeth only: a compliance that
     depends on the position has a torque of its own, which is neglected (4e-4 of the stiffness), and so have slices that
     a tip edge cuts."""
-    kind = KINDS[name]
     model = kind.model(unsteady)
     ends = [[torques(kind, model, tuple(s * STEP * np.eye(2)[k])) for s in (-1, 1)] for k in range(2)]
     stiffness = np.array([(high - low) / (2 * STEP) for low, high in ends])
     assert abs(stiffness[0, 1] - stiffness[1, 0]) < SAME * abs(stiffness).max()
 
 
-def wobbling(stage: Stage) -> Stage:
-    """With toothings beside their axes and tilted."""
-    bodies = {
-        name: body.model_copy(update={"wobble": Wobble(amount=3e-4, angle=0.7 - i)})
-        if isinstance(body, ToothedBody)
-        else body
-        for i, (name, body) in enumerate(unsteady(stage).bodies.items())
-    }
-    return stage.model_copy(update={"bodies": bodies})
-
-
 def test_toothings_move_as_their_places_change(inner_library: Path) -> None:
     """The motion of a toothing that runs out is the derivative of its place. Sees: rates of eccentricity or wobble that
     are missing or of the wrong sign, which act on nodal contact and its dampers alone."""
-    inner = Inner(inner_library, KINDS["helical"].model(wobbling).blob)
+    inner = Inner(inner_library, KINDS["helical"].model(partial(unsteady, wobble=3e-4)).blob)
     pose, motion, step = np.linspace(0.1, 1.2, 12), np.linspace(-3.0, 2.0, 12), 1e-6
     (before, _), (after, _) = (inner.runout(pose + side * step * motion, motion) for side in (-1, 1))
     _, moving = inner.runout(pose, motion)

@@ -4,18 +4,18 @@ of the mean. And no level is worse than a cheaper one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pytest
-from kinds import COARSE, KINDS, assembled, at_level, bodies_of
+from kinds import COARSE, FULL, KINDS, Kind, assembled, at_level, bodies_of, listed, some
 
 from gearfmu.body import load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.scenefile.scene import load_scene
-from gearfmu.stage import StageModel, Steady
+from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.assembly.teeth import ROLLS
 from gearfmu.stage.run.simulate import simulate
 from gearfmu.stage.run.te import loaded_te
 from gearfmu.stage.run.trace import Trace
@@ -25,59 +25,75 @@ from gearfmu.study.bench import Point, measure, models_for
 from gearfmu.study.ladder import window
 from gearfmu.study.norm import errors
 
-HARMONICS, POSITIONS = 8, 64
+HARMONICS = 8
 LEVEL, LENGTH = 1.0, 1e-9  # dB, m
 SHARE = 1e-3  # of the mean force: below it an order is not heard
 
 
-def harmonics(model: StageModel, torque: float, positions: int = POSITIONS, **parameters: float) -> np.ndarray:
-    """(HARMONICS,) m, rms, of the static transmission error."""
-    return loaded_te(model, [torque], positions, **parameters).harmonics(HARMONICS)[0]
+def harmonics(kind: Kind, model: StageModel, load: float = 1.0, positions: int = 64, **parameters: float) -> np.ndarray:
+    """(HARMONICS,) m, rms, of the static transmission error under `load` times the torque."""
+    return loaded_te(model, [load * kind.torque], positions, **parameters).harmonics(HARMONICS)[0]
 
 
-def moved(coarse: np.ndarray, fine: np.ndarray, least: float) -> list[str]:
-    """Harmonics that move by more than LEVEL and more than `least`, in words."""
-    change = 20 * np.log10(np.maximum(coarse, 1e-30) / np.maximum(fine, 1e-30))
-    wrong = (np.abs(change) > LEVEL) & (np.abs(coarse - fine) > least)
-    return [f"{k + 1}: {coarse[k]:.3g} → {fine[k]:.3g}" for k in np.flatnonzero(wrong)]
+Of = Callable[[Kind], np.ndarray]
+
+
+def own(**changed: float) -> Of:
+    """Harmonics of the kind's own model."""
+    return lambda kind: harmonics(kind, kind.model(), **changed)
+
+
+def with_bodies(**finer: Any) -> Of:
+    """Harmonics of the internal pair with other bodies."""
+
+    def found(kind: Kind) -> np.ndarray:
+        body = COARSE.model_copy(update=finer)
+        bodies = {name: old.model_copy(update={"body": body}) for name, old in kind.stage.bodies.items()}
+        stage = kind.stage.model_copy(update={"bodies": bodies})
+        return harmonics(kind, assembled(stage, {gear.name: reduced_gear(gear) for gear in stage.gears}))
+
+    return found
+
+
+def with_twice_the_rolls(kind: Kind) -> np.ndarray:
+    return harmonics(kind, assemble(kind.stage, listed(kind.stage, bodies_of(kind.file)), 2 * ROLLS))
+
+
+MESH = MeshSpec(
+    flank=8, thickness=2, root=4, rim=4, width=4
+)  # with four along a flank a tenth of the eighth is missing
+FINER_MESH = MESH.model_copy(update={"scale": 1.5})
+ALL = ("pair", "internal", "helical", "train")
+PARTS = ("helical", "train")  # lines of contact in parts (docs/theory.md, 2.6): margins 1.1 to 4
+REFINED: list[tuple[str, tuple[str, ...], Of, Of, float]] = [  # what is refined, kinds, coarse, fine, least
+    ("slices from 5", ALL[:2], own(slices=5.0), own(slices=10.0), LENGTH),
+    ("slices from 7", PARTS, own(slices=7.0), own(slices=14.0), 7e-9),
+    ("slices from 7 at part load", PARTS, own(load=0.3, slices=7.0), own(load=0.3, slices=14.0), 7e-9),
+    ("slices from 10", PARTS, own(slices=10.0), own(slices=20.0), 4e-9),
+    ("positions", ALL, own(), own(positions=128), LENGTH),
+    ("modes", ("internal",), own(), with_bodies(modes=200), LENGTH),
+    ("roll points", ("internal",), own(), with_bodies(roll_points=16), LENGTH),
+    ("width functions", ("internal",), own(), with_bodies(width_functions=5), LENGTH),
+    ("mesh", ("internal",), with_bodies(mesh=MESH), with_bodies(mesh=FINER_MESH), LENGTH),
+    ("rolls", ("pair", "helical"), own(), with_twice_the_rolls, LENGTH),
+]
+QUICK_ONES = {("slices from 5", "pair"), ("positions", "pair"), ("positions", "internal"), ("modes", "internal")}
+QUICK_ONES |= {("rolls", "pair")}
 
 
 @pytest.mark.parametrize(
-    ("name", "slices", "least"),
+    ("name", "coarse", "fine", "least"),
     [
-        ("pair", 5, LENGTH),
-        pytest.param("internal", 5, LENGTH, marks=pytest.mark.full),
-        *(
-            pytest.param(name, slices, least, marks=pytest.mark.full)
-            for name, slices, least in (
-                ("helical", 7, 7e-9),
-                ("helical", 10, 4e-9),
-                ("train", 7, 7e-9),
-                ("train", 10, 4e-9),
-            )
-        ),
+        pytest.param(name, *rest, id=f"{what}, {name}", marks=[FULL] * ((what, name) not in QUICK_ONES))
+        for what, names, *rest in REFINED
+        for name in names
     ],
 )
-def test_twice_the_slices(name: str, slices: int, least: float) -> None:
-    """Helical teeth: parts of the lines of contact (docs/theory.md, 2.6), margins 1.1 to 4; seven under part load too,
-    which closes parts of them."""
-    kind = KINDS[name]
-    for load in (1.0, 0.3) if slices == 7 else (1.0,):
-        own, twice = (harmonics(kind.model(), load * kind.torque, slices=float(n)) for n in (slices, 2 * slices))
-        assert moved(own, twice, least) == [], load
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("slices", [5, 7])
-def test_no_line_of_the_transmission_error_at_the_parts(slices: int) -> None:
-    """Of parts that entered one after the other there would be orders k·slices/overlap: none is above its neighbours by
-    more than half."""
-    kind, overlap = KINDS["helical"], 1.016
-    found = loaded_te(kind.model(), [kind.torque], 400, slices=float(slices)).harmonics(80)[0]
-    for order in np.round(np.arange(1, 80 * overlap / slices) * slices / overlap).astype(int):
-        if 3 < order < 77:
-            near = np.r_[found[order - 4 : order - 1], found[order : order + 3]]  # found[k - 1]: order k
-            assert found[order - 1] < 1.5 * near.max(), order
+def test_harmonics_hardly_move(name: str, coarse: Of, fine: Of, least: float) -> None:
+    one, other = coarse(KINDS[name]), fine(KINDS[name])
+    change = 20 * np.log10(np.maximum(one, 1e-30) / np.maximum(other, 1e-30))
+    wrong = (np.abs(change) > LEVEL) & (np.abs(one - other) > least)
+    assert not wrong.any(), [f"{k + 1}: {one[k]:.3g} → {other[k]:.3g}" for k in np.flatnonzero(wrong)]
 
 
 def orders_of_a_run(speed: float, slices: int, teeth: int = 23) -> Mapping[str, np.ndarray]:
@@ -96,7 +112,7 @@ def orders_of_a_run(speed: float, slices: int, teeth: int = 23) -> Mapping[str, 
     }
 
 
-@pytest.mark.parametrize("speed", [209.0, pytest.param(400.0, marks=pytest.mark.full)])
+@pytest.mark.parametrize("speed", [209.0, pytest.param(400.0, marks=FULL)])
 def test_orders_of_a_run_hardly_depend_on_the_slices(speed: float) -> None:
     """Of all forces with 5, 7 and 10: those that reach SHARE of the mean mesh force agree within 3 dB, margin 1.3."""
     runs = [orders_of_a_run(speed, slices) for slices in (5, 7, 10)]
@@ -105,58 +121,6 @@ def test_orders_of_a_run_hardly_depend_on_the_slices(speed: float) -> None:
         found = np.array([run[name][1:] for run in runs])
         low, high = found.min(axis=0), found.max(axis=0)
         assert (20 * np.log10(high / low)[high > least] < 3.0).all(), (name, found)
-
-
-@pytest.mark.parametrize(
-    "name", ["pair", "internal", *(pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train"))]
-)
-def test_twice_the_positions(name: str) -> None:
-    """What a harmonic above half the number of positions folds down."""
-    kind = KINDS[name]
-    few, many = (harmonics(kind.model(), kind.torque, positions) for positions in (POSITIONS, 2 * POSITIONS))
-    assert moved(few, many, LENGTH) == []
-
-
-@cache
-def _refined(**finer: Any) -> StageModel:
-    """The internal pair with finer bodies."""
-    stage = KINDS["internal"].stage
-    body = COARSE.model_copy(update=finer)
-    bodies = {name: own.model_copy(update={"body": body}) for name, own in stage.bodies.items()}
-    finer_stage = stage.model_copy(update={"bodies": bodies})
-    made = {gear.name: reduced_gear(gear) for gear in finer_stage.gears}
-    return assembled(finer_stage, made)
-
-
-FINER = {"modes": 200, "roll_points": 16, "width_functions": 5}
-
-
-@pytest.mark.parametrize(
-    "finer",
-    [pytest.param({name: n}, id=name, marks=[pytest.mark.full] * (name != "modes")) for name, n in FINER.items()],
-)
-def test_twice_the_numbers_of_a_body(finer: Mapping[str, int]) -> None:
-    kind = KINDS["internal"]
-    coarse = harmonics(kind.model(), kind.torque)
-    assert moved(coarse, harmonics(_refined(**finer), kind.torque), LENGTH) == []
-
-
-@pytest.mark.full
-def test_one_and_a_half_times_the_mesh() -> None:
-    """From eight elements along a flank on: with four, a tenth of the eighth harmonic is missing."""
-    kind, mesh = KINDS["internal"], MeshSpec(flank=8, thickness=2, root=4, rim=4, width=4)
-    coarse, fine = (_refined(mesh=mesh.model_copy(update={"scale": scale})) for scale in (1.0, 1.5))
-    assert moved(harmonics(coarse, kind.torque), harmonics(fine, kind.torque), LENGTH) == []
-
-
-@pytest.mark.parametrize("name", ["pair", pytest.param("helical", marks=pytest.mark.full)])
-def test_twice_the_rolls_of_the_grid(name: str) -> None:
-    from gearfmu.stage import assemble
-    from gearfmu.stage.assembly.teeth import ROLLS
-
-    kind, known = KINDS[name], bodies_of(KINDS[name].file)
-    finer = assemble(kind.stage, [known[body] for body in known], 2 * ROLLS)
-    assert moved(harmonics(kind.model(), kind.torque), harmonics(finer, kind.torque), LENGTH) == []
 
 
 def run(name: str, level: str, h: float = 0.0, step: float = 20e-6, duration: float = 3e-3) -> Trace:
@@ -188,7 +152,7 @@ def bands(rows: np.ndarray, every: float = 20e-6) -> np.ndarray:
     return np.sqrt(np.diff([power[:, frequency < edge].sum(axis=1) for edge in BANDS], axis=0).T) / rows.shape[1]
 
 
-@pytest.mark.parametrize("name", ["pair", pytest.param("train", marks=pytest.mark.full)])
+@pytest.mark.parametrize("name", ["pair", pytest.param("train", marks=FULL)])
 def test_half_the_step_and_half_the_communication_step(name: str) -> None:
     """Bands of the transmission error and of the bearings' forces, against the same run at half the default step and
     at half the communication step."""
@@ -208,7 +172,7 @@ def test_half_the_step_and_half_the_communication_step(name: str) -> None:
 MARGIN = 1.05  # at equal error the sign of what a level leaves out decides: some parts of it cancel
 
 
-@pytest.mark.parametrize("name", ["pair", *(pytest.param(name, marks=pytest.mark.full) for name in ("set", "helical"))])
+@pytest.mark.parametrize("name", ["pair", *(pytest.param(name, marks=FULL) for name in ("set", "helical"))])
 def test_level_full_is_not_worse_than_standard_at_their_default_steps(name: str) -> None:
     """Against level full at a tenth of the step: transmission error and mesh forces."""
     reference = run(name, "full", 0.625e-6)
@@ -218,7 +182,7 @@ def test_level_full_is_not_worse_than_standard_at_their_default_steps(name: str)
         assert full < MARGIN * standard, (ending, full / rms(exact), standard / rms(exact))
 
 
-@pytest.mark.full
+@FULL
 def test_level_full_is_not_worse_than_standard_under_a_brake() -> None:
     """A set under a brake whose torque follows sampled speeds. Sees: oscillators that the step does not follow, dynamic
     at level full, ring with such a brake (.99 % of the transmission error where standard has .46)."""
@@ -234,8 +198,7 @@ def test_level_full_is_not_worse_than_standard_under_a_brake() -> None:
 
 
 # ---- lines of contact in any number of parts -------------------------------------------------------------------------
-QUICK = (("helical", "rigid gears"),)  # the others take eight seconds and more
-YIELDS = {
+YIELDS = {  # of the helical pair those that are rigid are quick, the others take eight seconds and more
     "all": {},
     "rigid gears": {"effect.elastic": 0.0},
     "straight contacts": {"effect.hertz": 0.0},
@@ -244,17 +207,12 @@ YIELDS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "yields"),
-    [
-        pytest.param(name, yields, marks=() if (name, yields) in QUICK else pytest.mark.full)
-        for name in ("helical", "train", "helical_set")
-        for yields in YIELDS
-    ],
+    "yields", ["rigid gears", *(pytest.param(y, marks=FULL) for y in YIELDS if y != "rigid gears")]
 )
-def test_any_number_of_parts_finds_equilibrium(name: str, yields: str) -> None:
+@pytest.mark.parametrize("kind", some(["helical"], ["train", "helical_set"]))
+def test_any_number_of_parts_finds_equilibrium(kind: Kind, yields: str) -> None:
     """5, 12 and 20 parts, more than any body has width functions: the mean transmission error is that of 12 within
     1 %. Sees: a search that does not end where parts of a line outnumber the width functions of its teeth."""
-    kind = KINDS[name]
     found = [loaded_te(kind.model(), [kind.torque], 3, slices=float(n), **YIELDS[yields]) for n in (5, 12, 20)]
     means = np.array([result.te.mean() for result in found])
     assert np.isfinite(means).all()

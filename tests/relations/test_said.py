@@ -3,43 +3,36 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, bodies_of, drawn, listed
+from kinds import KINDS, Kind, every
 from said import Said
 
 from gearfmu import report
 from gearfmu.stage.run.trace import Trace
 
-SLOW = [pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train", "helical_set")]
-ALL = ["pair", "internal", "set", *SLOW]
-DRAWN = [pytest.param(seed, marks=pytest.mark.full) for seed in range(20)]
+ALL = every(full=("helical", "train", "helical_set"))
 OF_STATICS = ("mesh_cycle", "contact")  # quasi-static, or of finite elements: not of the trace
 OF_OTHERS = ("orders", "spectrogram")  # below, by demodulation
 LENGTH = {"pair": 30e-3, "set": 2e-3, "helical_set": 2e-3}  # s; orders take 8 mesh periods
 
 
 @cache
-def trace_of(name: str, scale: float = 1.0) -> Trace:
-    kind = KINDS[name] if name in KINDS else drawn(int(name))
-    return run(kind, LENGTH.get(kind.name, 4e-3), scale)
-
-
-def run(kind: Kind, length: float, scale: float) -> Trace:
-    longer = type(kind)(**{**vars(kind), "duration": length})
-    trace = longer.run(kind.model(), scale=scale)
+def trace_of(kind: Kind, scale: float) -> Trace:
+    length = LENGTH.get(kind.name, 4e-3)
+    trace = replace(kind, duration=length).run(kind.model(), scale=scale)
     trace.meta.update(settle=0.25 * length, stage=kind.name)
     return trace
 
 
-def said(name: str, folder: Path, scale: float = 1.0, with_bodies: bool = False) -> Said:
-    kind, trace = KINDS[name] if name in KINDS else drawn(int(name)), trace_of(name, scale)
-    bodies = listed(kind.stage, bodies_of(kind.file)) if with_bodies else None
+def said(kind: Kind, folder: Path, scale: float = 1.0) -> Said:
+    trace = trace_of(kind, scale)
     trace.save(folder / "trace.h5")
-    report.write(trace, dict(trace.meta), folder, kind.stage, bodies)
+    report.write(trace, dict(trace.meta), folder, kind.stage)
     return Said(folder)
 
 
@@ -49,19 +42,14 @@ def alike(shown: str, value: float) -> bool:
     return float(shown) == pytest.approx(value, rel=0.6 * 10.0 ** (1 - digits), abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_summary(name: str, tmp_path: Path) -> None:
-    found = said(name, tmp_path)
+@pytest.mark.parametrize("kind", ALL)
+def test_summary(kind: Kind, tmp_path: Path) -> None:
+    found = said(kind, tmp_path)
     assert found.results.keys() >= {"energy_residual_of_port_work"}
     for key, value in found.results.items():
         assert value == pytest.approx(found.result(key), rel=1e-9, abs=1e-12), key
     require_tables(found)
     require_files(found)
-
-
-@pytest.mark.parametrize("seed", DRAWN)
-def test_summary_of_drawn_stages(seed: int, tmp_path: Path) -> None:
-    test_summary(str(seed), tmp_path)
 
 
 def require_tables(found: Said) -> None:
@@ -170,7 +158,7 @@ def require_files(found: Said) -> None:
 def test_orders_and_spectrogram_of_a_pair(tmp_path: Path) -> None:
     """Orders by demodulation over 8 mesh periods around each point (to 1 % of the largest: Hann weights without least
     squares); the loudest line of the spectrogram by one transform."""
-    found = said("pair", tmp_path)
+    found = said(KINDS["pair"], tmp_path)
     angle = np.append(0.0, np.cumsum(0.5 * (found.trace["pinion.gear.w"][1:] + found.trace["pinion.gear.w"][:-1])))
     angle *= 16 * (found.time[1] - found.time[0])
     table = found.table("orders")
@@ -203,7 +191,7 @@ def test_orders_and_spectrogram_of_a_pair(tmp_path: Path) -> None:
 def test_flanks_are_named_by_the_load(name: str, scale: float, tmp_path: Path) -> None:
     """A positive torque on the input is carried by drive flanks in every mesh, a negative one by coast flanks. Fault:
     flanks by the kernel's index, so that meshes of a driven train or set ran "on coast flanks"."""
-    found = said(name, tmp_path, scale)
+    found = said(KINDS[name], tmp_path, scale)
     coast = [value for key, value in found.results.items() if key.endswith("coast_contact_percent")]
     assert len(coast) == len(found.meshes) and coast == [0.0 if scale > 0 else 100.0] * len(coast)
     assert ("Coast flanks carry in" in found.text) == (scale < 0)

@@ -21,7 +21,7 @@ from typing import Any, get_args
 
 import pint
 import pytest
-from kinds import KINDS, Drawn, Kind, assembled, channels, differences, drawn
+from kinds import KINDS, Drawn, Kind, assembled, channels, differences, drawn, every, some
 
 from gearfmu.body import reduce_body
 from gearfmu.stage import StageModel, Steady, simulate
@@ -178,46 +178,42 @@ def test_numbers_are_scaled_by_the_dimension_of_their_unit() -> None:
 
 
 # ---- bodies, statics, motion -----------------------------------------------------------------------------------------
-DEAR = [pytest.param(name, marks=pytest.mark.full) for name in ("set", "helical_set")]
-NAMES = ["pair", "helical", "internal", "train", *DEAR]
-LIGHT = [pytest.param(name, marks=pytest.mark.full) if name == "train" else name for name in NAMES]
-BODIES = [pytest.param(name, marks=pytest.mark.full) if name in ("internal", "train") else name for name in NAMES]
+DEAR = ("set", "helical_set")
 
 
-@pytest.mark.parametrize("name", BODIES)
-def test_frequencies_fall_with_the_size(name: str) -> None:
-    small, large = bodies_at(name, 1.0), bodies_at(name, C)
+@pytest.mark.parametrize("kind", some(["pair", "helical"], ["internal", "train", *DEAR]))
+def test_frequencies_fall_with_the_size(kind: Kind) -> None:
+    small, large = bodies_at(kind.name, 1.0), bodies_at(kind.name, C)
     for part, body in small.items():
         if body.exact is None:
             assert C * large[part].frequency == pytest.approx(body.frequency, rel=1e-7), part
 
 
-@pytest.mark.parametrize("name", LIGHT)
-def test_transmission_error_grows_with_the_size(name: str) -> None:
+@pytest.mark.parametrize("kind", some(["pair", "helical", "internal"], ["train", *DEAR]))
+def test_transmission_error_grows_with_the_size(kind: Kind) -> None:
     """Stiffness per face width stays, to the roughness of light contacts."""
-    kind = KINDS[name]
     small, large = (loaded_te(model_at(kind, c), [load_at(kind, c).torque], 3) for c in (1.0, C))
     assert large.te / C == pytest.approx(small.te, rel=1e-6)
     assert large.stage_stiffness / C == pytest.approx(small.stage_stiffness, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_scaled_stage_moves_alike(name: str) -> None:
+@pytest.mark.parametrize("kind", every(full=DEAR, seeds=()))
+def test_a_scaled_stage_moves_alike(kind: Kind) -> None:
     """With straight contacts, which know no roughness. Within 1e-6, of the train within 1.1e-4: rows of one mode of its
     first pinion are exact to 7e-4; of the set within 3.3e-4: with such coarse bodies its step needs γ = .455, a bound
     that rounding moves by 1 %. Red where a damper of one direction acts on the force of another (seats 7e-3)."""
-    holds(KINDS[name], {"effect.hertz": (0.0, "")}, 5e-4)
+    holds(kind, {"effect.hertz": (0.0, "")}, 5e-4)
 
 
-@pytest.mark.parametrize("name", ["pair", "helical", "internal", *DEAR])
-def test_curved_contacts_scale_but_for_the_roughness_of_light_ones(name: str) -> None:
+@pytest.mark.parametrize("kind", some(["pair", "helical", "internal"], DEAR))
+def test_curved_contacts_scale_but_for_the_roughness_of_light_ones(kind: Kind) -> None:
     """Slices of a set that hardly carry differ by 5e-4 of the largest, axial forces on a spur ring by 3e-3."""
-    holds(KINDS[name], {}, 5e-3)
+    holds(kind, {}, 5e-3)
 
 
-@pytest.mark.parametrize("name", ["pair", "helical", "internal"])
-def test_friction_of_a_constant_coefficient_scales(name: str) -> None:
-    holds(KINDS[name], {"effect.friction": (1.0, "")}, 3e-4)
+@pytest.mark.parametrize("kind", some(["pair", "helical", "internal"]))
+def test_friction_of_a_constant_coefficient_scales(kind: Kind) -> None:
+    holds(kind, {"effect.friction": (1.0, "")}, 3e-4)
 
 
 @pytest.mark.full

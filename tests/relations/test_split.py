@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from kinds import KINDS, Kind, drawn
+from kinds import KINDS, Kind, every
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.instance import Recording
@@ -19,16 +19,10 @@ from gearfmu.stage import StageModel
 H, INNER = 24e-6, 4e-6  # s: communication step, internal step
 BEFORE, AFTER = 12, 8  # communication steps; the load halves two steps before the cut
 WINDOWED = ("_mean", "_max", "_next", "_power", ".a")  # of a communication or internal step, not of a time
-QUICK = ("pair", "internal", "helical", "set")
+ALL = every(full=("train", "helical_set"))
 KEPT, UNDISTURBED, ELSEWHERE = 1e-5, 2e-6, 3e-3  # of the family of an output
 BY_ROWS = 2e-3  # the first communication step has seven internal steps for six; measured: 7e-4
 AFRESH = 5e-5  # engagements that solve side by side begin each communication step afresh; measured: 2.1e-5
-
-
-def kinds(quick: tuple[str, ...] = QUICK) -> list[object]:
-    full = (pytest.mark.full,)
-    every = [pytest.param(kind, id=name, marks=() if name in quick else full) for name, kind in KINDS.items()]
-    return every + [pytest.param(drawn(seed), id=f"drawn-{seed}", marks=full) for seed in range(20)]
 
 
 def given(
@@ -84,7 +78,7 @@ def step_on(kernel: Kernel, inputs: dict[str, np.ndarray], first: int) -> np.nda
     return np.array(rows)
 
 
-@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("kind", ALL)
 def test_two_runs_joined_by_a_state_are_one(kind: Kind) -> None:
     """The second runs in a kernel of its own that was prepared and never started: all outputs and the state have the
     same bits."""
@@ -98,7 +92,7 @@ def test_two_runs_joined_by_a_state_are_one(kind: Kind) -> None:
     assert np.array_equal(*rows) and one.save() == other.save() and np.ptp(rows[0], axis=0).max() > 0
 
 
-@pytest.mark.parametrize("kind", kinds(("pair", "internal", "set")))
+@pytest.mark.parametrize("kind", every(full=("helical", "train", "helical_set")))
 def test_shorter_communication_steps_are_the_same_run(kind: Kind) -> None:
     """Of H, H/2 and H/3 whose internal steps are the same; inputs move on by the same rule within a step and differ by
     rounding, which single precision of the modes may enlarge: 6e-7 of a force was seen. The load stays."""
@@ -143,7 +137,7 @@ def adopted(kind: Kind, new: dict[str, float], cuts: Sequence[int]) -> dict[str,
     return kept
 
 
-@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("kind", ALL)
 def test_a_run_that_goes_on_with_its_own_setup_is_not_disturbed(kind: Kind) -> None:
     """6e-7 is left in sets. Rigid rotations that were taken over without their force: 2e-5 in the pair, 1e-4 in the
     set; energy that contacts owe and a run forgets: .4 %, 1.5 % with pitch errors."""
@@ -154,7 +148,7 @@ SETUPS = {"standard": {"level": 2.0}, "half": {"h": INNER / 2}, "gyroscopic": {"
 
 
 @pytest.mark.parametrize("new", list(SETUPS.values()), ids=list(SETUPS))
-@pytest.mark.parametrize("kind", kinds(("pair", "internal")))
+@pytest.mark.parametrize("kind", every(full=KINDS.keys() - {"pair", "internal"}))
 def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(kind: Kind, new: dict[str, float]) -> None:
     """One communication step later motion and forces are those of the run that stays, but for what the setups differ by
     over it."""
@@ -163,7 +157,7 @@ def test_a_run_that_goes_on_with_another_setup_goes_on_where_it_was(kind: Kind, 
     assert max(adopted(kind, new, range(40, 56, 4)).values()) < ELSEWHERE
 
 
-@pytest.mark.parametrize("kind", kinds())
+@pytest.mark.parametrize("kind", ALL)
 def test_steps_by_rows_are_those_by_tables(kind: Kind) -> None:
     """Matrices of contacts come from tables where internal steps are as long as the first ones, else from the rows of
     the oscillators. A first communication step 1 ns longer has seven internal steps, and all others go by rows."""

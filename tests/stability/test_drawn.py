@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 
 from evidence.stability.checks import common
 from evidence.stability.record import Inputs, Record, Stopped, Watched, run_times
-from gearfmu.body import Body, load_bodies
+from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError, SimulationError, SpecError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, Steady, assemble
@@ -132,11 +131,6 @@ def draw(seed: int) -> Draw:
     return Draw(stage, changes, *load, parameters, dice.one("rigid", "fast"), tuple(steps))
 
 
-@lru_cache(maxsize=2)
-def bodies(stage: str) -> list[Body]:
-    return load_bodies(load_stage(stage))
-
-
 def driven(model: StageModel, drawn: Draw) -> tuple[Inputs, dict[str, float]]:
     """Inputs under the drawn load, and the speed at which a shaft without a spring starts."""
     if drawn.stage not in SETS:
@@ -173,7 +167,7 @@ def complaints(drawn: Draw) -> list[str]:
     """What is wrong with the run of a draw; nothing where it is refused by a clear message."""
     try:
         spec = load_stage(drawn.stage, drawn.changes)
-        model = assemble(spec, bodies(drawn.stage))
+        model = assemble(spec, load_bodies(load_stage(drawn.stage)))
         inputs, start = driven(model, drawn)
         kernel = Kernel(model.blob, drawn.parameters | start)
         kernel.set("level", kernel.variables["level"].items.index(drawn.level))

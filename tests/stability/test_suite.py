@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evidence.stability import checks, record, suite
+from evidence.stability import record, suite
 from evidence.stability.__main__ import main as program
 from evidence.stability.bench import internal_step
-from evidence.stability.case import CASES, Case, Finding
+from evidence.stability.case import Case, Finding
 from evidence.stability.motion import Constant, Step, Swinging, Turn, UpAndDown
 from evidence.stability.pair import Pair, overlap
-from evidence.stability.scenes import PAIR, SCENES, Scene, what
-from evidence.stability.suite import Row, Task, tasks
+from evidence.stability.scenes import PAIR, SCENES, Scene
+from evidence.stability.suite import Row, Task
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.stage import loaded_te
 
@@ -33,13 +33,6 @@ def test_what_counts_as_a_failure() -> None:
     assert not row(GOOD).failed and row(stopped).failed and row(drifted).failed
     assert not row(stopped, "half").failed and not row(stopped, "given", 5e-6).failed
     assert row(drifted, "half").failed and row(drifted, "given", 5e-6).failed
-
-
-def test_scenes_are_listed_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
-    assert program(["--list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(": ")[0] for line in lines] == list(SCENES)
-    assert all(len(what(name)) > 20 for name in SCENES)
 
 
 def test_a_table_is_written_and_read_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -63,13 +56,6 @@ def test_failures_are_counted_and_named(monkeypatch: pytest.MonkeyPatch, capsys:
     assert "the mesh sings" in capsys.readouterr().err
     monkeypatch.setattr(suite, "run_suite", lambda *_: [row(bad)] * 120)
     assert program([]) == 99
-
-
-def test_tasks_are_every_scene_in_five_cases() -> None:
-    wanted = tasks()
-    assert len(wanted) == 5 * len(SCENES) == len(set(wanted)) and CASES[-1] == Case("full")
-    with pytest.raises(GearfmuError, match="jamed"):
-        tasks(["jamed"])
 
 
 def test_what_the_kernel_refuses_is_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,15 +123,6 @@ def test_a_run_that_stops_is_named_with_its_last_good_time(monkeypatch: pytest.M
     outcome, _, time = found.outcome.partition("@")
     assert outcome in {"diverged", "penetration", "energy"} and 0.003 <= float(time) < 0.02
     assert found.realtime_factor > 0 and found.penetration > 0 and row(found).failed
-
-
-def test_levels_of_a_sine() -> None:
-    """10 N rms at 500 Hz are 20 dB in their band and nothing in the other."""
-    time = np.arange(4001) * 1e-4
-    values = {"mesh.force_mean": 100 + 10 * np.sqrt(2) * np.sin(2 * np.pi * 500 * time)}
-    made = record.Record(time, values, time, "completed", 1.0)
-    found = checks.levels(made)
-    assert found["level_200_1000_Hz_dB"] == pytest.approx(20.0, abs=0.05) and found["level_1000_4000_Hz_dB"] < -20
 
 
 @pytest.mark.parametrize(

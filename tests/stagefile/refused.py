@@ -1,23 +1,19 @@
-"""What `load_stage` says of a file whose text was changed."""
+"""What `load_stage` says of a stage whose fields were changed."""
 
 from __future__ import annotations
 
 from pathlib import Path
-
-import pytest
+from typing import Any
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.stagefile.stage import load_stage
 
 
-def refused(folder: Path, text: str, *changes: tuple[str, str]) -> tuple[Problem, ...]:
-    """All problems of `text` after the changes (before, after), each made once; written to stage.toml in `folder`."""
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    path = folder / "stage.toml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(SpecError) as error:
-        load_stage(path)
-    assert all(problem.file == str(path) for problem in error.value.problems)
-    return tuple(error.value.problems)
+def problems(changes: dict[str, Any], stage: Path | str = "fzg_c") -> dict[str, Problem]:
+    """All that is wrong after these changes, by field; none where the stage loads."""
+    try:
+        load_stage(stage, changes)
+    except SpecError as error:
+        assert str(error) == "\n".join(map(str, error.problems))
+        return {problem.field: problem for problem in error.problems}
+    return {}

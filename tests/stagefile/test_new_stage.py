@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -83,45 +84,36 @@ def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def judge(schema: dict[str, Any]) -> Draft202012Validator:
-    """What an editor makes of a schema."""
-    Draft202012Validator.check_schema(schema)
-    return Draft202012Validator(json.loads(json.dumps(schema)))
+RAW = {name: read_toml(find_stage(name)) for name in ("fzg_c", "two_stage", "planetary54")}
+BODIES, SUPPORT = RAW["two_stage"]["bodies"], RAW["two_stage"]["supports"][0]
+SLIPS: dict[str, list[dict[str, Any]]] = {  # of `supports` are the stiffnesses: they are no fields of a body
+    "fzg_c": [{"torque_max": 600}, {"torque_max": "600"}, {"torqe": "1 N*m"}, {"levels": {"fast_cut": 5}}],
+    "two_stage": [
+        {"bodies": BODIES | {"pinion1": BODIES["pinion1"] | slip}}
+        for slip in (
+            {"kind": "shaft"}, {"helix_angle": 20}, {"bearing": {"stiffness": "3e8 N/m"}}, {"name": "pinion1"},
+            {"lenght": "1 m"},
+        )
+    ] + [
+        {"bodies": BODIES | {"Pinion": BODIES["pinion1"]}}, {"engagements": []}, {"slices": 21},
+        {"supports": [SUPPORT | {"radial": "stiff"}]}, {"rotors": {"input": {"axis": ["0 mm"]}}},
+    ],
+    "planetary54": [{"ring": RAW["planetary54"]["ring"] | {"name": "ring"}}],
+}  # fmt: skip
 
 
-def test_schema_accepts_the_shipped_files_and_refuses_slips() -> None:
-    schema, raw = judge(stage_schema()), read_toml(find_stage("fzg_c"))
-    assert schema.is_valid(raw)
-    assert schema.is_valid(read_toml(find_stage("fzg_c/stage_relief")) | {"gears": raw["gears"]}), (
-        "the rest is its base's"
-    )
-    slips = ({"torque_max": 600}, {"torque_max": "600"}, {"torqe": "1 N*m"}, {"levels": {"fast_cut": 5}})
-    assert not [slip for slip in slips if schema.is_valid(raw | slip)]
-    assert not schema.is_valid({key: value for key, value in raw.items() if key != "pair"})
-
-
-def test_schema_of_a_general_stage_accepts_the_train_and_refuses_slips() -> None:
-    """Bodies are told apart by their kind; what stands in `supports` is no field of a body."""
-    tables, raw = general_schema(), read_toml(find_stage("two_stage"))
-    schema = judge(tables)
-    assert schema.is_valid(raw) and "source" not in tables["properties"]
-    gear = raw["bodies"]["pinion1"]
-    wrong = ({"kind": "shaft"}, {"helix_angle": 20}, {"bearing": {"stiffness": "3e8 N/m"}}, {"name": "pinion1"})
-    slips = [{"bodies": raw["bodies"] | {"pinion1": gear | slip}} for slip in (*wrong, {"lenght": "1 m"})]
-    slips += [{"bodies": raw["bodies"] | {"Pinion": gear}}, {"engagements": []}, {"slices": 21}]
-    slips += [{"supports": [raw["supports"][0] | {"radial": "stiff"}]}, {"rotors": {"input": {"axis": ["0 mm"]}}}]
-    assert not [slip for slip in slips if schema.is_valid(raw | slip)]
-
-
-def test_schema_of_a_set_accepts_the_shipped_one() -> None:
-    schema, raw = judge(set_schema()), read_toml(find_stage("planetary54"))
-    assert schema.is_valid(raw) and not schema.is_valid(raw | {"ring": raw["ring"] | {"name": "ring"}})
-    assert set_schema()["$defs"]["RingSpec"]["properties"]["rim_diameter"]["unit"] == "m"
+@pytest.mark.parametrize(("name", "schema"), [*zip(RAW, (stage_schema, general_schema, set_schema), strict=True)])
+def test_a_schema_accepts_the_shipped_file_and_refuses_slips(name: str, schema: Callable[[], dict[str, Any]]) -> None:
+    Draft202012Validator.check_schema(schema())
+    judge, raw = Draft202012Validator(json.loads(json.dumps(schema()))), RAW[name]
+    assert judge.is_valid(raw) and "source" not in schema()["properties"]
+    assert not [slip for slip in SLIPS[name] if judge.is_valid(raw | slip)]
+    assert not judge.is_valid({key: value for key, value in raw.items() if key not in ("pair", "bodies", "ring")})
 
 
 def test_schema_shows_units_meanings_and_defaults_as_in_a_file() -> None:
     schema = stage_schema()
-    assert "source" not in schema["properties"]
+    assert set_schema()["$defs"]["RingSpec"]["properties"]["rim_diameter"]["unit"] == "m"
     gear = schema["$defs"]["GearSpec"]
     assert gear["properties"]["tip_edge_radius"]["default"] == "0.0002 m"
     assert gear["properties"]["face_width"]["unit"] == "m"

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refused import problems
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import SpecError
 from gearfmu.stagefile.checks.gears import at_most
 from gearfmu.stagefile.forms.pair import StageSpec
 from gearfmu.stagefile.forms.shapes import largest_half_width
@@ -21,16 +22,6 @@ from gearfmu.stagefile.reading.base import read_toml
 from gearfmu.stagefile.reading.files import find_stage, model_folder, shipped_stages
 from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.connections import Bearing
-
-
-def problems(changes: dict[str, Any], stage: Path | str = "fzg_c") -> dict[str, Problem]:
-    """What is wrong with the stage after these changes of fields, by field; none where it loads."""
-    try:
-        load_stage(stage, changes)
-    except SpecError as error:
-        assert str(error) == "\n".join(map(str, error.problems))
-        return {problem.field: problem for problem in error.problems}
-    return {}
 
 
 def test_relief_stage_differs_only_in_its_relief() -> None:
@@ -186,14 +177,6 @@ def test_whatever_stands_in_the_file_it_loads_or_lists_problems(changes: dict[st
     """Fields before the tables that hold them."""
     found = problems(dict(sorted(changes.items(), key=lambda item: -item[0].count("."))))
     assert all(problem.file and problem.remedy for problem in found.values())
-
-
-def test_text_of_a_stage_reads_back_as_the_same_stage(tmp_path: Path) -> None:
-    path = tmp_path / "stage.toml"
-    path.write_text(stage_text(read_toml(find_stage("fzg_c")), ""), encoding="utf-8")
-    assert load_stage(path).model_copy(update={"source": Path("x")}) == load_stage("fzg_c").model_copy(
-        update={"source": Path("x")}
-    )
 
 
 def test_index_deviations_by_tooth() -> None:

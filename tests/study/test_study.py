@@ -9,8 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from evidence.study.sets import at_speed, with_planets
 from gearfmu.kernel import Kernel
 from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.stagefile.stage import load_stage
 from gearfmu.study import bench
 from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
@@ -119,3 +121,35 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
     assert all(20e-6 / p.h == pytest.approx(round(20e-6 / p.h)) for p in found if p.h)
     assert min(p.h for p in found if p.h) == pytest.approx(min(STEPS))
     assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
+
+
+# ---- sets ------------------------------------------------------------------------------------------------------------
+@pytest.mark.full
+def test_a_set_is_studied_like_a_pair(tmp_path: Path) -> None:
+    """`gearfmu study` of a set: levels at their default steps, kept; forces of all meshes are read back with it."""
+    scene = load_scene("planetary_paper").model_copy(update={"duration": 1e-3, "settle": 0.4e-3})
+    rows = study(Job(scene, tmp_path, defaults=True)).rows
+    by_level = {row.level: row for row in rows}
+    assert sorted(by_level) == ["fast", "full", "rigid", "standard"]
+    assert by_level["rigid"].force_error > by_level["fast"].force_error > 0
+    for row, again in zip(rows, study(Job(scene, tmp_path, defaults=True)).rows, strict=True):
+        assert (again.level, again.n_dyn, again.slices) == (row.level, row.n_dyn, row.slices)
+        numbers = [(r.h_s, r.te_error, r.force_error, r.realtime_factor) for r in (again, row)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-5), "kept in six digits, prices too"
+
+
+def test_another_speed_keeps_the_loads_in_balance() -> None:
+    """What brakes in proportion to its speed has the same torque at the start."""
+    scene = at_speed(load_scene("planetary_paper"), 300.0)
+    assert scene.start.pinion_speed == 300.0 and scene.shaft_loads is not None
+    brake = scene.shaft_loads["sun"].proportional
+    assert brake is not None and brake.slope * 4 * 300.0 == pytest.approx(-150.0)
+    assert scene.shaft_loads["carrier"].constant == 600.0
+
+
+@pytest.mark.parametrize(("planets", "places"), [(3, None), (5, (0, 14, 29, 43, 58))])
+def test_planets_stand_as_evenly_as_teeth_allow(planets: int, places: tuple[int, ...] | None) -> None:
+    spec = load_stage("planetary54")
+    changed = with_planets(spec, planets)
+    assert (changed.written.set.planets, changed.written.set.positions) == (planets, places)
+    assert changed.written.carrier.mesh.scale < spec.written.carrier.mesh.scale

@@ -52,14 +52,7 @@ def test_a_stage_with_a_speed_is_run_and_without_one_is_static() -> None:
 
 
 def test_keys_belong_to_the_scene_or_to_the_stage_file() -> None:
-    keys = (
-        "torque",
-        "stage.level",
-        "stage.contact",
-        "stage.contact.damping",
-        "stage.effects.hertz",
-        "stage.torque_max",
-    )
+    keys = "torque stage.level stage.contact stage.contact.damping stage.effects.hertz stage.torque_max".split()
     stage, scene = split(RUN, dict.fromkeys(keys, 1))
     assert set(stage) == {"contact.damping", "torque_max"}
     assert set(scene) == {"torque", "stage.level", "stage.contact", "stage.effects.hertz"}

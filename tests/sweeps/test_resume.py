@@ -43,18 +43,13 @@ def good(torque: float) -> Outcome:
     return Outcome(OK, "", {"twice": 2 * torque})
 
 
-def swept(out: Path, becomes: Callable[[float], Any] = good, **options: Any) -> tuple[SweepTable, list[float]]:
+def swept(
+    out: Path, becomes: Callable[[float], Any] = good, over: dict[str, Any] | None = None, **options: Any
+) -> tuple[SweepTable, list[float]]:
     """The table, and the torques that were computed for it."""
     runner = Runner(becomes)
-    table = sweep(plan(STAGE, {"torque": TORQUES, "positions": 4}), out, runner, **options)
+    table = sweep(plan(STAGE, {"torque": TORQUES, "positions": 4} | (over or {})), out, runner, **options)
     return table, runner.asked
-
-
-def test_known_points_are_not_computed_again(tmp_path: Path) -> None:
-    first, asked = swept(tmp_path)
-    again, none = swept(tmp_path)
-    assert asked == TORQUES and none == []
-    assert again["twice"].tolist() == first["twice"].tolist() == [100.0, 200.0, 300.0]
 
 
 @pytest.mark.parametrize("bad", [Outcome("divergence", "teeth overlap"), Lost("the worker died")])
@@ -85,16 +80,8 @@ def test_points_of_another_program_are_computed_again(
         assert asked == TORQUES and table["twice"].tolist() == [-50.0, -100.0, -150.0]
     table, asked = swept(tmp_path)
     assert asked == [] and table["twice"].tolist() == [100.0, 200.0, 300.0]
-
-
-@pytest.mark.parametrize("other", [{"stage.gears.pinion.tip_relief.amount": "10 um"}, {"positions": 5}])
-def test_points_of_other_numbers_are_computed_again(tmp_path: Path, other: dict[str, Any]) -> None:
-    """A number of the stage, and one of the calculation."""
-    swept(tmp_path)
-    runner = Runner(good)
-    over: dict[str, Any] = {"torque": TORQUES, "positions": 4} | {key: [value] for key, value in other.items()}
-    sweep(plan(STAGE, over), tmp_path, runner)
-    assert runner.asked == TORQUES
+    for other in ({"stage.gears.pinion.tip_relief.amount": "10 um"}, {"positions": 5}):
+        assert swept(tmp_path, over=other)[1] == TORQUES, "points of other numbers are others"
 
 
 def test_points_without_the_trace_that_is_asked_for_are_computed_again(tmp_path: Path) -> None:
@@ -141,10 +128,3 @@ def test_the_last_line_of_a_point_counts_and_broken_lines_do_not(tmp_path: Path)
     journal.add("a", Outcome("failed", "first"))
     journal.add("a", Outcome(OK, "then"))
     assert Journal(path).get("a") == journal.get("a") == Outcome(OK, "then")
-
-
-def test_a_line_that_was_cut_off_does_not_swallow_the_next(tmp_path: Path) -> None:
-    path = tmp_path / JOURNAL
-    path.write_text('{"identity": "cut o', encoding="utf-8")
-    Journal(path).add("a", Outcome(OK))
-    assert Journal(path).get("a") == Outcome(OK)
