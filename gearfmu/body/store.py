@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import h5py
 import numpy as np
 
-from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Shapes, Skin, Tangent, whole_surface
+from gearfmu.body.body import PARTS, Body, How, Node, Shapes, whole_surface
 from gearfmu.body.former import FORMATS, former_values
 from gearfmu.body.layout import (
-    BODY,
     FORMAT,
     FORMAT_VERSION,
-    GROUPS,
+    POINTS,
+    SURFACE,
     TEXTS,
     entries_of,
     read_entry,
@@ -24,22 +25,11 @@ from gearfmu.body.layout import (
 )
 from gearfmu.errors import BodyError
 from gearfmu.files import Format, reading, writing
-from gearfmu.reduction.cyclic.frf import FrfError
-from gearfmu.reduction.cyclic.modal import Spin
+from gearfmu.reduction.stored import Entry, entries
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM, FORMATS)
-PARTS = {  # classes by their path in a body, inner ones first
-    "flank.tangent": Tangent,
-    "picture.shapes": Shapes,
-    "error": FrfError,
-    "flank": Flank,
-    "spin": Spin,
-    "picture": Picture,
-    "sensors": Sensors,
-    "skin": Skin,
-}
 
 
 def save_body(body: Body, path: str | os.PathLike[str]) -> None:
@@ -62,8 +52,7 @@ def load_body(path: str | os.PathLike[str]) -> Body:
     or version, or not sound."""
     with reading(path, FILE) as file:
         if int(file.attrs["format_version"]) == FORMAT_VERSION:
-            there = [*BODY, *(entry for group in GROUPS if group[0].path in file for entry in group)]
-            values = {entry.field: read_entry(file, entry) for entry in there}
+            values = {entry.field: read_entry(file, entry) for entry in _entries_in(file)}
             texts = {name: json.loads(file.attrs[name]) for name in TEXTS if name in file.attrs}
         else:
             values, texts = former_values(file)
@@ -71,6 +60,15 @@ def load_body(path: str | os.PathLike[str]) -> Body:
         version = int(file.attrs.get("algorithm_version", 1))  # the first carriers do not say it
         made = How(str(file.attrs["input_hash"]), **how, algorithm=version)
         return _body(str(file.attrs["name"]), made, values, texts)
+
+
+def _entries_in(file: h5py.File) -> Iterator[Entry]:
+    """The datasets of a file, and those that are missing in a part of which it has some."""
+    yield from (POINTS, *entries(Body))
+    for path, kind in PARTS.items():
+        own = [e for e in entries(kind, f"{path}.") if e.field not in SURFACE or "picture/shapes" not in file]
+        if any(entry.path in file for entry in own):
+            yield from (entry for entry in own if entry.path in file or not entry.optional)
 
 
 def _texts(body: Body) -> dict[str, Any]:

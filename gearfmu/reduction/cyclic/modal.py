@@ -23,6 +23,7 @@ from gearfmu.fem.low_fields import LowFields
 from gearfmu.fem.refined import refined_modes
 from gearfmu.fem.spinning import leave_axial, turn_quarter
 from gearfmu.reduction.cyclic.sector import SectorBody
+from gearfmu.reduction.stored import ROW_BITS, stored
 
 _SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
 _SAMPLED = 1e-4  # residual of their modes
@@ -36,21 +37,18 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Spin:
-    """Terms of the turning axes, n real modes.
+    """Terms of the turning axes, n real modes: Ω turns the pair of a mode by 2Ω coupling."""
 
-    coupling (n, n), skew: ∫ρ φ_k · (e_z × φ_l), so that Ω turns the pair of a mode by 2Ω coupling; tilt (2, n),
-    kg^½·m: ∫ρ z (φ_x, φ_y), the same coupling with rigid tilt about x and y; load (n,), kg^½·m: centrifugal load per
-    Ω²; stiffening (n,): B of ω² = ω₀² + B Ω², stresses less softening; growth (2, R, A), m·s²: outward normal
-    displacement of tooth 0 under centrifugal load per Ω²; inertia (), kg·m²·s²: what that adds to the polar moment of
-    inertia per Ω².
-    """
-
-    coupling: np.ndarray
-    tilt: np.ndarray
-    load: np.ndarray
-    stiffening: np.ndarray
-    growth: np.ndarray
-    inertia: float
+    coupling: np.ndarray = stored(
+        ("n", "n"), "", "integral of density times mode k . (e_z x mode l), skew", bits=ROW_BITS
+    )
+    tilt: np.ndarray = stored((2, "n"), "kg1/2.m", "the same with rigid tilt about x and y: of z u_x and z u_y")
+    load: np.ndarray = stored(("n",), "kg1/2.m", "centrifugal load per square of the speed")
+    stiffening: np.ndarray = stored(("n",), "", "B in ω² = ω₀² + B Ω²: stresses less softening")
+    growth: np.ndarray = stored(
+        (2, "R", "A"), "m.s2", "flank rows of tooth 0 under centrifugal load per square of the speed"
+    )
+    inertia: float = stored((), "kg.m2.s2", "what that adds to the polar inertia per square of the speed")
 
 
 @dataclass(frozen=True)
