@@ -11,7 +11,6 @@ import numpy as np
 from gearfmu.body.apart import Progress, Work
 from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Tangent
 from gearfmu.body.former import GEAR_METHOD
-from gearfmu.body.imported import read_gear
 from gearfmu.body.pictures import drawn_outline, pictured_loads, sector_picture, whole_picture
 from gearfmu.errors import MeshError
 from gearfmu.fem.factor import FactorError
@@ -25,7 +24,7 @@ from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.reduction.imported.gear import ImportedGear, hinge_problem
+from gearfmu.reduction.imported.gear import CheckedGear, checked_gear, hinge_problem, loaded_gear
 from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.stagefile.forms.general import ToothedBody
@@ -180,28 +179,29 @@ def symmetric_mass(inertia: np.ndarray) -> np.ndarray:
 
 def _meshed_elsewhere(gear: ToothedBody, report: Progress) -> Parts:
     """A gear from finite elements made elsewhere, by its sector or its mean tooth."""
-    found, source = read_gear(gear), gear.imported
-    assert source is not None
+    found = checked_gear(gear)
+    body = loaded_gear(found, gear)
     try:
-        if isinstance(found.body, SectorBody):
-            return _by_sector(gear, found.body, found.facts, report)
-        return _by_mean_tooth(gear, found.body, found, report)
+        if isinstance(body, SectorBody):
+            return _by_sector(gear, body, found.facts, report)
+        return _by_mean_tooth(gear, body, found, report)
     except (FactorError, ModesError) as error:
         raise MeshError(
-            f"{source.file}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six "
+            f"{found.mesh.source}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six "
             "rigid motions (a hinge, a loose part), or not of a free body"
         ) from error
 
 
-def _by_mean_tooth(gear: ToothedBody, whole: WholeGear, found: ImportedGear, report: Progress) -> Parts:
+def _by_mean_tooth(gear: ToothedBody, whole: WholeGear, found: CheckedGear, report: Progress) -> Parts:
     """A gear reduced as a whole, brought to the form of a cyclic one."""
     space, geometry = Elastic(whole.body), gear_shape(gear)
-    if problem := hinge_problem(space, float(space.modes(1)[0][0])):
+    if problem := hinge_problem(space):
         raise MeshError(f"{found.facts['file']}: {problem}")
     modes, left = mean_modes(whole, space, gear.body.modes, report)
     statics, deviation = mean_statics(whole, space, pictured_loads(whole.points), report)
     report("frequency response", 0.0)
     frf = mean_frf(whole, space, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
     facts = found.facts | {"teeth_deviation": deviation, "compliance_left_to_residual": left}
-    surface = drawn_outline(geometry, gear.face_width, found.nodes)
-    return Parts(modes, statics, frf, facts, whole_picture(surface, found.nodes, whole, statics), whole.inertia)
+    nodes = found.mesh.nodes
+    picture = whole_picture(drawn_outline(geometry, gear.face_width, nodes), nodes, whole, statics)
+    return Parts(modes, statics, frf, facts, picture, whole.inertia)

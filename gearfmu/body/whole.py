@@ -13,14 +13,19 @@ import scipy.sparse as sp
 
 from gearfmu.body.apart import Progress
 from gearfmu.body.body import Body, How, Node, Sensors, Skin
-from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.toothed import named
+from gearfmu.errors import MeshError
+from gearfmu.fem.factor import FactorError
+from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.femesh.quality import mesh_report
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order, carrier_need
 from gearfmu.reduction.cyclic.frf import FrfError
+from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.imported.carrier import imported_carrier
+from gearfmu.reduction.imported.gear import hinge_problem
 from gearfmu.reduction.imported.housing import ImportedHousing, imported_housing
 from gearfmu.reduction.imported.superelement import superelement
 from gearfmu.reduction.memory import lower_counts, require_memory
@@ -49,11 +54,22 @@ def reduced_carrier(carrier: CarrierBody, progress: Progress | None = None) -> B
         full = carrier_full_order(carrier)
         mesh = {**facts, "dof_body": full.size}
     else:
-        full, mesh = imported_carrier_order(carrier)
+        full, mesh = imported_carrier(carrier)
+        _check_solid(full, carrier.imported.file)
     tell(carrier.method, 0.5)
     how = How.of(carrier, carrier.method, mesh)
     body = whole_body(full, how, Size(carrier.modes), Judging.over(damping_ratio=carrier.modal_damping))
     return replace(body, how=how.since(started))
+
+
+def _check_solid(full: FullOrder, file: str) -> None:
+    """MeshError where finite elements made elsewhere are no solid."""
+    try:
+        problem = hinge_problem(elastic(full))
+    except (FactorError, ModesError) as error:
+        problem = f"the stiffness matrix cannot be factorised ({error}): it is not of one free solid body"
+    if problem:
+        raise MeshError(f"{file}: {problem}")
 
 
 @dataclass(frozen=True)

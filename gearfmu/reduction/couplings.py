@@ -95,6 +95,11 @@ def averaging(body: Elements, nodes: np.ndarray, point: np.ndarray) -> sp.csr_ar
     return sp.csr_array(moved(about_origin, point))
 
 
+def rows_of(body: Elements, coupling: Coupling) -> sp.csr_array:
+    """Rows (6, 3N) of an averaging coupling at its point."""
+    return averaging(body, coupling.nodes, coupling.point) if coupling.rows is None else coupling.rows
+
+
 def _check(couplings: Sequence[Coupling]) -> None:
     claimed: dict[int, str] = {}
     for coupling in couplings:
@@ -155,7 +160,7 @@ def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigi
         first = size - 6 * (len(rigid) - k)
         rows = sp.csr_array((np.ones(6), (np.arange(6), first + np.arange(6))), shape=(6, size))
     elif coupling.kind == "averaging":
-        rows = (averaging(body, coupling.nodes, coupling.point) if coupling.rows is None else coupling.rows) @ transform
+        rows = rows_of(body, coupling) @ transform
     else:
         assert coupling.kind == "nodes" and len(coupling.nodes) == 1
         components = COMPONENTS[:3]

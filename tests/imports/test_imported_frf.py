@@ -10,10 +10,9 @@ import scipy.sparse as sp
 from gears import hex20_deck, pinion, stage
 from scipy.spatial import cKDTree
 
-from gearfmu.body.imported import imported_full_order
 from gearfmu.fem import solids
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.toothed import gear_full_order
+from gearfmu.reduction.toothed import toothed_full_order
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
@@ -21,7 +20,7 @@ READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
 
 def imported(folder: Path, section: str = SECTION) -> FullOrder:
     spec = stage(folder, section)
-    return imported_full_order(spec.by_file[spec.gears[0].name])
+    return toothed_full_order(spec.by_file[spec.gears[0].name])
 
 
 def store_matrices(folder: Path, whole: bool) -> None:
@@ -33,7 +32,7 @@ def store_matrices(folder: Path, whole: bool) -> None:
 
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
-    return gear_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], 1.0)
+    return toothed_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], scale=1.0)
 
 
 def places(body: FullOrder) -> np.ndarray:

@@ -16,61 +16,41 @@ from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.geometry.plane import about_z
-from gearfmu.reduction.couplings import Coupling, Springs, full_order
-from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
+from gearfmu.reduction.couplings import Coupling, Elements
+from gearfmu.reduction.imported.couplings import elements_of, set_coupling
+from gearfmu.reduction.imported.files import naming
 from gearfmu.reduction.imported.flank import middle_node
-from gearfmu.reduction.imported.gear import BORE, CheckedGear, Wanted
+from gearfmu.reduction.imported.gear import BORE, CheckedGear, checked_gear
+from gearfmu.stagefile.forms.general import ToothedBody
 from gearfmu.stagefile.forms.planetary import MountsSpec
 
 
-def imported_gear_order(
-    found: CheckedGear,
-    wanted: Wanted,
-    name: str,
-    length: float,
-    coupling: str,
-    mounts: MountsSpec | None = None,
-) -> FullOrder:
-    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, its ground when judged;
-    a ring (one node a space) on the springs of its mounts, or free without them.
-
-    length : m, that scales rotations. coupling : of its bore. Raises MeshError.
-    """
-    mesh, matrices = _whole(found, wanted, mounts)
-    faces, body = solids.boundary(mesh.elements), elements_of(mesh, matrices, wanted.material)
-    couplings = []
-    for tooth in range(wanted.teeth):
-        node = middle_node(mesh.nodes, faces, wanted.flank, 2 * np.pi * tooth / wanted.teeth)
-        couplings.append(Coupling(f"tooth{tooth}", "nodes", np.array([node]), mesh.nodes[node]))
-    if not wanted.flank.internal:
-        couplings.append(set_coupling(mesh, faces, BORE, coupling, np.zeros(3)))
-        return full_order(name, body, couplings, (BORE,), length)
-    springs = None
-    if mounts is not None:
-        patches = [set_coupling(mesh, faces, own) for own in mesh.sets if own != BORE]
-        rows = [patch.rows[:3] for patch in patches if patch.rows is not None]
-        springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), mounts.stiffness))
-    return full_order(name, body, couplings, (), length, springs)
+def imported_teeth(gear: ToothedBody, mounts: MountsSpec | None) -> tuple[Elements, list[int], list[Coupling]]:
+    """The whole imported gear: finite elements, one node a tooth, and its bore, or of a ring the patches of its rim
+    that mounts hold. Raises MeshError."""
+    found, source = checked_gear(gear), gear.imported
+    assert source is not None
+    mesh, matrices = found.mesh, found.matrices
+    with naming(mesh.source):
+        if (cut := found.cut) is not None:
+            mesh = _unfolded(found, gear.teeth, mounts.points if mounts else 0)
+            if matrices is not None:
+                stiffness, mass = (unfolded_matrix(matrix, cut, gear.teeth) for matrix in matrices)
+                matrices = stiffness, mass
+        faces, body = solids.boundary(mesh.elements), elements_of(mesh, matrices, gear.material)
+        angles = 2 * np.pi * np.arange(gear.teeth) / gear.teeth
+        numbers = [middle_node(mesh.nodes, faces, found.flank, angle) for angle in angles]
+        if found.flank.internal:
+            return body, numbers, [set_coupling(mesh, faces, own) for own in mesh.sets if own != BORE]
+        return body, numbers, [set_coupling(mesh, faces, BORE, source.bore_coupling, np.zeros(3))]
 
 
-def _whole(found: CheckedGear, wanted: Wanted, mounts: MountsSpec | None) -> tuple[ImportedMesh, Matrices | None]:
-    """All teeth of a checked gear, and their ready-made matrices or None."""
-    mesh, ready = found.mesh, found.matrices
-    if found.cut is not None:
-        mesh = _unfolded(mesh, found.cut, wanted.teeth, mounts.points if mounts else 0)
-        if ready is not None:
-            stiffness, mass = (unfolded_matrix(matrix, found.cut, wanted.teeth) for matrix in ready)
-            ready = stiffness, mass
-    return mesh, ready
-
-
-def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int, mounts: int) -> ImportedMesh:
+def _unfolded(found: CheckedGear, teeth: int, mounts: int) -> ImportedMesh:
     """All sectors, with the sets of bore or rim and of the patches that the mounts hold."""
-    nodes, numbers = _numbers(cut, teeth)
-    bore = np.flatnonzero(np.isin(cut.of_mesh, mesh.sets[BORE]))
+    assert (cut := found.cut) is not None
+    (nodes, numbers), bore = _numbers(cut, teeth), found.bore_of_cut
     return replace(
-        mesh,
+        found.mesh,
         nodes=nodes,
         elements={kind: np.concatenate([n[block] for n in numbers]) for kind, block in cut.elements.items()},
         sets={BORE: np.unique(np.concatenate([n[bore] for n in numbers]))}
