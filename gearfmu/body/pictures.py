@@ -95,10 +95,9 @@ def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:
     return turn_sectors(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
 
 
-def sector_shapes(sector: Outline, modes: Modes) -> Shapes | None:
-    """Surface of a sector in all modes; None where the modes were made without it."""
-    if modes.surface is None:
-        return None
+def sector_shapes(sector: Outline, modes: Modes) -> Shapes:
+    """Surface of a sector in all modes, which were made with its points."""
+    assert modes.surface is not None
     return Shapes(sector.points.astype("f4"), sector.quads, sector.ahead.astype(int), modes.surface.astype("f4"))
 
 

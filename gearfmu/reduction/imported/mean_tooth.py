@@ -14,7 +14,7 @@ Source: the mean over a group of turns is the nearest block-circulant matrix: Ch
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,7 +31,7 @@ from gearfmu.reduction.cyclic.frf import (
     rigid_compliance,
     static_matrix,
 )
-from gearfmu.reduction.cyclic.modal import Modes, Progress
+from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, phases, real_modes
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -69,13 +69,11 @@ class WholeGear:
 
 @dataclass(frozen=True)
 class _Found:
-    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last, strongest whole
-    mode."""
+    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last."""
 
     squared: float
     nodal_diameter: int
     amplitude: np.ndarray
-    mode: int
 
 
 def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress | None = None) -> tuple[Modes, float]:
@@ -100,10 +98,10 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress |
     for members in _clusters(np.sqrt(squared)):
         weighted = amplitude[:, :, members] / np.sqrt(squared[members])
         kept, lost = _directions(weighted, squared[members], gear.teeth)
-        found += [_Found(o.squared, o.nodal_diameter, o.amplitude / scale, int(members[o.mode])) for o in kept]
+        found += [replace(o, amplitude=o.amplitude / scale) for o in kept]
         left += lost
     total = float((np.abs(amplitude) ** 2 / squared).sum())
-    return _as_modes(sorted(found, key=lambda o: o.squared), gear, shapes, count), left / total
+    return _as_modes(sorted(found, key=lambda o: o.squared), gear, count), left / total
 
 
 def _clusters(frequency: np.ndarray) -> list[np.ndarray]:
@@ -123,52 +121,21 @@ def _directions(weighted: np.ndarray, squared: np.ndarray, teeth: int) -> tuple[
             if size**2 < _WEAK * whole:
                 left += float(size**2)
                 continue
-            weight = np.abs(share) ** 2
-            mean = float(1 / (weight / squared).sum())
-            found.append(_Found(mean, nu, direction * size * np.sqrt(mean), int(weight.argmax())))
+            mean = float(1 / (np.abs(share) ** 2 / squared).sum())
+            found.append(_Found(mean, nu, direction * size * np.sqrt(mean)))
     return found, left
 
 
-def _as_modes(found: list[_Found], gear: WholeGear, shapes: np.ndarray, count: int) -> Modes:
-    functions = gear.points.functions
-    odd = np.tile(np.arange(functions), 2 * len(gear.points.rolls)) % 2 == 1
-    columns: dict[str, list] = {name: [] for name in ("frequency", "diameter", "part", "parity", "flank", "bore")}
-    pictures: dict[int, np.ndarray] = {}
+def _as_modes(found: list[_Found], gear: WholeGear, count: int) -> Modes:
+    odd = np.tile(np.arange(gear.points.functions), 2 * len(gear.points.rolls)) % 2 == 1
+    patterns = []
     for item in found:
-        pair = 0 < 2 * item.nodal_diameter < gear.teeth
-        if len(columns["part"]) + 1 + pair > count:
-            break
-        amplitude = _turned(item.amplitude, len(odd))
+        amplitude = item.amplitude * phases(item.amplitude[: len(odd), None])
         flank, parity = _of_one_parity(amplitude[: len(odd)], odd)
-        pictures[len(columns["part"])] = shapes[:, item.mode]
-        for part in (1, 2) if pair else (0,):
-            take = np.imag if part == 2 else np.real
-            columns["frequency"].append(np.sqrt(item.squared) / (2 * np.pi))
-            columns["diameter"].append(item.nodal_diameter)
-            columns["part"].append(part)
-            columns["parity"].append(parity)
-            columns["flank"].append(take(flank))
-            columns["bore"].append(take(amplitude[len(odd) :]))
-    diameters, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    return Modes(
-        frequency=np.array(columns["frequency"]),
-        nodal_diameter=diameters,
-        part=parts,
-        parity=parities,
-        flank_rows=np.stack(columns["flank"], 1),
-        bore_rows=np.stack(columns["bore"], 1),
-        patch_rows=np.zeros((0, len(parts))),
-        shapes=pictures,
-    )
-
-
-def _turned(amplitude: np.ndarray, flank: int) -> np.ndarray:
-    """The same pair with the phase at which its flank rows are as real as can be and the largest is positive."""
-    rows = amplitude[:flank]
-    turned = amplitude * np.exp(-0.5j * np.angle((rows**2).sum()))
-    real = turned[:flank].real
-    turned = turned * (-1.0 if real[np.abs(real).argmax()] < 0 else 1.0)
-    return turned if np.iscomplexobj(amplitude) else turned.real
+        read = {"flank_rows": flank, "bore_rows": amplitude[len(odd) :]}
+        patterns.append(Pattern(item.squared, item.nodal_diameter, parity, read))
+    columns, _ = real_modes(patterns, count)
+    return Modes(patch_rows=np.zeros((0, len(columns["part"]))), **columns)
 
 
 def _of_one_parity(flank: np.ndarray, odd: np.ndarray) -> tuple[np.ndarray, int]:
