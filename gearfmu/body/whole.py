@@ -101,8 +101,8 @@ def whole_body(full: FullOrder, how: How, size: Size, judging: Judging, read: Re
         rows=model.rows,
         static=model.static,
         error=FrfError.of(judging.frequency, error, band, full.length, full.ground),
-        sensors=_sensed(read, full, basis.vectors @ model.turn),
-        skin=_skin(read, full, basis.vectors @ model.turn),
+        sensors=_sensed(read, full, basis @ model.turn),
+        skin=_skin(read, full, basis @ model.turn),
     )
 
 

@@ -1,9 +1,8 @@
-"""What a reduction method gives: a basis of the body's elastic motion; and how large it shall be."""
+"""A basis of a body's elastic motion as it grows, and how large it shall be."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,23 +30,6 @@ class Size:
             raise BodyError(f"size: count = {self.count}: at least one vector")
         if not 0 <= self.band[0] < self.band[1]:
             raise BodyError(f"size: band = {self.band} Hz: from a lower to a higher frequency")
-
-
-@dataclass(frozen=True)
-class Basis:
-    """Elastic motion of a body: V (N, n), orthonormal in M and M-orthogonal to the rigid modes that nothing holds.
-
-    method : its name. facts : what it was made of (expansion points, numbers of modes …), for reports.
-    """
-
-    method: str
-    vectors: np.ndarray
-    facts: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def size(self) -> int:
-        """Number n of elastic vectors."""
-        return self.vectors.shape[1]
 
 
 class Growing:

@@ -20,7 +20,7 @@ from gearfmu.reduction.basis import BAND, Growing
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.moments import Expansion
-from gearfmu.reduction.oscillators import Oscillators, Projection, decoupled
+from gearfmu.reduction.oscillators import Oscillators, decoupled
 
 LINES = 400
 _POINTS = (0.0, 0.5, 1.0)  # expansion points of a reference, in parts of the band's upper end
@@ -95,11 +95,12 @@ def reference(body: FullOrder, judging: Judging) -> Reference:
     moments = _Moments(body, [(share * top) ** 2 for share in _POINTS])
     step = max(1, len(judging.frequency) // _CHECKED)
     watched = Judging(judging.frequency[::step], judging.damping_ratio)
+    without_residual = np.zeros((len(moments.rows),) * 2)
     last: np.ndarray | None = None
     best = float("inf")
     for _ in range(_BLOCKS):
         grown = moments.grow()
-        model = decoupled(body, moments.projection(), judging.damping_ratio)
+        model = decoupled(body, moments.stiffness, moments.rows, without_residual, judging.damping_ratio)
         now = transfer(model, watched, body.ground)
         change = float("inf") if last is None else float(relative_error(now, last).max())
         if change < _CONVERGED or not grown or (best < _ROUNDING and change > 0.2 * best):
@@ -135,7 +136,3 @@ class _Moments:
         grown[:before, :before], grown[:, before:], grown[before:, :] = self.stiffness, new, new.T
         self.stiffness = grown
         self.rows = np.hstack([self.rows, self.body.rows() @ added])
-
-    def projection(self) -> Projection:
-        """What is there so far, without static residual."""
-        return Projection("moments", self.stiffness, self.rows, np.zeros((len(self.rows),) * 2))
