@@ -29,6 +29,7 @@ from gearfmu.reduction.stored import Entry, entries
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
+HOW = ("method", "material", "mesh", "provenance")
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM, FORMATS)
 
 
@@ -56,7 +57,7 @@ def load_body(path: str | os.PathLike[str]) -> Body:
             texts = {name: json.loads(file.attrs[name]) for name in TEXTS if name in file.attrs}
         else:
             values, texts = former_values(file)
-        how = {name: texts.pop(name) for name in ("method", "material", "mesh", "provenance")}
+        how = {name: texts.pop(name) for name in HOW}
         version = int(file.attrs.get("algorithm_version", 1))  # the first carriers do not say it
         made = How(str(file.attrs["input_hash"]), **how, algorithm=version)
         return _body(str(file.attrs["name"]), made, values, texts)
@@ -72,20 +73,13 @@ def _entries_in(file: h5py.File) -> Iterator[Entry]:
 
 
 def _texts(body: Body) -> dict[str, Any]:
-    how, error = body.how, body.error
     nodes = [
         {"name": n.name, "kind": n.kind, "components": list(n.components)} | ({"span": list(n.span)} if n.span else {})
         for n in body.nodes
     ]
     names = {"sensors": list(body.sensors.names)} if body.sensors is not None else {}
-    return {
-        "nodes": nodes,
-        "ground": list(error.ground) if error is not None else [],
-        "method": how.method,
-        "material": how.material,
-        "mesh": how.mesh,
-        "provenance": how.provenance,
-    } | names
+    how = {name: getattr(body.how, name) for name in HOW}
+    return {"nodes": nodes, "ground": list(body.error.ground) if body.error is not None else []} | how | names
 
 
 def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any]) -> Body:

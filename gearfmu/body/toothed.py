@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.apart import Progress, Work
 from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Tangent
 from gearfmu.body.former import GEAR_METHOD
 from gearfmu.body.pictures import drawn_outline, pictured_loads, sector_picture, whole_picture
@@ -19,7 +18,7 @@ from gearfmu.femesh.quality import mesh_report
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, tooth_flank
 from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, frf_error
-from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.reduction.cyclic.modal import Modes, Progress, elastic_modes, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.elastic import Elastic
@@ -50,14 +49,6 @@ class Parts:
     sensors: Sensors | None = None
 
 
-def gear_work(gear: ToothedBody) -> Work | None:
-    """Memory and time for the reduction of a gear meshed here; None of one meshed elsewhere. Raises MeshError."""
-    if gear.imported is not None:
-        return None
-    geometry = gear_shape(gear)
-    return Work(gear_need(gear_sector(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
-
-
 def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     """The reduced body of an external or internal gear. Raises MeshError."""
     started, report = time.process_time(), named(progress, gear.name)
@@ -85,7 +76,7 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
 
 def named(progress: Progress | None, name: str) -> Progress:
     """Progress of the body `name`, also where no one asks for it."""
-    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
+    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else untold
 
 
 def _meshed_here(gear: ToothedBody, report: Progress) -> Parts:

@@ -157,9 +157,9 @@ def eliminated(matrix: sp.csr_array, groups: list[np.ndarray], eliminate: Elimin
         rows = matrix[groups[number]].tocoo()
         column = place[rows.col]
         ahead = column >= start
-        own = Entries(rows.row[ahead], column[ahead], rows.data[ahead])
+        own = sp.coo_array((rows.data[ahead], (rows.row[ahead], column[ahead])), matrix.shape)
         children, waiting[number] = waiting[number], []
-        touched = np.unique(np.concatenate([own.column, *(index for index, _ in children)]))
+        touched = np.unique(np.concatenate([own.col, *(index for index, _ in children)]))
         below = touched[touched >= stop]
         dense = gathered(own, range(start, stop), below, children, workspace)
         front, update = eliminate(dense, start, int(stop), below)
@@ -167,15 +167,6 @@ def eliminated(matrix: sp.csr_array, groups: list[np.ndarray], eliminate: Elimin
         if len(below):
             waiting[group_of[below[0]]].append((below, update))
     return fronts
-
-
-@dataclass(frozen=True)
-class Entries:
-    """Entries of a front's own rows, row counted from its first, at columns that are not eliminated yet."""
-
-    row: np.ndarray
-    column: np.ndarray
-    value: np.ndarray
 
 
 class Workspace:
@@ -193,10 +184,11 @@ class Workspace:
         return dense
 
 
-def gathered(own: Entries, rows: range, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
+def gathered(own: sp.coo_array, rows: range, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
     """Lower triangle of a front: own columns of A and the children's Schur complements.
 
-    children : (places, Schur complement), of which the upper triangle is read.
+    own : entries of its own rows, counted from the first, at columns that are not eliminated yet. children : (places,
+    Schur complement), of which the upper triangle is read.
     """
     count = len(rows)
     dense = workspace.square(count + len(below))
@@ -204,7 +196,7 @@ def gathered(own: Entries, rows: range, below: np.ndarray, children: list, works
     def position(place: np.ndarray) -> np.ndarray:
         return np.where(place < rows.stop, place - rows.start, count + np.searchsorted(below, place))
 
-    dense[position(own.column), own.row] = own.value
+    dense[position(own.col), own.row] = own.data
     for index, update in children:
         _add_lower(dense, position(index), update)
     return dense

@@ -60,4 +60,4 @@ def stress_stiffness(
     stress = 2 * d[3, 3] * strain + d[0, 1] * np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3)
     measure = np.linalg.det(jacobian) * weight
     blocks = np.einsum("eg,egan,egab,egbm->enm", measure, spatial, stress, spatial, optimize=True)
-    return hex20.scatter(blocks, elements, len(nodes))
+    return hex20.symmetric(hex20.scattered(blocks, elements, len(nodes)))

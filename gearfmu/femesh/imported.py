@@ -16,12 +16,12 @@ import meshio
 import numpy as np
 
 from gearfmu.errors import MeshError
+from gearfmu.fem.hex20 import EDGES
 from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.gmsh import is_format_4, read_gmsh
 from gearfmu.femesh.mesh import LabelledMesh
 from gearfmu.femesh.nastran import nastran_problems, nastran_sets
 
-_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
 _SURFACES = ("vertex", "line", "line3", "triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 _FORMATS = {".bdf": "nastran", ".nas": "nastran", ".dat": "nastran", ".fem": "nastran", ".msh": "gmsh", ".vtu": "vtu"}
 QUADRATIC = {"hexahedron20": 20, "tetra10": 10}
@@ -220,7 +220,7 @@ def _raised(mesh: ImportedMesh) -> ImportedMesh:
     linear = mesh.elements.get("hexahedron")
     if linear is None:
         return mesh
-    edges = np.sort(linear[:, _EDGES], axis=2).reshape(-1, 2)
+    edges = np.sort(linear[:, EDGES], axis=2).reshape(-1, 2)
     edges, place = np.unique(edges, axis=0, return_inverse=True)
     number = len(mesh.nodes) + np.arange(len(edges))
     raised = np.hstack([linear, number[place.reshape(len(linear), 12)]])

@@ -42,7 +42,7 @@ def carrier_need(carrier: CarrierBody) -> Need:
     size, vectors, cyclic = own * bolts, 3 * carrier.modes, cyclic_carrier(carrier)
     need = parts_need(size, bolts, vectors) if cyclic else whole_need(size, vectors, CARRIER_FACTORS)
     scale = max(1.0, compared_scale(carrier))
-    return Need(size, max(need.memory, _modes_memory(own * scale**3, 1 if cyclic else bolts)), True)
+    return Need(size, max(need.memory, _modes_memory(own * scale**3, 1 if cyclic else bolts)))
 
 
 def compared_scale(carrier: CarrierBody) -> float:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, moved, rigid_fields, rigid_modes
+from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, master_rows, moved, rigid_fields, rigid_modes
 from gearfmu.fem.hex20 import symmetric
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 
@@ -146,10 +146,7 @@ def elimination(nodes: np.ndarray, rigid: Sequence[Coupling]) -> tuple[sp.csr_ar
 def _rigid_columns(nodes: np.ndarray, rigid: Sequence[Coupling]) -> np.ndarray:
     count = len(nodes)
     free = np.flatnonzero(_masters(count, rigid) < count)
-    parts = [rigid_modes(nodes[free])]
-    for coupling in rigid:
-        parts.append(np.vstack([rigid_fields(coupling.point), np.eye(6)[3:]]))
-    return np.vstack(parts)
+    return np.vstack([rigid_modes(nodes[free]), *(master_rows(coupling.point) for coupling in rigid)])
 
 
 def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigid: Sequence[Coupling]) -> Interface:

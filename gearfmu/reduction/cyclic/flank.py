@@ -68,10 +68,9 @@ class ToothFlank:
         coordinate z (m, to be broadcast with the roll; of no influence on a spur gear)."""
         sg, outwards = 1 - 2 * side, -1 if self.internal else 1
         plane = outwards * involute.flank_normal(roll, self.r_b, self.psi_b, sg)
-        if not self.base_helix_angle:
-            return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
         turned = self._turned(np.cos(self.base_helix_angle) * plane, z)
-        turned[..., 2] = -outwards * sg * np.sin(self.base_helix_angle)
+        if self.base_helix_angle:
+            turned[..., 2] = -outwards * sg * np.sin(self.base_helix_angle)
         return turned
 
     def tangent(self, roll: np.ndarray, side: int, z: np.ndarray | float = 0.0) -> np.ndarray:

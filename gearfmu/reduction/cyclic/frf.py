@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearfmu.fem.harmonic import Harmonic, flexibilities
-from gearfmu.reduction.cyclic.modal import Modes, Progress
+from gearfmu.reduction.cyclic.modal import Modes, Progress, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
 from gearfmu.reduction.stored import stored
@@ -85,9 +85,7 @@ class Series:
     moments: list[np.ndarray]
 
 
-def frf_error(
-    body: SectorBody, modes: Modes, statics: Statics, case: FrfCase, progress: Progress | None = None
-) -> FrfError:
+def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase, progress: Progress = untold) -> FrfError:
     """Relative error of modes below the cut + static residual against the finite elements (see the head of this
     file)."""
     inputs = frf_inputs(len(body.points.rolls), body.points.functions)
@@ -143,15 +141,14 @@ def static_matrix(statics: Statics, inputs: np.ndarray) -> np.ndarray:
     return np.block([[flank, bore], [bore.T, statics.static_bb]])
 
 
-def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress | None) -> list[np.ndarray]:
+def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress) -> list[np.ndarray]:
     """Fᵀ C (M C)^j F for j = 1, 2, 3 over the whole body, flank loads on tooth 0 and bore loads."""
     size = len(inputs) + 6
     total = [np.zeros((size, size)) for _ in range(3)]
     diameters = body.diameters()
     for space in body.spaces:
         for start in range(0, len(diameters), _AT_ONCE):
-            if progress:
-                progress(f"frequency response, nodal diameter {start}", start / len(diameters))
+            progress(f"frequency response, nodal diameter {start}", start / len(diameters))
             harmonics = [space.harmonic(nu) for nu in diameters[start : start + _AT_ONCE]]
             _add_moments(total, body, harmonics, inputs)
     return total

@@ -30,7 +30,11 @@ _SAMPLED = 1e-4  # residual of their modes
 _BESIDE = 3  # modes of a family beyond its share that join the space
 _SPACE_SHARE = 0.4  # of the time, for the space
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float], None]  # what is being done, share done of it
+
+
+def untold(what: str, share: float) -> None:
+    """Progress that nobody asks for."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,7 @@ def real_modes(patterns: Sequence[Pattern], count: int) -> tuple[dict[str, np.nd
 
 
 def elastic_modes(
-    body: SectorBody, count: int, progress: Progress | None = None, sample: sp.csr_array | None = None
+    body: SectorBody, count: int, progress: Progress = untold, sample: sp.csr_array | None = None
 ) -> Modes:
     """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
 
@@ -160,9 +164,8 @@ def elastic_modes(
         for index, low in enumerate(lows):
             for mine in refined_modes(low, {nu: wanted[s, nu] for s, nu in open_families if s == index}):
                 nu = mine[0].nodal_diameter
-                if progress:
-                    done = number / len(open_families)
-                    progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
+                done = number / len(open_families)
+                progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
                 found[index, nu] = _made(body, mine, chosen)
                 number += 1
         limit = _limit(found.values(), count)
@@ -173,13 +176,12 @@ def elastic_modes(
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
 
-def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress | None) -> LowFields:
+def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress) -> LowFields:
     """The space of the modes of a few nodal diameters; low ones have the most modes in a band."""
     low, last = LowFields(space), body.diameters()[-1]
     diameters = sorted({round(part * last) for part in _SAMPLES})
     for number, nu in enumerate(diameters):
-        if progress:
-            progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
+        progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
         harmonic, wide = space.harmonic(nu), 2 - 1.5 * nu / last
         low.add(harmonic, lowest_modes(harmonic, int(wide * _share(body, count)) + _BESIDE, _SAMPLED)[1])
     return low

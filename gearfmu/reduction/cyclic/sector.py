@@ -61,16 +61,6 @@ class SectorBody:
         """Number 2·R·A of flank loads of a tooth."""
         return 2 * len(self.points.rolls) * self.points.functions
 
-    @property
-    def flank_rows(self) -> np.ndarray:
-        """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
-        return self.load_matrix[: self.flank_count].toarray()
-
-    @property
-    def tangent_rows(self) -> np.ndarray:
-        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
-        return self.load_matrix[self.profile_loads :].toarray()
-
     @cached_property
     def patch_rows(self) -> np.ndarray:
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from gearfmu.fem.cyclic import SectorSpace
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.reduction.cyclic.flank import Points
-from gearfmu.reduction.cyclic.modal import Progress
+from gearfmu.reduction.cyclic.modal import Progress, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 
 _NEGLIGIBLE = 1e-11  # of the largest: singular values of the loads on the cuts that are left out
@@ -47,7 +47,7 @@ class Statics:
     static_tt: np.ndarray | None = None
 
 
-def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress | None = None) -> Statics:
+def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress = untold) -> Statics:
     """Compliance of all flank points and the bore for every tooth offset.
 
     picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
@@ -60,13 +60,13 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
         loads = _CondensedLoads(body, space)
         seen, normal = loads.columns, np.flatnonzero(loads.columns < size)
         shown = [load for load in picture_loads if load in seen]
-        rest = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
+        kernels, moved = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
         table = np.zeros((z, len(normal), len(normal)))
         for m in range(z):
-            table[m] = loads.parts[:, normal].T @ rest.kernels[m] @ loads.parts[:, normal]
+            table[m] = loads.parts[:, normal].T @ kernels[m] @ loads.parts[:, normal]
         inner = loads.gram[: loads.count, : loads.count]
         table[0] += inner[np.ix_(normal, normal)]
-        own[np.ix_(seen, seen)] += inner + loads.parts.T @ rest.kernels[0] @ loads.parts
+        own[np.ix_(seen, seen)] += inner + loads.parts.T @ kernels[0] @ loads.parts
         for nu in (0, 1):
             harmonic = space.harmonic(nu)
             product = loads.compliance(harmonic, loads.tooth, loads.tooth) - inner
@@ -79,7 +79,7 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
             bb += z * harmonic.weight * loads.compliance(harmonic, bore, bore).real
         ff[np.ix_(np.arange(z), seen[normal], seen[normal])] += table
         for number, load in enumerate(shown):
-            pictures[picture_loads.index(load)] += _picture(body, index, load, rest.moved[:, :, [number]])
+            pictures[picture_loads.index(load)] += _picture(body, index, load, moved[:, :, [number]])
     shaped = _shaped(body, ff, fb[:size], bb, pictures)
     return replace(shaped, **_along_profile(body, 0.5 * (own + own.T)))
 
@@ -143,33 +143,25 @@ def _low_rank(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return left[:, kept], values[kept, None] * right[kept]
 
 
-@dataclass(frozen=True)
-class _Diameters:
-    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `_CondensedLoads.kernel` by tooth offset, and
-    moved (ν, c, p), the cut's displacement under the loads that are shown."""
-
-    kernels: np.ndarray
-    moved: np.ndarray
-
-
 def _all_diameters(
-    body: SectorBody, index: int, loads: _CondensedLoads, shown: np.ndarray, progress: Progress | None
-) -> _Diameters:
+    body: SectorBody, index: int, loads: _CondensedLoads, shown: np.ndarray, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
+    """What ν = 2, 3, … do on the cuts: Fourier sums (z, r, r) of `_CondensedLoads.kernel` by tooth offset, and the
+    cut's displacement (ν, c, p) under the loads that are shown."""
     z, found = body.teeth, []
     diameters = np.arange(2, z // 2 + 1)
     for nu in diameters.tolist():
-        if progress:
-            progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+        progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
         harmonic = body.spaces[index].harmonic(nu)
         moved, kernel = loads.kernel(harmonic)
         found.append((moved @ loads.parts[:, shown], kernel))
     turn = _weights(z, diameters) * np.exp(2j * np.pi * np.multiply.outer(np.arange(z), diameters) / z)
     rank = loads.patterns.shape[1]
     if not found:
-        return _Diameters(np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown))))
+        return np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown)))
     stacked = np.array([kernel for _, kernel in found]).reshape(len(found), -1)
     kernels = turn.real @ stacked.real + turn.imag @ stacked.imag
-    return _Diameters(kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found]))
+    return kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found])
 
 
 def _weights(z: int, diameters: np.ndarray) -> np.ndarray:
@@ -201,8 +193,6 @@ def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.n
 def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
     """Tables of loads along the profile from the compliance (every, every) of all loads of one tooth."""
     points, first = body.flank_count, body.profile_loads
-    if first == len(own):
-        return {}
     shape = (2, len(body.points.rolls), body.points.functions)
     blocks = {"static_nt": own[:points, first:], "static_tt": own[first:, first:]}
     return {

@@ -31,7 +31,7 @@ from gearfmu.reduction.cyclic.frf import (
     rigid_compliance,
     static_matrix,
 )
-from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, phases, real_modes
+from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, phases, real_modes, untold
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -76,11 +76,10 @@ class _Found:
     amplitude: np.ndarray
 
 
-def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress | None = None) -> tuple[Modes, float]:
+def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress = untold) -> tuple[Modes, float]:
     """Modes of the mean tooth from the `count` lowest modes of the whole gear, and the share of their static compliance
     that was left to the residual."""
-    if progress:
-        progress("modes of the whole gear", 0.0)
+    progress("modes of the whole gear", 0.0)
     squared, shapes = space.modes(count)
     rows = np.stack(
         [
@@ -149,7 +148,7 @@ def _of_one_parity(flank: np.ndarray, odd: np.ndarray) -> tuple[np.ndarray, int]
 
 
 def mean_statics(
-    gear: WholeGear, space: Elastic, picture_loads: list[int], progress: Progress | None = None
+    gear: WholeGear, space: Elastic, picture_loads: list[int], progress: Progress = untold
 ) -> tuple[Statics, float]:
     """Static tables of the mean tooth, and how far teeth are from it: largest relative deviation of the compliance
     under the uniform load at mid flank. Pictures: displacement (p, N) under loads on tooth 0."""
@@ -159,8 +158,7 @@ def mean_statics(
     tables, fb, pictures, mid = np.zeros((z, size, size)), np.zeros((size, 6)), np.zeros((0, space.size)), []
     place = (len(points.rolls) // 2) * points.functions
     for tooth, rows in enumerate(gear.flank_rows):
-        if progress:
-            progress("static compliance", tooth / z)
+        progress("static compliance", tooth / z)
         response = space.flexibility(rows.T.toarray())
         if tooth == 0:
             pictures = response[:, picture_loads].T.copy()
