@@ -14,10 +14,9 @@ from gearfmu.errors import Problem, SpecError
 from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.judged import Judgement, judged
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.toothed import toothed_full_order
-from gearfmu.reduction.transfer import LINES
+from gearfmu.reduction.transfer import LINES, Judgement, judged
 from gearfmu.reduction.transfer import Judging as Lines
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody

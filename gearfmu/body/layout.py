@@ -136,17 +136,6 @@ def _pairs_sound(flank: Flank) -> bool:
     )
 
 
-TEXTS = {
-    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section), components, span along z, in row order",
-    "sensors": "names of the sensors",
-    "ground": "nodes held when the error was measured",
-    "method": "method of reduction",
-    "material": "material: youngs_modulus (Pa), poisson_ratio, density (kg/m³)",
-    "mesh": "finite-element mesh: element counts, degrees of freedom, quality",
-    "provenance": "program versions, time and memory of the reduction",
-}
-
-
 SMALL = 16  # numbers: not worth compressing
 FILTERS = {"compression": "gzip", "compression_opts": 9, "shuffle": True, "fletcher32": True}
 STEP = "step"  # attribute of a dataset in steps

@@ -17,7 +17,6 @@ from gearfmu.body.layout import (
     FORMAT_VERSION,
     POINTS,
     SURFACE,
-    TEXTS,
     entries_of,
     read_entry,
     value_of,
@@ -30,6 +29,7 @@ from gearfmu.reduction.stored import Entry, entries
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
 HOW = ("method", "material", "mesh", "provenance")
+TEXTS = ("nodes", "sensors", "ground", *HOW)
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM, FORMATS)
 
 
@@ -54,7 +54,11 @@ def load_body(path: str | os.PathLike[str]) -> Body:
     with reading(path, FILE) as file:
         if int(file.attrs["format_version"]) == FORMAT_VERSION:
             values = {entry.field: read_entry(file, entry) for entry in _entries_in(file)}
-            texts = {name: json.loads(file.attrs[name]) for name in TEXTS if name in file.attrs}
+            texts = {
+                name: json.loads(file.attrs[name])
+                for name in ("nodes", "sensors", "ground", *HOW)
+                if name in file.attrs
+            }
         else:
             values, texts = former_values(file)
         how = {name: texts.pop(name) for name in HOW}

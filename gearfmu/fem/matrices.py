@@ -157,9 +157,8 @@ def _sorted(path: Path, matrix: sp.csr_array, unknowns: np.ndarray, labels: np.n
     missing = np.setdiff1d(np.arange(3 * len(labels)), target)
     if len(missing):
         raise MeshError(
-            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node "
-            f"{labels[missing[0] // 3]}): export the free "
-            "body, without supports and constraints"
+            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node {labels[missing[0] // 3]}): export "
+            "the free body, without supports and constraints"
         )
     entries = matrix.tocoo()
     size = 3 * len(labels)

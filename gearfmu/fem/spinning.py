@@ -30,16 +30,12 @@ def leave_axial(fields: np.ndarray) -> np.ndarray:
     return fields * np.tile(ACROSS, len(fields) // 3).reshape(-1, *[1] * (fields.ndim - 1))
 
 
-def centrifugal_load(nodes: np.ndarray, mass: sp.csr_array) -> np.ndarray:
-    """f_c (3N,), kg·m: nodes (N, 3) m, mass (3N, 3N) kg."""
-    return np.asarray(mass @ leave_axial(nodes.ravel()))
-
-
 def growth(space: SectorSpace, nodes: np.ndarray, mass: sp.csr_array) -> np.ndarray:
     """Displacement (3N,) of a sector under the centrifugal load of all sectors per square of the speed, m·s²; space:
     symmetric about mid-width, or of all fields."""
     harmonic = space.harmonic(0)
-    load = harmonic.reduce((space.from_nodes @ centrifugal_load(nodes, mass))[:, None])
+    centrifugal = np.asarray(mass @ leave_axial(nodes.ravel()))  # f_c, kg·m
+    load = harmonic.reduce((space.from_nodes @ centrifugal)[:, None])
     return np.asarray(space.to_nodes @ harmonic.expand(harmonic.flexibility(load)))[:, 0]
 
 

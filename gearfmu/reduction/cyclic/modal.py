@@ -218,7 +218,7 @@ def _made(body: SectorBody, modes: tuple[Harmonic, np.ndarray, np.ndarray], samp
     fields = harmonic.space.to_nodes @ harmonic.expand(shapes)
     flank = np.zeros((body.load_matrix.shape[0], len(squared)), shapes.dtype)
     flank[seen] = body.load_matrix[seen] @ fields
-    gauge = phases(flank[: body.profile_loads])
+    gauge = _phases(flank[: body.profile_loads])
     fields, flank = fields * gauge, flank * gauge
     bore = body.teeth * (body.bore_parts(harmonic).conj().T @ (body.bore_moments[0] @ fields))
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
@@ -228,7 +228,7 @@ def _made(body: SectorBody, modes: tuple[Harmonic, np.ndarray, np.ndarray], samp
     return _FamilyModes(weight, len(squared) >= harmonic.elastic, squared, flank, bore, surface, spin)
 
 
-def phases(rows: np.ndarray) -> np.ndarray:
+def _phases(rows: np.ndarray) -> np.ndarray:
     """Factors that fix the free sign, or the free phase of a pair: the real part dominates the flank rows, its largest
     entry is positive. Modes that leave the flanks at rest keep their sign."""
     square = (rows**2).sum(axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +12,27 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
-from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.femesh.imported import ImportedMesh, repeated_cells
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.involute_fit import InvoluteFit
 from gearfmu.reduction.couplings import full_order
-from gearfmu.reduction.cyclic.flank import Points, ToothFlank, tooth_flank
+from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, tooth_flank
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
-from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.files import (
+    Matrices,
+    elements_of,
+    mesh_facts,
+    naming,
+    ready_matrices,
+    set_coupling,
+    sound_mesh,
+)
 from gearfmu.reduction.imported.flank import fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
-from gearfmu.reduction.imported.sector import ImportedSector
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, sector_need, whole_need
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
@@ -29,7 +40,7 @@ from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 BORE = "bore"
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
-_WIDTH = 2e-3  # relative difference of face width, base radius and tooth thickness to the stage file
+_WIDTH, _THICKNESS = 2e-3, 0.05  # relative difference of face width and base radius, of tooth thickness to the file
 _HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibration of a solid body
 
 
@@ -50,6 +61,36 @@ class CheckedGear:
         """Nodes of the sector on the bore, of a ring on the rim."""
         assert self.cut is not None
         return np.flatnonzero(np.isin(self.cut.of_mesh, self.mesh.sets[BORE]))
+
+
+class ImportedSector(SectorBody):
+    """`SectorBody` on a cut of an imported mesh.
+
+    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). matrices : stiffness
+    (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
+    """
+
+    def __init__(
+        self, cut: CyclicCut, bore: np.ndarray, teeth: int, matrices: Matrices, flank: ToothFlank, points: Points
+    ):
+        self.faces = solids.boundary(cut.elements)
+        sets = {"rim" if flank.internal else "bore": bore}
+        mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), sets, teeth, cut.cut_minus, cut.cut_plus)
+        super().__init__(mesh, matrices, flank, points)
+
+    def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
+        return tooth_loads(self.mesh.nodes, self.faces, self.flank, self.points, direction=direction)
+
+    @cached_property
+    def patch_rows(self) -> np.ndarray:
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
+        if not self.internal:
+            return np.zeros((0, self.mesh.nodes.size))
+        return averaging_rows(self.mesh.nodes - self.patch_point, self._held_faces)[:3]
+
+    @property
+    def _held_faces(self) -> Faces:
+        return self.faces.within(self._held_nodes)
 
 
 def checked_gear(gear: ToothedBody) -> CheckedGear:
@@ -129,15 +170,14 @@ def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, flank: ToothFlank) -> None:
     radius, (low, high) = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1]), flank.radii()
     width = 2 * float(np.abs(mesh.nodes[(radius > low) & (radius < high), 2]).max())
     pairs = {
-        "base radius": (1e3 * fit.r_b, 1e3 * flank.r_b, "mm"),
-        "half tooth thickness at the base circle": (1e3 * fit.psi_b * fit.r_b, 1e3 * flank.psi_b * flank.r_b, "mm"),
-        "face width": (1e3 * width, 1e3 * flank.face_width, "mm"),
+        "base radius": (fit.r_b, flank.r_b, _WIDTH),
+        "half tooth thickness at the base circle": (fit.psi_b * fit.r_b, flank.psi_b * flank.r_b, _THICKNESS),
+        "face width": (width, flank.face_width, _WIDTH),
     }
-    slack = {"half tooth thickness at the base circle": 0.05}
     wrong = [
-        f"{name} {own:.5g} {unit} instead of {meant:.5g} {unit}"
-        for name, (own, meant, unit) in pairs.items()
-        if abs(own - meant) > slack.get(name, _WIDTH) * meant
+        f"{name} {1e3 * own:.5g} mm instead of {1e3 * meant:.5g} mm"
+        for name, (own, meant, slack) in pairs.items()
+        if abs(own - meant) > slack * meant
     ]
     if wrong:
         raise MeshError(
@@ -194,7 +234,6 @@ def hinge_problem(space: Elastic) -> str | None:
     if float(space.modes(1)[0][0]) > _HINGE**2 * stiffest:
         return None
     return (
-        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: "
-        "connect it, or "
-        "export it without mechanisms"
+        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: connect it, "
+        "or export it without mechanisms"
     )

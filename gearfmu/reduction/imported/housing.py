@@ -20,8 +20,7 @@ from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.reduction.couplings import Coupling, elimination, full_order
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 from gearfmu.reduction.imported.carrier import circle_centre
-from gearfmu.reduction.imported.couplings import elements_of, set_coupling
-from gearfmu.reduction.imported.files import naming, ready_matrices, sound_mesh, whole_facts
+from gearfmu.reduction.imported.files import elements_of, naming, ready_matrices, set_coupling, sound_mesh, whole_facts
 from gearfmu.reduction.imported.skin import Surface, closed_surface, enveloping_surface
 from gearfmu.reduction.memory import MESH_COARSER, require_memory, whole_need
 from gearfmu.stagefile.tables.housing import HousingBody, HousingImportSpec
@@ -54,11 +53,12 @@ def imported_housing(housing: HousingBody) -> ImportedHousing:
         require_memory(whole_need(mesh.nodes.size, 3 * housing.modes, HOUSING_FACTORS), MESH_COARSER)
         matrices = ready_matrices(source, mesh, np.eye(3), housing.material)
         faces = solids.boundary(mesh.elements)
-        held = _seats(mesh, faces, source) + _feet(mesh, faces, source)
+        feet = [set_coupling(mesh, faces, own, source.foot_coupling, name=name) for name, own in source.feet.items()]
+        held = _seats(mesh, faces, source) + feet
         felt = [_sensor(mesh, faces, name, node_set) for name, node_set in source.sensors.items()]
         body = elements_of(mesh, matrices, housing.material)
-        feet, reach = tuple(source.feet), float(np.linalg.norm(mesh.nodes, axis=1).max())
-        full = full_order(housing.name, body, [*held, *felt], feet, reach)
+        reach = float(np.linalg.norm(mesh.nodes, axis=1).max())
+        full = full_order(housing.name, body, [*held, *felt], tuple(source.feet), reach)
         loaded, sensors = full.interfaces[: len(held)], full.interfaces[len(held) :]
         surface = closed_surface(mesh, faces, source.skin) if source.skin else enveloping_surface(mesh, faces)
         transform = elimination(mesh.nodes, [c for c in held if c.kind == "rigid"])[0]
@@ -85,12 +85,6 @@ def _seats(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[
         point = np.array([*centre, 0.5 * (nodes[:, 2].min() + nodes[:, 2].max())])
         found.append(set_coupling(mesh, faces, node_set, source.seat_coupling, point, name))
     return found
-
-
-def _feet(mesh: ImportedMesh, faces: Faces, source: HousingImportSpec) -> list[Coupling]:
-    return [
-        set_coupling(mesh, faces, node_set, source.foot_coupling, name=name) for name, node_set in source.feet.items()
-    ]
 
 
 def _sensor(mesh: ImportedMesh, faces: Faces, name: str, node_set: str) -> Coupling:

@@ -14,7 +14,8 @@ Source: the mean over a group of turns is the nearest block-circulant matrix: Ch
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,7 +32,7 @@ from gearfmu.reduction.cyclic.frf import (
     rigid_compliance,
     static_matrix,
 )
-from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, phases, real_modes, untold
+from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, real_modes, untold
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -67,13 +68,7 @@ class WholeGear:
         return np.mean([turn.T @ whole @ turn for turn in turns], axis=0)
 
 
-@dataclass(frozen=True)
-class _Found:
-    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last."""
-
-    squared: float
-    nodal_diameter: int
-    amplitude: np.ndarray
+_Found = tuple[float, int, np.ndarray]  # of an oscillator: ω², nodal diameter, amplitude (L + 6,) with the bore last
 
 
 def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress = untold) -> tuple[Modes, float]:
@@ -97,10 +92,10 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress =
     for members in _clusters(np.sqrt(squared)):
         weighted = amplitude[:, :, members] / np.sqrt(squared[members])
         kept, lost = _directions(weighted, squared[members], gear.teeth)
-        found += [replace(o, amplitude=o.amplitude / scale) for o in kept]
+        found += [(mean, diameter, part / scale) for mean, diameter, part in kept]
         left += lost
     total = float((np.abs(amplitude) ** 2 / squared).sum())
-    return _as_modes(sorted(found, key=lambda o: o.squared), gear, count), left / total
+    return _as_modes(sorted(found, key=itemgetter(0)), gear, count), left / total
 
 
 def _clusters(frequency: np.ndarray) -> list[np.ndarray]:
@@ -121,20 +116,29 @@ def _directions(weighted: np.ndarray, squared: np.ndarray, teeth: int) -> tuple[
                 left += float(size**2)
                 continue
             mean = float(1 / (np.abs(share) ** 2 / squared).sum())
-            found.append(_Found(mean, nu, direction * size * np.sqrt(mean)))
+            found.append((mean, nu, direction * size * np.sqrt(mean)))
     return found, left
 
 
 def _as_modes(found: list[_Found], gear: WholeGear, count: int) -> Modes:
     odd = np.tile(np.arange(gear.points.functions), 2 * len(gear.points.rolls)) % 2 == 1
     patterns = []
-    for item in found:
-        amplitude = item.amplitude * phases(item.amplitude[: len(odd), None])
+    for squared, nu, amplitude in found:
+        amplitude = _turned(amplitude, len(odd))
         flank, parity = _of_one_parity(amplitude[: len(odd)], odd)
         read = {"flank_rows": flank, "bore_rows": amplitude[len(odd) :]}
-        patterns.append(Pattern(item.squared, item.nodal_diameter, parity, read))
+        patterns.append(Pattern(squared, nu, parity, read))
     columns, _ = real_modes(patterns, count)
     return Modes(patch_rows=np.zeros((0, len(columns["part"]))), **columns)
+
+
+def _turned(amplitude: np.ndarray, flank: int) -> np.ndarray:
+    """The same pair with the phase at which its flank rows are as real as can be and the largest is positive."""
+    rows = amplitude[:flank]
+    turned = amplitude * np.exp(-0.5j * np.angle((rows**2).sum()))
+    real = turned[:flank].real
+    turned = turned * (-1.0 if real[np.abs(real).argmax()] < 0 else 1.0)
+    return turned if np.iscomplexobj(amplitude) else turned.real
 
 
 def _of_one_parity(flank: np.ndarray, odd: np.ndarray) -> tuple[np.ndarray, int]:
@@ -173,8 +177,6 @@ def mean_statics(
         static_ff=by_load(symmetric_offsets(tables), points),
         static_fb=fb.reshape(2, rolls, functions, 6),
         static_bb=0.5 * (bb + bb.T),
-        static_fp=np.zeros((2, z, rolls, functions, 0)),
-        static_pp=np.zeros((z, 0, 0)),
         pictures=pictures,
     )
     return statics, float(np.abs(np.array(mid) / np.mean(mid) - 1).max())
