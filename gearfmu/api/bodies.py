@@ -11,10 +11,10 @@ from gearfmu.api.models import PathLike, loaded_stage
 from gearfmu.api.settings import Quantity, checked
 from gearfmu.body.whole import housing_order
 from gearfmu.errors import Problem, SpecError
-from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import BAND, Size
 from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.reduction.transfer import LINES, Judgement, judged
 from gearfmu.reduction.transfer import Judging as Lines

@@ -89,7 +89,10 @@ def _texts(body: Body) -> dict[str, Any]:
 def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any]) -> Body:
     """The body of numbers by their fields; texts: nodes, sensors, ground."""
     points = values.pop("points")
-    nodes = [Node(point=point, **_node(text)) for text, point in zip(texts["nodes"], points, strict=True)]
+    nodes = []
+    for text, point in zip(texts["nodes"], points, strict=True):
+        span = tuple(text["span"]) if "span" in text else None
+        nodes.append(Node(text["name"], text["kind"], tuple(text["components"]), point, span))
     if "flank.static" in values:
         values["flank.static"] = _all_offsets(values["flank.static"], values["flank.teeth"])
         values["flank.internal"] = bool(values["flank.internal"])
@@ -104,11 +107,6 @@ def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any])
         if own:
             values[part] = kind(**{field.rpartition(".")[2]: values.pop(field) for field in own})
     return Body(name=name, how=how, nodes=tuple(nodes), **values)
-
-
-def _node(text: Mapping[str, Any]) -> dict[str, Any]:
-    lists = {name: tuple(text[name]) for name in ("components", "span") if name in text}
-    return {"name": str(text["name"]), "kind": str(text["kind"])} | lists
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:

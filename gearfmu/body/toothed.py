@@ -29,7 +29,6 @@ from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.stagefile.forms.general import ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
 
-ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 _SHARES = ((0.1, 0.6), (0.6, 0.8), (0.8, 1.0))  # of the work: modes, static tables, error
 _OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
@@ -55,18 +54,17 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     report("mesh and finite elements", 0.0)
     made = _meshed_here(gear, report) if gear.imported is None else _meshed_elsewhere(gear, report)
     flank = flank_of(gear.teeth, tooth_flank(gear_shape(gear), gear), made.modes, made.statics)
-    node = Node("rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging", COMPONENTS, ORIGIN)
-    mass = symmetric_mass(made.inertia)
+    name, kind = "rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging"
     return Body(
         name=gear.name,
         how=How.of(gear, GEAR_METHOD, made.facts).since(started),
-        mass=mass,
+        mass=symmetric_mass(made.inertia),
         frequency=made.modes.frequency,
         damping_ratio=np.full(len(made.modes.frequency), gear.modal_damping),
-        nodes=(node,),
+        nodes=(Node(name, kind, COMPONENTS, np.zeros(3)),),
         rows=made.modes.bore_rows,
         static=made.statics.static_bb,
-        error=replace(made.error, ground=(node.name,)),
+        error=replace(made.error, ground=(name,)),
         flank=flank,
         spin=made.modes.spin,
         picture=made.picture,

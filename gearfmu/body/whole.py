@@ -17,7 +17,6 @@ from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.femesh.quality import mesh_report
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order, carrier_mesh_error, carrier_need
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Progress
@@ -29,7 +28,7 @@ from gearfmu.reduction.imported.housing import ImportedHousing, imported_housing
 from gearfmu.reduction.imported.superelement import superelement
 from gearfmu.reduction.memory import lower_counts, require_memory
 from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.moments import static_response
+from gearfmu.reduction.moments import Size, static_response
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 from gearfmu.stagefile.forms.planetary import CarrierBody

@@ -51,31 +51,30 @@ def carrier_full_order(carrier: CarrierBody, scale: float = 1.0) -> FullOrder:
 def carrier_need(carrier: CarrierBody) -> Need:
     """Memory that the reduction of a carrier meshed here takes, from its counts, the mesh beside it by which its error
     is known among it (`compared_scale`)."""
-    own, bolts = _sector_size(scaled_sector(carrier, 1.0))
-    size, vectors, cyclic = own * bolts, 3 * carrier.modes, cyclic_carrier(carrier)
-    need = parts_need(size, bolts, vectors) if cyclic else whole_need(size, vectors, CARRIER_FACTORS)
-    scale = max(1.0, compared_scale(carrier))
-    return Need(size, max(need.memory, _modes_memory(own * scale**3, 1 if cyclic else bolts)))
+    own, bolts = _sector_size(carrier)
+    size, vectors, scale = own * bolts, 3 * carrier.modes, max(1.0, compared_scale(carrier))
+    need = parts_need(size, bolts, vectors) if cyclic_carrier(carrier) else whole_need(size, vectors, CARRIER_FACTORS)
+    return Need(size, max(need.memory, _modes_memory(carrier, scale)))
 
 
 def compared_scale(carrier: CarrierBody) -> float:
     """Factor on all element counts of the mesh that the error of a carrier is known by: finer where that is no large
     one, else coarser."""
-    own, bolts = _sector_size(scaled_sector(carrier, 1.0))
-    finer = _modes_memory(own * FINER**3, 1 if cyclic_carrier(carrier) else bolts)
-    return FINER if finer < _LARGE else _COARSER
+    return FINER if _modes_memory(carrier, FINER) < _LARGE else _COARSER
 
 
-def _sector_size(sector: FeMesh) -> tuple[int, int]:
+def _sector_size(carrier: CarrierBody) -> tuple[int, int]:
     """Unknowns of a bolt's sector, and bolts."""
+    sector = scaled_sector(carrier, 1.0)
     return 3 * (len(sector.nodes) - len(sector.cut_plus)), sector.teeth
 
 
-def _modes_memory(sector_size: float, together: int) -> float:
-    """Bytes that the lowest modes take, by one sector or by all that must be taken together."""
-    if together == 1:
-        return modes_need(round(sector_size)).memory
-    return whole_need(round(sector_size * together), 0, 1).memory
+def _modes_memory(carrier: CarrierBody, scale: float) -> float:
+    """Bytes that the lowest modes take, by one sector or by all where they must be taken together."""
+    own, bolts = _sector_size(carrier)
+    if cyclic_carrier(carrier):
+        return modes_need(round(own * scale**3)).memory
+    return whole_need(round(own * scale**3 * bolts), 0, 1).memory
 
 
 def cyclic_carrier(carrier: CarrierBody) -> bool:

@@ -19,11 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import BAND, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.moments import Expansion
+from gearfmu.reduction.moments import BAND, Expansion, Growing, Size
 from gearfmu.reduction.oscillators import Oscillators, decoupled, oscillators
 
 LINES = 400

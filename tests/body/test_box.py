@@ -24,11 +24,10 @@ from gearfmu.body.whole import whole_body
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.surface import faces_within
 from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
-from gearfmu.reduction.imported.housing import ImportedHousing
-from gearfmu.reduction.imported.skin import Surface, enveloping_surface
+from gearfmu.reduction.imported.housing import ImportedHousing, Surface, enveloping_surface
+from gearfmu.reduction.moments import Size
 from gearfmu.reduction.transfer import Judging
 from gearfmu.sound import skin_of
 from gearfmu.stage.assembly.ground_part import ground_part

@@ -7,7 +7,7 @@ import pytest
 from blocks import STEEL, ring
 from small_gear import BETA, coarse
 
-from gearfmu.fem import hex20, refined
+from gearfmu.fem import hex20, low_fields
 from gearfmu.fem.factor import CondensedFactor
 from gearfmu.fem.harmonic import flexibilities
 from gearfmu.fem.lanczos import lowest_modes
@@ -27,15 +27,15 @@ def space_of(samples: tuple[int, ...]) -> LowFields:
 
 @pytest.mark.parametrize(
     ("near", "samples", "error"),
-    [(refined._NEAR, (0, 6), 1e-7), (0.0, (0, 3, 6), 1e-9), (1.0, (0, 3, 6), 1e-3)],
+    [(low_fields._NEAR, (0, 6), 1e-7), (0.0, (0, 3, 6), 1e-9), (1.0, (0, 3, 6), 1e-3)],
     ids=["from a poor space", "always Lanczos", "one step alone"],
 )
 def test_modes_are_those_of_each_nodal_diameter(
     near: float, samples: tuple[int, ...], error: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     low = space_of(samples)
-    monkeypatch.setattr(refined, "_NEAR", near)
-    found = {h.nodal_diameter: (h, s, x) for h, s, x in refined.refined_modes(low, dict.fromkeys(range(7), COUNT))}
+    monkeypatch.setattr(low_fields, "_NEAR", near)
+    found = {h.nodal_diameter: (h, s, x) for h, s, x in low_fields.refined_modes(low, dict.fromkeys(range(7), COUNT))}
     assert sorted(found) == list(range(7))
     for harmonic, squared, shapes in found.values():
         exact, _ = lowest_modes(harmonic, COUNT)

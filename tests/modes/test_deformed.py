@@ -42,7 +42,7 @@ def test_one_mode_is_the_shape_that_the_finite_elements_found() -> None:
     """Unfolded here over all teeth from complex sector shapes: displacement e^(iν2πj/z) φ on sector j, real part."""
     sector, drawn = small_gear.coarse(), gear_sector(small_gear.GEAR, small_gear.WIDTH, DRAWN)
     surface, z = outline(drawn, sector.mesh.nodes), small_gear.GEAR.z
-    modes = elastic_modes(sector, 40, None, surface.sample)
+    modes = elastic_modes(sector, 40, sample=surface.sample)
     teeth = SimpleNamespace(teeth=z, diameter=modes.nodal_diameter, part=modes.part)
     picture = SimpleNamespace(shapes=sector_shapes(surface, modes))
     body = SimpleNamespace(

@@ -10,10 +10,9 @@ from line_by_line import direct
 from small_body import mounted, small, tiny
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.moments import expansion_points, input_loads
+from gearfmu.reduction.moments import BAND, Size, expansion_points, input_loads
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 

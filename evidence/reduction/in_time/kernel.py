@@ -23,8 +23,8 @@ from evidence.reduction.in_time.scenes import GRID, Solid, gear, joint_rows, nom
 from evidence.reduction.in_time.tables import write_columns, write_rows
 from evidence.reduction.in_time.transient import Assembly, Joints, Member, Scheme, integrate
 from gearfmu.body import reduce_bodies
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import Size
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.stage.assembly.meshes import mesh_penalty
 from gearfmu.stagefile.forms.general import Stage

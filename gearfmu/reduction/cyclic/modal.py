@@ -19,8 +19,7 @@ import scipy.sparse as sp
 from gearfmu.fem.cyclic import SectorSpace
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.fem.low_fields import LowFields
-from gearfmu.fem.refined import refined_modes
+from gearfmu.fem.low_fields import LowFields, refined_modes
 from gearfmu.fem.spinning import leave_axial, turn_quarter
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.stored import ROW_BITS, stored

@@ -46,7 +46,8 @@ class SectorBody:
             bool(flank.base_helix_angle), self._held_faces.nodes if rigid_bore else None,
         )  # fmt: skip
         self.spaces = sector_spaces(sector)
-        self.load_matrix = self._all_loads()
+        loads = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
+        self.load_matrix = sp.csr_array(sp.vstack(loads))
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
@@ -72,10 +73,6 @@ class SectorBody:
     def patch_point(self) -> np.ndarray:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
         return self.mesh.nodes[self._held_nodes].mean(axis=0)
-
-    def _all_loads(self) -> sp.csr_array:
-        parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
-        return sp.csr_array(sp.vstack(parts))
 
     @property
     def profile_loads(self) -> int:
@@ -157,8 +154,9 @@ class SectorBody:
 
     def turned_sum(self, matrix: np.ndarray) -> np.ndarray:
         """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
-        total = np.zeros((6, 6))
-        for angle in 2 * np.pi * np.arange(self.teeth) / self.teeth:
-            turn = np.kron(np.eye(2), about_z(angle))
-            total += turn @ matrix @ turn.T
-        return total
+        return sum((turn @ matrix @ turn.T for turn in frames(self.teeth)), np.zeros((6, 6)))
+
+
+def frames(teeth: int) -> np.ndarray:
+    """(z, 6, 6): vectors of each tooth's frame in the frame of the gear, displacements and rotations."""
+    return np.array([np.kron(np.eye(2), about_z(angle)) for angle in 2 * np.pi * np.arange(teeth) / teeth])

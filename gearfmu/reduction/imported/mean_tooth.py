@@ -20,7 +20,6 @@ from operator import itemgetter
 import numpy as np
 import scipy.sparse as sp
 
-from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.frf import (
     FrfCase,
@@ -33,6 +32,7 @@ from gearfmu.reduction.cyclic.frf import (
     static_matrix,
 )
 from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, real_modes, untold
+from gearfmu.reduction.cyclic.sector import frames
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -63,7 +63,7 @@ class WholeGear:
     @property
     def inertia(self) -> np.ndarray:
         """Mass matrix (6, 6) of the rigid body about the origin, mean over the teeth."""
-        turns = _frames(self.teeth)
+        turns = frames(self.teeth)
         whole = self.body.rigid.T @ (self.body.mass @ self.body.rigid)
         return np.mean([turn.T @ whole @ turn for turn in turns], axis=0)
 
@@ -79,7 +79,7 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress =
     rows = np.stack(
         [
             np.vstack([r @ shapes, turn.T @ (gear.bore_rows @ shapes)])
-            for r, turn in zip(gear.flank_rows, _frames(gear.teeth), strict=True)
+            for r, turn in zip(gear.flank_rows, frames(gear.teeth), strict=True)
         ]
     )
     flank = rows.shape[1] - 6
@@ -129,7 +129,7 @@ def _as_modes(found: list[_Found], gear: WholeGear, count: int) -> Modes:
         read = {"flank_rows": flank, "bore_rows": amplitude[len(odd) :]}
         patterns.append(Pattern(squared, nu, parity, read))
     columns, _ = real_modes(patterns, count)
-    return Modes(patch_rows=np.zeros((0, len(columns["part"]))), **columns)
+    return Modes(patch_rows=np.zeros((0, len(columns["part"]))), spin=None, **columns)
 
 
 def _turned(amplitude: np.ndarray, flank: int) -> np.ndarray:
@@ -157,7 +157,7 @@ def mean_statics(
     """Static tables of the mean tooth, and how far teeth are from it: largest relative deviation of the compliance
     under the uniform load at mid flank. Pictures: displacement (p, N) under loads on tooth 0."""
     z, points = gear.teeth, gear.points
-    size, turns = gear.flank_rows[0].shape[0], _frames(z)
+    size, turns = gear.flank_rows[0].shape[0], frames(z)
     bore = space.flexibility(gear.bore_rows.T.toarray())
     tables, fb, pictures, mid = np.zeros((z, size, size)), np.zeros((size, 6)), np.zeros((0, space.size)), []
     place = (len(points.rolls) // 2) * points.functions
@@ -199,8 +199,3 @@ def mean_frf(gear: WholeGear, space: Elastic, modes: Modes, statics: Statics, ca
     rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
     rigid = rigid_compliance(gear.flank_rows[0][inputs] @ gear.body.rigid, gear.inertia) * weight
     return compare(full, Series(rows, modes.frequency, [static]), rigid, case)
-
-
-def _frames(teeth: int) -> np.ndarray:
-    """(z, 6, 6): vectors of each tooth's frame in the frame of the gear, displacements and rotations."""
-    return np.array([np.kron(np.eye(2), about_z(angle)) for angle in 2 * np.pi * np.arange(teeth) / teeth])

@@ -25,8 +25,7 @@ from gearfmu.fem.nastran_matrices import Labelled
 from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.imported import read_surface
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
-from gearfmu.reduction.imported.housing import ImportedHousing
-from gearfmu.reduction.imported.skin import Surface, enclosed
+from gearfmu.reduction.imported.housing import ImportedHousing, Surface, enclosed
 from gearfmu.stagefile.tables.housing import HousingBody, HousingReducedSpec
 
 MOST = 3000  # unknowns: matrices are full

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods import craig_bampton, krylov, modal, rubin
+from gearfmu.reduction.moments import Size
 
 Method = Callable[[FullOrder, Size], np.ndarray]
 METHODS: dict[str, Method] = {

@@ -13,10 +13,9 @@ import numpy as np
 import scipy.linalg as sl
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Growing, Size
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import input_loads, static_response
+from gearfmu.reduction.moments import Growing, Size, input_loads, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> np.ndarray:

@@ -12,10 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion, expansion_points
+from gearfmu.reduction.moments import Expansion, Growing, Size, expansion_points
 
 _POINTS = 3  # expansion points; more blocks than that become higher powers at the same points
 

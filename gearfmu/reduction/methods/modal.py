@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.moments import Size
 
 
 def reduce(body: FullOrder, size: Size) -> np.ndarray:

@@ -13,10 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import static_response
+from gearfmu.reduction.moments import Growing, Size, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> np.ndarray:
