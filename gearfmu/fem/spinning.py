@@ -16,8 +16,6 @@ import scipy.sparse as sp
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import SectorSpace
 
-ACROSS = np.array([1.0, 1.0, 0.0])
-
 
 def turn_quarter(fields: np.ndarray) -> np.ndarray:
     """e_z × u of nodal vectors (3N, k)."""
@@ -27,7 +25,7 @@ def turn_quarter(fields: np.ndarray) -> np.ndarray:
 
 def leave_axial(fields: np.ndarray) -> np.ndarray:
     """Nodal vectors (3N, k) without their component along z."""
-    return fields * np.tile(ACROSS, len(fields) // 3).reshape(-1, *[1] * (fields.ndim - 1))
+    return fields * np.tile([1.0, 1.0, 0.0], len(fields) // 3).reshape(-1, *[1] * (fields.ndim - 1))
 
 
 def growth(space: SectorSpace, nodes: np.ndarray, mass: sp.csr_array) -> np.ndarray:
