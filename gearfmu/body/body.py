@@ -18,11 +18,10 @@ import scipy
 
 from gearfmu.body.layout import POINTS, body_problems
 from gearfmu.errors import BodyError
-from gearfmu.fem.coupling import master_rows
+from gearfmu.files import PICTURE_BITS, ROW_BITS, TABLE_BITS, entries, stored
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Spin
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.reduction.stored import PICTURE_BITS, ROW_BITS, TABLE_BITS, entries, stored
 from gearfmu.stagefile.forms.general import Reduced
 from gearfmu.stagefile.stored import ALGORITHMS, body_hash
 
@@ -102,7 +101,15 @@ class Node:
     @property
     def rigid_rows(self) -> np.ndarray:
         """(k, 6): rigid motion about the origin → components."""
-        return master_rows(self.point)[[COMPONENTS.index(component) for component in self.components]]
+        return rigid_rows(self.point)[[COMPONENTS.index(component) for component in self.components]]
+
+
+def rigid_rows(point: np.ndarray) -> np.ndarray:
+    """(6, 6): rigid motion about the origin → motion of a point (3,) m."""
+    x, y, z = point
+    rows = np.eye(6)
+    rows[0, 4:], rows[1, 3], rows[1, 5], rows[2, 3:5] = (z, -y), -z, x, (y, -x)
+    return rows
 
 
 @dataclass(frozen=True)
@@ -122,7 +129,7 @@ class Sensors:
     @property
     def rigid_rows(self) -> np.ndarray:
         """(3S, 6): rigid motion about the origin → displacement of each."""
-        return np.vstack([master_rows(point)[:3] for point in self.points])
+        return np.vstack([rigid_rows(point)[:3] for point in self.points])
 
 
 @dataclass(frozen=True)

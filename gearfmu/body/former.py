@@ -11,8 +11,8 @@ import numpy as np
 
 from gearfmu.body.body import ENTRIES
 from gearfmu.body.layout import read_entry
+from gearfmu.files import Entry
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.reduction.stored import Entry
 
 FORMATS = (("gearfmu-body", 3), ("gearfmu-interface-body", 1))
 GEAR_METHOD = "free eigenmodes and static residual"

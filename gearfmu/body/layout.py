@@ -9,7 +9,7 @@ kind. Their cosine transform, the coefficients of Chebyshev polynomials, falls o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.stored import Entry, entries
+from gearfmu.files import ENTRY, Entry
 
 if TYPE_CHECKING:
     from gearfmu.body.body import Body, Flank
@@ -46,9 +46,11 @@ def entries_of(body: Body) -> tuple[Entry, ...]:
 
 def _there(part: Any, path: str = "") -> Iterator[Entry]:
     """The stored fields that are not None of a part of a body, which stands at `path`, and of the parts of that."""
-    yield from (entry for entry in entries(part, path) if value_of(part, entry.field.removeprefix(path)) is not None)
     for own in fields(part):
-        if is_dataclass(value := getattr(part, own.name)):
+        value = getattr(part, own.name)
+        if value is not None and ENTRY in own.metadata:
+            yield replace(own.metadata[ENTRY], field=f"{path}{own.name}")
+        elif is_dataclass(value):
             yield from _there(value, f"{path}{own.name}.")
 
 

@@ -88,9 +88,10 @@ def pictured_rolls(points: Points) -> np.ndarray:
 
 def sector_picture(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Picture:
     """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
-    points, quads = whole_surface(sector, body.teeth)
+    shapes, rolls = sector_shapes(sector, modes), pictured_rolls(body.points)
     loads = np.array([unfold_sectors(picture, sector) for picture in statics.pictures], "f4")
-    return Picture(points.astype("f4"), quads, loads, pictured_rolls(body.points), sector_shapes(sector, modes))
+    points, quads = whole_surface(sector, body.teeth)
+    return Picture(points.astype("f4"), quads, loads, rolls, shapes)
 
 
 def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:

@@ -23,8 +23,7 @@ from gearfmu.body.layout import (
     write_entry,
 )
 from gearfmu.errors import BodyError
-from gearfmu.files import Format, reading, writing
-from gearfmu.reduction.stored import Entry, entries
+from gearfmu.files import Entry, Format, entries, reading, writing
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms

@@ -18,7 +18,7 @@ from gearfmu.femesh.quality import mesh_report
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, tooth_flank
 from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, frf_error
-from gearfmu.reduction.cyclic.modal import Modes, Progress, elastic_modes, untold
+from gearfmu.reduction.cyclic.modal import Modes, Progress, elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.elastic import Elastic
@@ -74,7 +74,7 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
 
 def named(progress: Progress | None, name: str) -> Progress:
     """Progress of the body `name`, also where no one asks for it."""
-    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else untold
+    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
 
 
 def _meshed_here(gear: ToothedBody, report: Progress) -> Parts:

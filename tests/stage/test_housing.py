@@ -11,9 +11,8 @@ import pytest
 from housings import housing_of
 
 from gearfmu.body import load_bodies
-from gearfmu.body.body import Body, Node
+from gearfmu.body.body import Body, Node, rigid_rows
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.fem.coupling import master_rows
 from gearfmu.modes.housing import placed_housing
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage import StageModel, Steady, assemble, simulate
@@ -201,7 +200,7 @@ def test_a_bearing_beside_the_middle_of_its_seat_acts_with_a_rigid_arm() -> None
     body, arms, nodes = drawn(), np.eye(len(drawn().rows)), list(drawn().nodes)
     for k, node in enumerate(body.nodes):
         if node.name.startswith(("input", "output")):
-            arms[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = master_rows(offset)
+            arms[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = rigid_rows(offset)
             nodes[k] = replace(node, point=node.point + offset)
     told = {"nodes": tuple(nodes), "rows": arms @ body.rows, "static": arms @ body.static @ arms.T}
     assert body.sensors is not None

@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearfmu.fem.harmonic import Harmonic, flexibilities
+from gearfmu.files import stored
 from gearfmu.reduction.cyclic.modal import Modes, Progress, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
-from gearfmu.reduction.stored import stored
 
 BAND = (50.0, 10e3)
 TRUSTED_ERROR = 0.01

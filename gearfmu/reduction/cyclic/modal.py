@@ -21,8 +21,8 @@ from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.low_fields import LowFields, refined_modes
 from gearfmu.fem.spinning import leave_axial, turn_quarter
+from gearfmu.files import ROW_BITS, stored
 from gearfmu.reduction.cyclic.sector import SectorBody
-from gearfmu.reduction.stored import ROW_BITS, stored
 
 _SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
 _SAMPLED = 1e-4  # residual of their modes

@@ -14,7 +14,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.geometry.plane import about_z
+from gearfmu.geometry.plane import frames
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
@@ -155,8 +155,3 @@ class SectorBody:
     def turned_sum(self, matrix: np.ndarray) -> np.ndarray:
         """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
         return sum((turn @ matrix @ turn.T for turn in frames(self.teeth)), np.zeros((6, 6)))
-
-
-def frames(teeth: int) -> np.ndarray:
-    """(z, 6, 6): vectors of each tooth's frame in the frame of the gear, displacements and rotations."""
-    return np.array([np.kron(np.eye(2), about_z(angle)) for angle in 2 * np.pi * np.arange(teeth) / teeth])

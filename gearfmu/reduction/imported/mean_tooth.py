@@ -20,6 +20,7 @@ from operator import itemgetter
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.geometry.plane import frames
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.frf import (
     FrfCase,
@@ -32,7 +33,6 @@ from gearfmu.reduction.cyclic.frf import (
     static_matrix,
 )
 from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, real_modes, untold
-from gearfmu.reduction.cyclic.sector import frames
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfmu.body.body import Body, Node, Sensors
+from gearfmu.body.body import Body, Node, Sensors, rigid_rows
 from gearfmu.errors import ModelError
-from gearfmu.fem.coupling import master_rows
 from gearfmu.reduction.full_order import COMPONENTS
 from gearfmu.stage.assembly.ground_part import GroundPart, ground_part
 from gearfmu.stage.assembly.groups import Group
@@ -84,7 +83,7 @@ def housing_part(body: Body, found: list[Meeting], dynamic_to: float) -> GroundP
     names, arms = [node.name for node in body.nodes], np.zeros((6 * len(found), len(body.rows)))
     for k, meeting in enumerate(found):
         own = names.index(meeting.node)
-        arms[6 * k : 6 * k + 6, 6 * own : 6 * own + 6] = master_rows(meeting.point - body.nodes[own].point)
+        arms[6 * k : 6 * k + 6, 6 * own : 6 * own + 6] = rigid_rows(meeting.point - body.nodes[own].point)
     n = int(np.searchsorted(body.frequency, dynamic_to, "right"))
     moved = replace(
         body,
