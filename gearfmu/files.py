@@ -3,7 +3,9 @@ their bytes.
 
 The seal lies in the user block, 512 bytes before the HDF5 part that HDF5 leaves to its users, and is checked before the
 HDF5 library reads anything. Its own checksums cover no more than the data of a chunk: from a damaged index chunks
-vanish, and read as zeros; damaged heaps can keep the library busy for ever."""
+vanish, and read as zeros; damaged heaps can keep the library busy for ever.
+
+What a file of a body holds is said once, at the fields of the classes that hold it (`stored`): shape, unit, meaning."""
 
 from __future__ import annotations
 
@@ -13,9 +15,9 @@ import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import h5py
 
@@ -69,7 +71,49 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 USER_BLOCK = 512  # bytes, the smallest that HDF5 allows
 _MARK = b"gearfmu "
+TABLE_BITS = 23  # of compliances; what this costs a model: docs/decisions/bodies.md
+ROW_BITS = 21  # of rows in modes and of the coupling of modes
+PICTURE_BITS = 7
+ENTRY = "entry"
 _DAMAGE = (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One array of a body and dataset of its file.
+
+    shape: in symbols or numbers. kind: in memory, "f8" doubles, "f4" singles (pictures), "i8" integers. bits: 0, the
+    file holds the numbers themselves; else whole multiples of a step, which the largest number has fewer than 2^bits
+    of, and along the roll points (R) those of its cosine transform. each: a step for every index of the first axis
+    instead of one for all. optional: None where it was not made. field: attribute path in `body.Body`.
+    """
+
+    shape: tuple[str | int, ...]
+    unit: str
+    meaning: str
+    kind: str = "f8"
+    bits: int = 0
+    each: bool = False
+    optional: bool = False
+    field: str = ""
+
+    @property
+    def path(self) -> str:
+        """Name of the dataset."""
+        return self.field.replace(".", "/")
+
+
+def stored(shape: tuple[str | int, ...], unit: str, meaning: str, kind: str = "f8", **how: Any) -> Any:
+    """A field of a dataclass that is an `Entry`; an optional one is None unless it is given."""
+    entry = Entry(shape, unit, meaning, kind, **how)
+    return field(default=None, metadata={ENTRY: entry}) if entry.optional else field(metadata={ENTRY: entry})
+
+
+def entries(kind: Any, path: str = "") -> Iterator[Entry]:
+    """The stored fields of a dataclass, or of an object of it, that stands at `path` ("flank.") in a body."""
+    for own in fields(kind):
+        if ENTRY in own.metadata:
+            yield replace(own.metadata[ENTRY], field=f"{path}{own.name}")
 
 
 @dataclass(frozen=True)

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from typing_extensions import Unpack
 
 from gearfmu.api.models import PathLike, loaded_stage
 from gearfmu.api.settings import Quantity, checked
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.whole import housing_order
 from gearfmu.errors import Problem, SpecError
-from gearfmu.reduction.basis import BAND, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.judged import Judgement, judged
 from gearfmu.reduction.methods import METHODS
-from gearfmu.reduction.toothed import gear_full_order, ring_full_order
-from gearfmu.reduction.transfer import LINES
+from gearfmu.reduction.moments import BAND, Size
+from gearfmu.reduction.toothed import toothed_full_order
+from gearfmu.reduction.transfer import LINES, Judgement, judged
 from gearfmu.reduction.transfer import Judging as Lines
-from gearfmu.stagefile.forms.general import GearBody, Stage
+from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.tables.housing import HousingBody
 
@@ -71,7 +69,6 @@ def _entry(text: str, size: int, band: tuple[float, float]) -> tuple[str, Size]:
 
 def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     """The finite elements of a body, gear, ring or carrier."""
-    factor: dict[str, Any] = {} if scale is None else {"scale": scale}
     if (table := spec.by_file.get(body)) is None:
         remedy = f"no body '{body}'; the stage has {', '.join(spec.files)}"
         raise SpecError([Problem(str(spec.source), "body", body, remedy)])
@@ -82,9 +79,5 @@ def _full_order(spec: Stage, body: str, scale: float | None) -> FullOrder:
     if isinstance(table, HousingBody):
         return housing_order(table).full
     if isinstance(table, CarrierBody):
-        return carrier_full_order(table, **factor)
-    if isinstance(table, GearBody):
-        return gear_full_order(table, **factor) if table.imported is None else imported_full_order(table)
-    if table.imported is not None:
-        return imported_full_order(table, spec.mounts)
-    return ring_full_order(table, spec.mounts, **factor)
+        return carrier_full_order(table, 1.0 if scale is None else scale)
+    return toothed_full_order(table, spec.mounts, scale)

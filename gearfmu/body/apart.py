@@ -14,16 +14,15 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import BodyError
+from gearfmu.reduction.cyclic.modal import Progress
 from gearfmu.reduction.memory import Need, available_memory
 from gearfmu.stagefile.forms.general import Stage
 
-Progress = Callable[[str, float], None]  # what is being done, share done of it
 Job = tuple[Stage, str, Path]  # a stage, the name of the gear, the file of its body
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -33,20 +32,12 @@ _AT_ONCE = 2  # gears in processes of their own
 _WORTH = 8000  # unknowns of a sector from which on that is faster
 
 
-@dataclass(frozen=True)
-class Work:
-    """What the reduction of a gear takes: memory for one of its sectors, and how many sectors it has."""
-
-    need: Need
-    sectors: int
-
-
-def side_by_side(jobs: Sequence[tuple[Work | None, Job]]) -> list[Job]:
+def side_by_side(jobs: Sequence[tuple[Need | None, Job]]) -> list[Job]:
     """The jobs that are worth processes of their own, the longest first; none where processors or memory are for one
-    only. A job whose work is not known is none of them."""
-    found = [(work, job) for work, job in jobs if work is not None and work.need.unknowns > _WORTH]
-    found.sort(key=lambda entry: -entry[0].need.unknowns * entry[0].sectors)
-    most = sum(sorted((work.need.memory for work, _ in found), reverse=True)[:_AT_ONCE])
+    only. A job whose need is not known is none of them."""
+    found = [(need, job) for need, job in jobs if need is not None and need.unknowns > _WORTH]
+    found.sort(key=lambda entry: -entry[0].unknowns * entry[0].sectors)
+    most = sum(sorted((need.memory for need, _ in found), reverse=True)[:_AT_ONCE])
     there = available_memory()
     if len(found) < 2 or (os.cpu_count() or 1) < 2 or (there is not None and most > there):
         return []

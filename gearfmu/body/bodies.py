@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from gearfmu.body.apart import Progress, Work, reduce_apart_together, side_by_side
+from gearfmu.body.apart import reduce_apart_together, side_by_side
 from gearfmu.body.body import Body
 from gearfmu.body.layout import FORMAT_VERSION
 from gearfmu.body.sound import make_radiation, sound_path
 from gearfmu.body.store import load_body, save_body
-from gearfmu.body.toothed import gear_work, named, reduced_gear
+from gearfmu.body.toothed import named, reduced_gear
 from gearfmu.body.whole import reduced_carrier, reduced_housing
 from gearfmu.errors import BodyError, MeshError
+from gearfmu.femesh.sector import gear_sector
 from gearfmu.files import format_of
 from gearfmu.reduction.carrier import carrier_need
-from gearfmu.reduction.memory import Need
+from gearfmu.reduction.cyclic.modal import Progress
+from gearfmu.reduction.memory import Need, gear_need
 from gearfmu.stagefile.former import former_hash
 from gearfmu.stagefile.forms.general import Reduced, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody
+from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.reading.files import model_folder
 from gearfmu.stagefile.stored import ALGORITHMS, expected_hash
 from gearfmu.stagefile.tables.housing import HousingBody
@@ -67,8 +69,9 @@ def reduce_bodies(
         if body is not None and format_of(path := body_path(stage, name, folder))[1] != FORMAT_VERSION:
             save_body(body, path)
     wanted = [name for name in names if stored.get(name) is None]
-    works, paths = _works(stage, wanted), {name: body_path(stage, name, folder) for name in wanted}
-    if apart := side_by_side([(works.get(name), (stage, name, paths[name])) for name in wanted]):
+    paths = {name: body_path(stage, name, folder) for name in wanted}
+    gears = {name: table for name in wanted if isinstance(table := stage.by_file[name], ToothedBody)}
+    if apart := side_by_side([(_need(table), (stage, name, paths[name])) for name, table in gears.items()]):
         reduce_apart_together(apart, progress)
     together = {name for _, name, _ in apart}
     for name in wanted:
@@ -117,16 +120,16 @@ def make(table: Reduced, progress: Progress | None = None) -> Body:
 def body_needs(stage: Stage) -> dict[str, Need]:
     """Memory that the reduction of every body takes, estimated from its mesh; bodies meshed elsewhere are not among
     them. Raises MeshError."""
-    own = {name: table for name, table in stage.by_file.items() if table.imported is None}
-    carriers = {name: carrier_need(table) for name, table in own.items() if isinstance(table, CarrierBody)}
-    return {name: work.need for name, work in _works(stage, stage.files).items()} | carriers
+    needs = {name: _need(table) for name, table in stage.by_file.items()}
+    return {name: need for name, need in needs.items() if need is not None}
 
 
-def _works(stage: Stage, names: Sequence[str]) -> dict[str, Work]:
-    """What the reduction of those gears takes that are meshed here."""
-    chosen = {name: stage.by_file[name] for name in names}
-    works = {name: gear_work(table) for name, table in chosen.items() if isinstance(table, ToothedBody)}
-    return {name: work for name, work in works.items() if work is not None}
+def _need(table: Reduced) -> Need | None:
+    if table.imported is not None or isinstance(table, HousingBody):
+        return None
+    if isinstance(table, CarrierBody):
+        return carrier_need(table)
+    return gear_need(gear_sector(gear_shape(table), table.face_width, table.body.mesh), table.body)
 
 
 def _current(stage: Stage, name: str, folder: Folder) -> Body | None:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from gearfmu.body.layout import body_problems
+from gearfmu.body.layout import POINTS, body_problems
 from gearfmu.errors import BodyError
+from gearfmu.files import PICTURE_BITS, ROW_BITS, TABLE_BITS, entries, stored
 from gearfmu.reduction.cyclic.frf import FrfError
 from gearfmu.reduction.cyclic.modal import Spin
 from gearfmu.reduction.full_order import COMPONENTS
@@ -27,6 +28,7 @@ from gearfmu.stagefile.stored import ALGORITHMS, body_hash
 if TYPE_CHECKING:
     from gearfmu.body.pictures import Outline
 
+TABLE, COUPLED = (2, 2, "R", "R", "A", "A"), "kg-1/2, m-1.kg-1/2"
 _FORMER = {  # names of earlier versions, told by the AttributeError
     "input_hash": "how.hash", "algorithm_version": "how.algorithm", "method": "how.method", "material": "how.material",
     "mesh": "how.mesh", "provenance": "how.provenance", "frf": "error", "display": "picture", "ground": "error.ground",
@@ -112,14 +114,17 @@ def rigid_rows(point: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Sensors:
-    """S points that are read and never loaded. names; points (S, 3) m; rows (3S, n), kg^-½: displacement x, y, z of
-    each; static (3S, m), m/N and 1/N: per unit load on the nodes, None where that is not kept. A ring has one: the
-    mean of the patch of its rim that belongs to sector 0, in that sector's frame."""
+    """S points that are read and never loaded. A ring has one: the mean of the patch of its rim that belongs to sector
+    0, in that sector's frame."""
 
     names: tuple[str, ...]
-    points: np.ndarray
-    rows: np.ndarray
-    static: np.ndarray | None = None
+    points: np.ndarray = stored(
+        ("S", 3), "m", "where each sensor lies; of a ring: middle of the rim's patch of sector 0"
+    )
+    rows: np.ndarray = stored(("3S", "n"), "kg-1/2", "displacement x, y, z of each in the modes")
+    static: np.ndarray | None = stored(
+        ("3S", "m"), "m/N, 1/N", "displacement of each sensor per unit load on the nodes", optional=True
+    )
 
     @property
     def rigid_rows(self) -> np.ndarray:
@@ -129,13 +134,18 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Skin:
-    """A closed surface that radiates: points (P, 3) m; faces (F, 4), normals outward, a triangle repeats its last
-    point; modes (6 + n, P, 3): displacement in rigid motion about the origin (1 and m), then in the oscillators,
-    kg^-½."""
+    """A closed surface that radiates."""
 
-    points: np.ndarray
-    faces: np.ndarray
-    modes: np.ndarray
+    points: np.ndarray = stored(("V", 3), "m", "points of the closed outer surface", "f4")
+    faces: np.ndarray = stored(("W", 4), "", "its faces, normals outward; a triangle repeats its last point", "i8")
+    modes: np.ndarray = stored(
+        ("6+n", "V", 3),
+        "1, m, kg-1/2",
+        "displacement of the points: rigid motion x, y, z, rx, ry, rz about the origin, then the modes",
+        "f4",
+        bits=PICTURE_BITS,
+        each=True,
+    )
 
     @property
     def skin_modes(self) -> np.ndarray:
@@ -145,27 +155,34 @@ class Skin:
 
 @dataclass(frozen=True)
 class Picture:
-    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; loads (p, P, 3):
-    displacement under a unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m; shapes: a sector in all
-    modes, None where none was made."""
+    """Pictures of a gear. loads: at roll `load_roll`; shapes: a sector in all modes, None where none was made. The
+    surface of a gear with shapes is that of its sectors and not stored."""
 
-    points: np.ndarray
-    quads: np.ndarray
-    loads: np.ndarray
-    load_roll: np.ndarray
+    points: np.ndarray = stored(("P", 3), "m", "surface points of the whole gear", "f4")
+    quads: np.ndarray = stored(("Q", 4), "", "quadrilaterals of the surface, point numbers", "i8")
+    loads: np.ndarray = stored(
+        ("L", "P", 3),
+        "m/N",
+        "displacement of the surface of the whole gear, unit load on flank 0, tooth 0",
+        "f4",
+        bits=PICTURE_BITS,
+        each=True,
+    )
+    load_roll: np.ndarray = stored(("L",), "m", "roll point of these loads")
     shapes: Shapes | None = None
 
 
 @dataclass(frozen=True)
 class Shapes:
-    """Drawn surface of one sector and how it moves in every mode of the gear, float32. points (S, 3) m; quads (T, 4)
-    numbers of its points, normals outward, and ahead (T, 4): 1 where the point meant is that of the next sector; modes
-    (n, S, 3), kg^-½: displacement on sector 0, of the second mode of a pair its own."""
+    """Drawn surface of one sector, normals outward, and how it moves in every mode of the gear, of the second mode of a
+    pair its own."""
 
-    points: np.ndarray
-    quads: np.ndarray
-    ahead: np.ndarray
-    modes: np.ndarray
+    points: np.ndarray = stored(("T", 3), "m", "surface points of sector 0", "f4")
+    quads: np.ndarray = stored(("U", 4), "", "quadrilaterals of its surface, point numbers", "i8")
+    ahead: np.ndarray = stored(("U", 4), "", "1: the point of that number in the next sector", "i8")
+    modes: np.ndarray = stored(
+        ("n", "T", 3), "kg-1/2", "displacement on sector 0 in every mode", "f4", bits=PICTURE_BITS, each=True
+    )
 
 
 @dataclass(frozen=True)
@@ -180,42 +197,63 @@ class Exact:
 
 @dataclass(frozen=True)
 class Tangent:
-    """Displacement along the profile, towards growing roll: what friction loads and reads.
+    """Displacement along the profile, towards growing roll: what friction loads and reads."""
 
-    rows (2, R, A, n), kg^-½, like those of the flank. static_nt, static_tt (2, 2, R, R, A, A), m/N: along the normal
-    and along the profile at (tooth 0, flank f, roll i, function a) per load along the profile at (tooth 0, g, j, b).
-    """
-
-    rows: np.ndarray
-    static_nt: np.ndarray
-    static_tt: np.ndarray
+    rows: np.ndarray = stored(
+        (2, "R", "A", "n"),
+        "kg-1/2",
+        "tooth 0: like flank/rows, displacement along the profile towards growing roll",
+        bits=ROW_BITS,
+    )
+    static_nt: np.ndarray = stored(
+        TABLE,
+        "m/N",
+        "compliance [f, g, i, j, a, b] of tooth 0 alone: flank f, roll i, function a along the outward normal under "
+        "the load along the profile at flank g, roll j, function b",
+        bits=TABLE_BITS,
+    )
+    static_tt: np.ndarray = stored(TABLE, "m/N", "the same, displacement along the profile", bits=TABLE_BITS)
 
 
 @dataclass(frozen=True)
 class Flank:
-    """Teeth of a body of equal sectors; shapes, units and meaning of every field: `layout.FLANK`.
+    """Teeth of a body of equal sectors.
 
-    diameter, part, parity (n,): the modes as patterns round the axis. rows (2, R, A, n), kg^-½; static (2, 2, M, R, R,
-    A, A), m/N; node (2, R, A, 6): flanks under loads of the node. M is z, or 2K + 1 where only the tooth offsets −K …
-    K are kept: offset m stands at m mod M. internal: a ring, whose index k counts tooth spaces, normals pointing into
-    them, and whose node is the rim. beta_b: rad, positive for a right-handed gear. tangent: None of a mean tooth.
+    diameter, part, parity: the modes as patterns round the axis. M of `static` is z, or 2K + 1 where only the tooth
+    offsets −K … K are kept: offset m stands at m mod M. internal: normals point into the tooth spaces, and the node is
+    the rim. tangent: None of a mean tooth.
     """
 
-    teeth: int
-    internal: bool
-    r_b: float
-    psi_b: float
-    beta_b: float
-    face_width: float
-    strip_half_width: float
-    roll_range: np.ndarray
-    roll: np.ndarray
-    diameter: np.ndarray
-    part: np.ndarray
-    parity: np.ndarray
-    rows: np.ndarray
-    static: np.ndarray
-    node: np.ndarray
+    teeth: int = stored((), "", "number of teeth z, equal sectors of the body", "i8")
+    internal: bool = stored((), "", "1: a ring, whose index counts tooth spaces", "i8")
+    r_b: float = stored((), "m", "base radius")
+    psi_b: float = stored((), "rad", "half tooth-thickness angle at the base circle, nominal")
+    beta_b: float = stored((), "rad", "base helix angle, positive for a right-handed gear: z turns by z tan β_b / r_b")
+    face_width: float = stored((), "m", "face width b; z runs from −b/2 to b/2")
+    strip_half_width: float = stored((), "m", "half-width of the load strip in arc length along the flank")
+    roll_range: np.ndarray = stored((2,), "m", "roll of form and tip point: the Chebyshev interval")
+    roll: np.ndarray = stored(("R",), "m", "roll points: Chebyshev points of the first kind, ascending")
+    diameter: np.ndarray = stored(("n",), "", "nodal diameter ν of the modes", "i8")
+    part: np.ndarray = stored(("n",), "", "0 single, 1 first (real) and 2 second (imaginary) part of a pair", "i8")
+    parity: np.ndarray = stored(("n",), "", "+1 symmetric about mid-width, −1 antisymmetric, 0 neither", "i8")
+    rows: np.ndarray = stored(
+        (2, "R", "A", "n"),
+        "kg-1/2",
+        "tooth 0: load-weighted mean displacement along the outward normal; "
+        "flank (0: sg = +1), roll point, width function, mode",
+        bits=ROW_BITS,
+    )
+    static: np.ndarray = stored(
+        (2, 2, "M", "R", "R", "A", "A"),
+        "m/N",
+        "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, flank g, "
+        "roll j, function b. The file holds the offsets m = 0 … 3, or 0 … z/2 of a small gear, the others follow: "
+        "C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+        bits=TABLE_BITS,
+    )
+    node: np.ndarray = stored(
+        (2, "R", "A", 6), "m/N, 1/N", "flank rows of tooth 0 per unit force x, y, z and moment x, y, z on the node"
+    )
     tangent: Tangent | None = None
 
     @property
@@ -236,22 +274,22 @@ class Flank:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A free body: n oscillators, m rows at its nodes; SI; shapes, units and meaning of the arrays: `layout.ENTRIES`.
+    """A free body: n oscillators, m rows at its nodes, in the order of `nodes`; SI.
 
-    mass (6, 6) of rigid motion about the origin, kg, kg·m, kg·m²; frequency (n,) Hz, ascending; damping_ratio (n,);
-    nodes in the order of rows (m, n), kg^-½ and kg^-½/m; static (m, m), m/N …: compliance of the free body, inertia
-    relief, mean-axis gauge; error: how well it follows its finite elements, None where nothing was compared; spin: None
-    turns as if rigid; picture: None is not drawn. Raises BodyError naming every field that cannot be.
+    error: how well it follows its finite elements, None where nothing was compared; spin: None turns as if rigid;
+    picture: None is not drawn. Raises BodyError naming every field that cannot be.
     """
 
     name: str
     how: How
-    mass: np.ndarray
-    frequency: np.ndarray
-    damping_ratio: np.ndarray
     nodes: tuple[Node, ...]
-    rows: np.ndarray
-    static: np.ndarray
+    mass: np.ndarray = stored((6, 6), "kg, kg.m, kg.m2", "mass matrix of rigid motion about the origin")
+    frequency: np.ndarray = stored(("n",), "Hz", "natural frequencies of the free body, ascending, none rigid")
+    damping_ratio: np.ndarray = stored(("n",), "", "modal damping ratio")
+    rows: np.ndarray = stored(("m", "n"), COUPLED, "displacement and rotation of the nodes in the modes")
+    static: np.ndarray = stored(
+        ("m", "m"), "m/N, 1/N, 1/(N.m)", "compliance of the nodes; inertia relief, mean-axis gauge"
+    )
     error: FrfError | None = None
     flank: Flank | None = None
     spin: Spin | None = None
@@ -305,6 +343,19 @@ class Body:
         """The flank of a body that has one."""
         assert self.flank is not None, f"body '{self.name}' has no teeth"
         return self.flank
+
+
+PARTS: dict[str, type] = {  # classes by their path in a body, inner ones first
+    "flank.tangent": Tangent,
+    "picture.shapes": Shapes,
+    "error": FrfError,
+    "flank": Flank,
+    "spin": Spin,
+    "picture": Picture,
+    "sensors": Sensors,
+    "skin": Skin,
+}
+ENTRIES = (POINTS, *entries(Body), *(entry for path, kind in PARTS.items() for entry in entries(kind, f"{path}.")))
 
 
 def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,20 +9,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearfmu.body.layout import (
-    BODY,
-    CUT,
-    ERROR,
-    FLANK,
-    PICTURE,
-    SENSORS,
-    SHAPES,
-    SPIN,
-    SURFACE,
-    TANGENT,
-    Entry,
-    read_entry,
-)
+from gearfmu.body.body import ENTRIES
+from gearfmu.body.layout import read_entry
+from gearfmu.files import Entry
 from gearfmu.reduction.full_order import COMPONENTS
 
 FORMATS = (("gearfmu-body", 3), ("gearfmu-interface-body", 1))
@@ -42,8 +31,6 @@ _WHOLE = {
     "damping_ratio": "modes/damping_ratio", "rows": "modes/rows", "static": "static/c",
 }  # fmt: skip
 _PARTS = (("flank.tangent", "tangent"), ("picture.shapes", "shapes"), ("picture", "display"), ("error", "frf"))
-_OPTIONAL = {"tangent": TANGENT, "shapes": SHAPES, "surface": SURFACE, "spin": SPIN, "rim": SENSORS, "helix": ()}
-_SUMS = ("error.band", "error.max_error")  # what carriers did not store
 
 
 def former_values(file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -53,45 +40,38 @@ def former_values(file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _gear(file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
-    ring, helical = "rim" in file, "helix" in file
-    wanted = [
-        *BODY,
-        *ERROR,
-        *CUT,
-        *FLANK,
-        *PICTURE,
-        *(e for name in _OPTIONAL if name in file for e in _OPTIONAL[name]),
-    ]
-    own = {"mass", "points", "flank.internal"} | (set() if helical else {"flank.beta_b"})
-    values = {e.field: _read(file, e, _GEAR) for e in wanted if e.field not in own}
-    mass = np.zeros((6, 6))
-    mass[:3, :3] = read_entry(file, Entry("", (), "", ""), "body/mass") * np.eye(3)
-    mass[3:, 3:] = read_entry(file, Entry("", (3, 3), "", ""), "body/inertia")
-    values |= {"mass": mass, "points": np.zeros((1, 3)), "flank.internal": ring}
+    ring = "rim" in file
     name = "rim" if ring else "bore"
+    mass = np.zeros((6, 6))
+    mass[:3, :3] = read_entry(file, Entry((), "", ""), "body/mass") * np.eye(3)
+    mass[3:, 3:] = read_entry(file, Entry((3, 3), "", ""), "body/inertia")
+    values = {"flank.beta_b": 0.0, "flank.internal": ring, "mass": mass, "points": np.zeros((1, 3))}
     texts = {
         "nodes": [{"name": name, "kind": "", "components": list(COMPONENTS)}],
         "ground": [name],
         "method": GEAR_METHOD,
     }
-    return {"flank.beta_b": 0.0} | values, texts | ({"sensors": ["rim"]} if ring else {}) | _texts(file)
+    return values | _values(file, _GEAR), texts | ({"sensors": ["rim"]} if ring else {}) | _texts(file)
 
 
 def _whole(file: h5py.File) -> tuple[dict[str, Any], dict[str, Any]]:
-    values = {e.field: _read(file, e, _WHOLE) for e in (*BODY, *ERROR) if e.field not in _SUMS}
+    values = _values(file, _WHOLE)
     lines, error = values["error.frequency"], values["error.error"]
-    values |= {"error.band": lines[[0, -1]], "error.max_error": float(error.max())}
+    values |= {"error.band": lines[[0, -1]], "error.max_error": float(error.max())}  # carriers did not store them
     texts = {name: json.loads(file.attrs[name]) for name in ("ground", "method")}
     return values, texts | {"nodes": json.loads(file.attrs["interfaces"])} | _texts(file)
 
 
-def _read(file: h5py.File, entry: Entry, names: dict[str, str]) -> Any:
-    path = names.get(entry.field)
-    if path is None:
-        group = next((pair for pair in _PARTS if entry.field.startswith(f"{pair[0]}.")), ("", ""))
-        path = entry.field.replace(group[0], group[1], 1).replace(".", "/") if group[0] else entry.path
-    value = read_entry(file, entry, path)
-    return value[None] if np.ndim(value) < len(entry.shape) else value  # the one sensor of a ring
+def _values(file: h5py.File, names: dict[str, str]) -> dict[str, Any]:
+    """Numbers by their fields in a body; names: datasets of some fields."""
+    found = {}
+    for entry in ENTRIES:
+        part, former = next((pair for pair in _PARTS if entry.field.startswith(f"{pair[0]}.")), ("", ""))
+        path = names.get(entry.field, entry.field.replace(part, former, 1).replace(".", "/") if part else entry.path)
+        if path in file:
+            value = read_entry(file, entry, path)
+            found[entry.field] = value[None] if np.ndim(value) < len(entry.shape) else value  # one sensor of a ring
+    return found
 
 
 def _texts(file: h5py.File) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The layout of a body and its file: one table from which it is written, packed, read, checked and documented.
+"""The layout of a body's file: from the stored fields of its classes it is written, packed, read and checked.
 
 A model holds singles, and a picture shows a hundredth of a displacement: the lower bits of the finite elements' doubles
 are noise, which nothing compresses. So numbers are rounded to whole multiples of a power of two, and packing numbers
@@ -8,7 +8,8 @@ kind. Their cosine transform, the coefficients of Chebyshev polynomials, falls o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -16,6 +17,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from gearfmu.errors import BodyError
+from gearfmu.files import ENTRY, Entry
 
 if TYPE_CHECKING:
     from gearfmu.body.body import Body, Flank
@@ -25,170 +27,8 @@ FORMAT_VERSION = 4
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One array of a body and dataset of its file: attribute path in `body.Body`, shape in symbols or numbers, unit,
-    meaning, and how it is stored (`gearfmu/body/store.py`).
-
-    kind: in memory, "f8" doubles, "f4" singles (pictures), "i8" integers. bits: 0, the file holds the numbers
-    themselves; else whole multiples of a step, which the largest number has fewer than 2^bits of, and along the roll
-    points (R) those of its cosine transform. each: a step for every index of the first axis instead of one for all.
-    """
-
-    field: str
-    shape: tuple[str | int, ...]
-    unit: str
-    meaning: str
-    kind: str = "f8"
-    bits: int = 0
-    each: bool = False
-
-    @property
-    def path(self) -> str:
-        """Name of the dataset."""
-        return self.field.replace(".", "/")
-
-
-TABLE_BITS = 23  # of compliances; what this costs a model: docs/decisions/bodies.md
-ROW_BITS = 21  # of rows in modes and of the coupling of modes
-PICTURE_BITS = 7
-TABLE, COUPLED = (2, 2, "R", "R", "A", "A"), "kg-1/2, m-1.kg-1/2"
-
-BODY = (
-    Entry("mass", (6, 6), "kg, kg.m, kg.m2", "mass matrix of rigid motion about the origin"),
-    Entry("points", ("K", 3), "m", "where each node lies"),
-    Entry("frequency", ("n",), "Hz", "natural frequencies of the free body, ascending, none rigid"),
-    Entry("damping_ratio", ("n",), "", "modal damping ratio"),
-    Entry("rows", ("m", "n"), COUPLED, "displacement and rotation of the nodes in the modes"),
-    Entry("static", ("m", "m"), "m/N, 1/N, 1/(N.m)", "compliance of the nodes; inertia relief, mean-axis gauge"),
-)
-ERROR = (
-    Entry("error.frequency", ("F",), "Hz", "frequency lines"),
-    Entry("error.error", ("F",), "", "relative Frobenius error with the ground held (paper eq. 3)"),
-    Entry("error.band", (2,), "Hz", "band of max_error"),
-    Entry("error.max_error", (), "", "largest error (ground held) in the band"),
-    Entry("error.trusted_to", (), "Hz", "the error stays below 1 % up to this frequency"),
-    Entry("error.length", (), "m", "length by which rotations are multiplied"),
-)
-CUT = (
-    Entry("error.error_free", ("F",), "", "error of the free body's elastic part, with bore ports"),
-    Entry("error.cut", (), "Hz", "modes below this were dynamic in the comparison, the others static"),
-    Entry("error.size", (), "", "number of modes below the cut", "i8"),
-)
-FLANK = (
-    Entry("flank.teeth", (), "", "number of teeth z, equal sectors of the body", "i8"),
-    Entry("flank.internal", (), "", "1: a ring, whose index counts tooth spaces", "i8"),
-    Entry("flank.r_b", (), "m", "base radius"),
-    Entry("flank.psi_b", (), "rad", "half tooth-thickness angle at the base circle, nominal"),
-    Entry("flank.beta_b", (), "rad", "base helix angle, positive for a right-handed gear: z turns by z tan β_b / r_b"),
-    Entry("flank.face_width", (), "m", "face width b; z runs from −b/2 to b/2"),
-    Entry("flank.strip_half_width", (), "m", "half-width of the load strip in arc length along the flank"),
-    Entry("flank.roll_range", (2,), "m", "roll of form and tip point: the Chebyshev interval"),
-    Entry("flank.roll", ("R",), "m", "roll points: Chebyshev points of the first kind, ascending"),
-    Entry("flank.diameter", ("n",), "", "nodal diameter ν of the modes", "i8"),
-    Entry("flank.part", ("n",), "", "0 single, 1 first (real) and 2 second (imaginary) part of a pair", "i8"),
-    Entry("flank.parity", ("n",), "", "+1 symmetric about mid-width, −1 antisymmetric, 0 neither", "i8"),
-    Entry(
-        "flank.rows",
-        (2, "R", "A", "n"),
-        "kg-1/2",
-        "tooth 0: load-weighted mean displacement along the outward normal; "
-        "flank (0: sg = +1), roll point, width function, mode",
-        bits=ROW_BITS,
-    ),
-    Entry(
-        "flank.static",
-        (2, 2, "M", "R", "R", "A", "A"),
-        "m/N",
-        "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, flank g, "
-        "roll j, function b. The file holds the offsets m = 0 … 3, or 0 … z/2 of a small gear, the others follow: "
-        "C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
-        bits=TABLE_BITS,
-    ),
-    Entry(
-        "flank.node",
-        (2, "R", "A", 6),
-        "m/N, 1/N",
-        "flank rows of tooth 0 per unit force x, y, z and moment x, y, z on the node",
-    ),
-)
-TANGENT = (
-    Entry(
-        "flank.tangent.rows",
-        (2, "R", "A", "n"),
-        "kg-1/2",
-        "tooth 0: like flank/rows, displacement along the profile towards growing roll",
-        bits=ROW_BITS,
-    ),
-    Entry(
-        "flank.tangent.static_nt",
-        TABLE,
-        "m/N",
-        "compliance [f, g, i, j, a, b] of tooth 0 alone: flank f, roll i, function a along the outward normal under "
-        "the load along the profile at flank g, roll j, function b",
-        bits=TABLE_BITS,
-    ),
-    Entry("flank.tangent.static_tt", TABLE, "m/N", "the same, displacement along the profile", bits=TABLE_BITS),
-)
-SPIN = (
-    Entry("spin.coupling", ("n", "n"), "", "integral of density times mode k . (e_z x mode l), skew", bits=ROW_BITS),
-    Entry("spin.tilt", (2, "n"), "kg1/2.m", "the same with rigid tilt about x and y: of z u_x and z u_y"),
-    Entry("spin.load", ("n",), "kg1/2.m", "centrifugal load per square of the speed"),
-    Entry("spin.stiffening", ("n",), "", "B in ω² = ω₀² + B Ω²: stresses less softening"),
-    Entry("spin.growth", (2, "R", "A"), "m.s2", "flank rows of tooth 0 under centrifugal load per square of the speed"),
-    Entry("spin.inertia", (), "kg.m2.s2", "what that adds to the polar inertia per square of the speed"),
-)
-PICTURE = (
-    Entry(
-        "picture.loads",
-        ("L", "P", 3),
-        "m/N",
-        "displacement of the surface of the whole gear, unit load on flank 0, tooth 0",
-        "f4",
-        bits=PICTURE_BITS,
-        each=True,
-    ),
-    Entry("picture.load_roll", ("L",), "m", "roll point of these loads"),
-)
-SHAPES = (
-    Entry("picture.shapes.points", ("T", 3), "m", "surface points of sector 0", "f4"),
-    Entry("picture.shapes.quads", ("U", 4), "", "quadrilaterals of its surface, point numbers", "i8"),
-    Entry("picture.shapes.ahead", ("U", 4), "", "1: the point of that number in the next sector", "i8"),
-    Entry(
-        "picture.shapes.modes",
-        ("n", "T", 3),
-        "kg-1/2",
-        "displacement on sector 0 in every mode",
-        "f4",
-        bits=PICTURE_BITS,
-        each=True,
-    ),
-)
-SURFACE = (
-    Entry("picture.points", ("P", 3), "m", "surface points of the whole gear", "f4"),
-    Entry("picture.quads", ("Q", 4), "", "quadrilaterals of the surface, point numbers", "i8"),
-)
-SENSORS = (
-    Entry("sensors.points", ("S", 3), "m", "where each sensor lies; of a ring: middle of the rim's patch of sector 0"),
-    Entry("sensors.rows", ("3S", "n"), "kg-1/2", "displacement x, y, z of each in the modes"),
-)
-FELT = (Entry("sensors.static", ("3S", "m"), "m/N, 1/N", "displacement of each sensor per unit load on the nodes"),)
-SKIN = (
-    Entry("skin.points", ("V", 3), "m", "points of the closed outer surface", "f4"),
-    Entry("skin.faces", ("W", 4), "", "its faces, normals outward; a triangle repeats its last point", "i8"),
-    Entry(
-        "skin.modes",
-        ("6+n", "V", 3),
-        "1, m, kg-1/2",
-        "displacement of the points: rigid motion x, y, z, rx, ry, rz about the origin, then the modes",
-        "f4",
-        bits=PICTURE_BITS,
-        each=True,
-    ),
-)
-# optional, each whole or not at all
-GROUPS = (ERROR, CUT, FLANK, TANGENT, SPIN, PICTURE, SHAPES, SURFACE, SENSORS, FELT, SKIN)
-ENTRIES = (*BODY, *(entry for group in GROUPS for entry in group))
+POINTS = Entry(("K", 3), "m", "where each node lies", field="points")
+SURFACE = ("picture.points", "picture.quads")  # not stored beside the shapes of a sector
 
 
 def value_of(body: Any, field: str) -> Any:
@@ -198,12 +38,20 @@ def value_of(body: Any, field: str) -> Any:
     return body
 
 
-def entries_of(body: Any) -> tuple[Entry, ...]:
+def entries_of(body: Body) -> tuple[Entry, ...]:
     """The arrays that a body has; the surface of a gear that is stored by a sector is not among them."""
-    found = [group for group in GROUPS if value_of(body, group[0].field) is not None]
-    if SHAPES in found:
-        found.remove(SURFACE)
-    return (*BODY, *(entry for group in found for entry in group))
+    left_out = () if value_of(body, "picture.shapes") is None else SURFACE
+    return (POINTS, *(entry for entry in _there(body) if entry.field not in left_out))
+
+
+def _there(part: Any, path: str = "") -> Iterator[Entry]:
+    """The stored fields that are not None of a part of a body, which stands at `path`, and of the parts of that."""
+    for own in fields(part):
+        value = getattr(part, own.name)
+        if value is not None and ENTRY in own.metadata:
+            yield replace(own.metadata[ENTRY], field=f"{path}{own.name}")
+        elif is_dataclass(value):
+            yield from _there(value, f"{path}{own.name}.")
 
 
 def body_problems(body: Body) -> list[str]:
@@ -288,17 +136,6 @@ def _pairs_sound(flank: Flank) -> bool:
     return bool(np.all((flank.part >= 0) & (flank.part <= 2))) and bool(
         np.all(second == follows) and np.all(same[second])
     )
-
-
-TEXTS = {
-    "nodes": "name, kind (rigid: RBE2, averaging: RBE3, nodes, section), components, span along z, in row order",
-    "sensors": "names of the sensors",
-    "ground": "nodes held when the error was measured",
-    "method": "method of reduction",
-    "material": "material: youngs_modulus (Pa), poisson_ratio, density (kg/m³)",
-    "mesh": "finite-element mesh: element counts, degrees of freedom, quality",
-    "provenance": "program versions, time and memory of the reduction",
-}
 
 
 SMALL = 16  # numbers: not worth compressing

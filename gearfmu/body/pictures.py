@@ -81,11 +81,15 @@ def pictured_loads(points: Points) -> list[int]:
     return [roll * functions for roll in chosen]
 
 
+def pictured_rolls(points: Points) -> np.ndarray:
+    """Rolls of the `pictured_loads`, m."""
+    return points.rolls[[load // points.functions for load in pictured_loads(points)]]
+
+
 def sector_picture(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Picture:
     """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
-    shapes, pictured = sector_shapes(sector, modes), pictured_loads(body.points)
+    shapes, rolls = sector_shapes(sector, modes), pictured_rolls(body.points)
     loads = np.array([unfold_sectors(picture, sector) for picture in statics.pictures], "f4")
-    rolls = body.points.rolls[[load // body.points.functions for load in pictured]]
     points, quads = whole_surface(sector, body.teeth)
     return Picture(points.astype("f4"), quads, loads, rolls, shapes)
 
@@ -95,10 +99,9 @@ def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:
     return turn_sectors(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
 
 
-def sector_shapes(sector: Outline, modes: Modes) -> Shapes | None:
-    """Surface of a sector in all modes; None where the modes were made without it."""
-    if modes.surface is None:
-        return None
+def sector_shapes(sector: Outline, modes: Modes) -> Shapes:
+    """Surface of a sector in all modes, which were made with its points."""
+    assert modes.surface is not None
     return Shapes(sector.points.astype("f4"), sector.quads, sector.ahead.astype(int), modes.surface.astype("f4"))
 
 
@@ -108,7 +111,5 @@ def whole_picture(sector: Outline, nodes: np.ndarray, gear: WholeGear, statics: 
     kept = np.unique(gear.body.node_of_dof[gear.body.node_of_dof < len(nodes)])
     nearest = cKDTree(nodes[kept]).query(points)[1]
     dofs = 3 * nearest[:, None] + np.arange(3)
-    pictured = pictured_loads(gear.points)
     loads = np.array([picture[dofs] for picture in statics.pictures], "f4")
-    rolls = gear.points.rolls[[load // gear.points.functions for load in pictured]]
-    return Picture(points.astype("f4"), quads, loads, rolls)
+    return Picture(points.astype("f4"), quads, loads, pictured_rolls(gear.points))

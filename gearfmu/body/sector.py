@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.stagefile.forms.general import Stage
+from gearfmu.reduction.imported.gear import BORE, checked_gear
+from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.tables.housing import HousingBody
@@ -29,6 +29,19 @@ def body_sector(stage: Stage, name: str, scale: float = 1.0) -> FeMesh:
             "pictures of your own finite-element program"
         )
     if table.imported is not None:
-        return imported_sector_mesh(table)
+        return _imported_sector(table)
     own = table.body.mesh
     return gear_sector(gear_shape(table), table.face_width, own.model_copy(update={"scale": own.scale * scale}))
+
+
+def _imported_sector(gear: ToothedBody) -> FeMesh:
+    """The sector mesh of an imported gear, as of one meshed here."""
+    found = checked_gear(gear)
+    cut = found.cut
+    if cut is None or set(cut.elements) != {"hexahedron20"} or found.matrices is not None:
+        raise BodyError(
+            f"{found.mesh.source}: this needs hexahedra, our own matrices and a mesh that repeats itself from tooth to "
+            "tooth; use the pictures of your own finite-element program"
+        )
+    sets = {"rim" if found.flank.internal else BORE: found.bore_of_cut}
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, gear.teeth, cut.cut_minus, cut.cut_plus)

@@ -4,42 +4,32 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import h5py
 import numpy as np
 
-from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Shapes, Skin, Tangent, whole_surface
+from gearfmu.body.body import PARTS, Body, How, Node, Shapes, whole_surface
 from gearfmu.body.former import FORMATS, former_values
 from gearfmu.body.layout import (
-    BODY,
     FORMAT,
     FORMAT_VERSION,
-    GROUPS,
-    TEXTS,
+    POINTS,
+    SURFACE,
     entries_of,
     read_entry,
     value_of,
     write_entry,
 )
 from gearfmu.errors import BodyError
-from gearfmu.files import Format, reading, writing
-from gearfmu.reduction.cyclic.frf import FrfError
-from gearfmu.reduction.cyclic.modal import Spin
+from gearfmu.files import Entry, Format, entries, reading, writing
 
 REMEDY = "make it again with 'gearfmu reduce STAGE'"
 FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
+HOW = ("method", "material", "mesh", "provenance")
+TEXTS = ("nodes", "sensors", "ground", *HOW)
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM, FORMATS)
-PARTS = {  # classes by their path in a body, inner ones first
-    "flank.tangent": Tangent,
-    "picture.shapes": Shapes,
-    "error": FrfError,
-    "flank": Flank,
-    "spin": Spin,
-    "picture": Picture,
-    "sensors": Sensors,
-    "skin": Skin,
-}
 
 
 def save_body(body: Body, path: str | os.PathLike[str]) -> None:
@@ -62,38 +52,46 @@ def load_body(path: str | os.PathLike[str]) -> Body:
     or version, or not sound."""
     with reading(path, FILE) as file:
         if int(file.attrs["format_version"]) == FORMAT_VERSION:
-            there = [*BODY, *(entry for group in GROUPS if group[0].path in file for entry in group)]
-            values = {entry.field: read_entry(file, entry) for entry in there}
-            texts = {name: json.loads(file.attrs[name]) for name in TEXTS if name in file.attrs}
+            values = {entry.field: read_entry(file, entry) for entry in _entries_in(file)}
+            texts = {
+                name: json.loads(file.attrs[name])
+                for name in ("nodes", "sensors", "ground", *HOW)
+                if name in file.attrs
+            }
         else:
             values, texts = former_values(file)
-        how = {name: texts.pop(name) for name in ("method", "material", "mesh", "provenance")}
+        how = {name: texts.pop(name) for name in HOW}
         version = int(file.attrs.get("algorithm_version", 1))  # the first carriers do not say it
         made = How(str(file.attrs["input_hash"]), **how, algorithm=version)
         return _body(str(file.attrs["name"]), made, values, texts)
 
 
+def _entries_in(file: h5py.File) -> Iterator[Entry]:
+    """The datasets of a file, and those that are missing in a part of which it has some."""
+    yield from (POINTS, *entries(Body))
+    for path, kind in PARTS.items():
+        own = [e for e in entries(kind, f"{path}.") if e.field not in SURFACE or "picture/shapes" not in file]
+        if any(entry.path in file for entry in own):
+            yield from (entry for entry in own if entry.path in file or not entry.optional)
+
+
 def _texts(body: Body) -> dict[str, Any]:
-    how, error = body.how, body.error
     nodes = [
         {"name": n.name, "kind": n.kind, "components": list(n.components)} | ({"span": list(n.span)} if n.span else {})
         for n in body.nodes
     ]
     names = {"sensors": list(body.sensors.names)} if body.sensors is not None else {}
-    return {
-        "nodes": nodes,
-        "ground": list(error.ground) if error is not None else [],
-        "method": how.method,
-        "material": how.material,
-        "mesh": how.mesh,
-        "provenance": how.provenance,
-    } | names
+    how = {name: getattr(body.how, name) for name in HOW}
+    return {"nodes": nodes, "ground": list(body.error.ground) if body.error is not None else []} | how | names
 
 
 def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any]) -> Body:
     """The body of numbers by their fields; texts: nodes, sensors, ground."""
     points = values.pop("points")
-    nodes = [Node(point=point, **_node(text)) for text, point in zip(texts["nodes"], points, strict=True)]
+    nodes = []
+    for text, point in zip(texts["nodes"], points, strict=True):
+        span = tuple(text["span"]) if "span" in text else None
+        nodes.append(Node(text["name"], text["kind"], tuple(text["components"]), point, span))
     if "flank.static" in values:
         values["flank.static"] = _all_offsets(values["flank.static"], values["flank.teeth"])
         values["flank.internal"] = bool(values["flank.internal"])
@@ -108,11 +106,6 @@ def _body(name: str, how: How, values: dict[str, Any], texts: Mapping[str, Any])
         if own:
             values[part] = kind(**{field.rpartition(".")[2]: values.pop(field) for field in own})
     return Body(name=name, how=how, nodes=tuple(nodes), **values)
-
-
-def _node(text: Mapping[str, Any]) -> dict[str, Any]:
-    lists = {name: tuple(text[name]) for name in ("components", "span") if name in text}
-    return {"name": str(text["name"]), "kind": str(text["kind"])} | lists
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.apart import Progress, Work
 from gearfmu.body.body import Body, Flank, How, Node, Picture, Sensors, Tangent
 from gearfmu.body.former import GEAR_METHOD
-from gearfmu.body.imported import read_gear
 from gearfmu.body.pictures import drawn_outline, pictured_loads, sector_picture, whole_picture
 from gearfmu.errors import MeshError
 from gearfmu.fem.factor import FactorError
@@ -20,18 +18,17 @@ from gearfmu.femesh.quality import mesh_report
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank, tooth_flank
 from gearfmu.reduction.cyclic.frf import FrfCase, FrfError, frf_error
-from gearfmu.reduction.cyclic.modal import Modes, elastic_modes
+from gearfmu.reduction.cyclic.modal import Modes, Progress, elastic_modes
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import COMPONENTS
-from gearfmu.reduction.imported.gear import ImportedGear, hinge_problem
+from gearfmu.reduction.imported.gear import CheckedGear, checked_gear, hinge_problem, loaded_gear
 from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.stagefile.forms.general import ToothedBody
 from gearfmu.stagefile.forms.shapes import gear_shape
 
-ORIGIN = np.zeros(3)
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
 _SHARES = ((0.1, 0.6), (0.6, 0.8), (0.8, 1.0))  # of the work: modes, static tables, error
 _OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
@@ -51,32 +48,23 @@ class Parts:
     sensors: Sensors | None = None
 
 
-def gear_work(gear: ToothedBody) -> Work | None:
-    """Memory and time for the reduction of a gear meshed here; None of one meshed elsewhere. Raises MeshError."""
-    if gear.imported is not None:
-        return None
-    geometry = gear_shape(gear)
-    return Work(gear_need(gear_sector(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
-
-
 def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     """The reduced body of an external or internal gear. Raises MeshError."""
     started, report = time.process_time(), named(progress, gear.name)
     report("mesh and finite elements", 0.0)
     made = _meshed_here(gear, report) if gear.imported is None else _meshed_elsewhere(gear, report)
     flank = flank_of(gear.teeth, tooth_flank(gear_shape(gear), gear), made.modes, made.statics)
-    node = Node("rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging", COMPONENTS, ORIGIN)
-    mass = symmetric_mass(made.inertia)
+    name, kind = "rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging"
     return Body(
         name=gear.name,
         how=How.of(gear, GEAR_METHOD, made.facts).since(started),
-        mass=mass,
+        mass=symmetric_mass(made.inertia),
         frequency=made.modes.frequency,
         damping_ratio=np.full(len(made.modes.frequency), gear.modal_damping),
-        nodes=(node,),
+        nodes=(Node(name, kind, COMPONENTS, np.zeros(3)),),
         rows=made.modes.bore_rows,
         static=made.statics.static_bb,
-        error=replace(made.error, ground=(node.name,)),
+        error=replace(made.error, ground=(name,)),
         flank=flank,
         spin=made.modes.spin,
         picture=made.picture,
@@ -180,28 +168,29 @@ def symmetric_mass(inertia: np.ndarray) -> np.ndarray:
 
 def _meshed_elsewhere(gear: ToothedBody, report: Progress) -> Parts:
     """A gear from finite elements made elsewhere, by its sector or its mean tooth."""
-    found, source = read_gear(gear), gear.imported
-    assert source is not None
+    found = checked_gear(gear)
+    body = loaded_gear(found, gear)
     try:
-        if isinstance(found.body, SectorBody):
-            return _by_sector(gear, found.body, found.facts, report)
-        return _by_mean_tooth(gear, found.body, found, report)
+        if isinstance(body, SectorBody):
+            return _by_sector(gear, body, found.facts, report)
+        return _by_mean_tooth(gear, body, found, report)
     except (FactorError, ModesError) as error:
         raise MeshError(
-            f"{source.file}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six "
+            f"{found.mesh.source}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six "
             "rigid motions (a hinge, a loose part), or not of a free body"
         ) from error
 
 
-def _by_mean_tooth(gear: ToothedBody, whole: WholeGear, found: ImportedGear, report: Progress) -> Parts:
+def _by_mean_tooth(gear: ToothedBody, whole: WholeGear, found: CheckedGear, report: Progress) -> Parts:
     """A gear reduced as a whole, brought to the form of a cyclic one."""
     space, geometry = Elastic(whole.body), gear_shape(gear)
-    if problem := hinge_problem(space, float(space.modes(1)[0][0])):
+    if problem := hinge_problem(space):
         raise MeshError(f"{found.facts['file']}: {problem}")
     modes, left = mean_modes(whole, space, gear.body.modes, report)
     statics, deviation = mean_statics(whole, space, pictured_loads(whole.points), report)
     report("frequency response", 0.0)
     frf = mean_frf(whole, space, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
     facts = found.facts | {"teeth_deviation": deviation, "compliance_left_to_residual": left}
-    surface = drawn_outline(geometry, gear.face_width, found.nodes)
-    return Parts(modes, statics, frf, facts, whole_picture(surface, found.nodes, whole, statics), whole.inertia)
+    nodes = found.mesh.nodes
+    picture = whole_picture(drawn_outline(geometry, gear.face_width, nodes), nodes, whole, statics)
+    return Parts(modes, statics, frf, facts, picture, whole.inertia)

@@ -13,8 +13,7 @@ from gearfmu.commands.shared import FOLDER, Quantity, stage_names
 
 if TYPE_CHECKING:
     from gearfmu.reduction.full_order import FullOrder
-    from gearfmu.reduction.judged import Judgement, Trial
-    from gearfmu.reduction.transfer import Reference
+    from gearfmu.reduction.transfer import Judgement, Reference, Trial
 
 GIVEN = ("size", "band", "damping", "lines", "free", "scale")
 HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "CPU s")

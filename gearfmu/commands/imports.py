@@ -46,8 +46,8 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 
 def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
-    from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported.carrier import imported_carrier
+    from gearfmu.reduction.imported.gear import checked_gear
     from gearfmu.stagefile.forms.general import GearBody, RingBody
     from gearfmu.stagefile.forms.planetary import CarrierBody
     from gearfmu.stagefile.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
@@ -62,7 +62,7 @@ def body_facts(spec: Stage, name: str, file: str, options: dict[str, Any]) -> di
     ring = isinstance(table, RingBody)
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}
     source = (RingImportSpec if ring else ImportSpec)(file=file, **chosen)
-    return check_gear(table.model_copy(update={"imported": source})).facts
+    return checked_gear(table.model_copy(update={"imported": source})).facts
 
 
 def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) -> dict[str, Any]:

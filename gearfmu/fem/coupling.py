@@ -28,6 +28,11 @@ def rigid_modes(nodes: np.ndarray) -> np.ndarray:
     return rigid_fields(nodes).reshape(-1, 6)
 
 
+def master_rows(point: np.ndarray) -> np.ndarray:
+    """(6, 6): rigid motion about the origin → motion of a point (3,) m."""
+    return np.vstack([rigid_fields(point), np.eye(6)[3:]])
+
+
 def surface_moments(nodes: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray]:
     """Moments of a surface's displacement field, by exact surface integration.
 

@@ -46,14 +46,9 @@ class Harmonic:
 
     def _surface_motions(self) -> np.ndarray:
         """Motions of the rigid surface that belong to this harmonic, as columns: (motions of the space, amplitudes)."""
-        patterns: dict[int, list[dict[int, complex]]] = {0: [{2: 1}, {5: 1}], 1: [{0: 1, 1: 1j}, {3: 1, 4: 1j}]}
-        motions = list(self.space.motions)
-        mine = [p for p in patterns.get(self.nodal_diameter, []) if set(p) <= set(motions)]
-        columns = np.zeros((len(motions), len(mine)), self.dtype)
-        for k, pattern in enumerate(mine):
-            for motion, value in pattern.items():
-                columns[motions.index(motion), k] = value if np.iscomplexobj(columns) else value.real
-        return columns
+        parts = _RIGID.get(self.nodal_diameter, np.zeros((6, 0)))
+        mine = parts[self.space.motions][:, (np.delete(parts, self.space.motions, axis=0) == 0).all(axis=0)]
+        return mine.astype(self.dtype)
 
     def _rigid_motions(self) -> tuple[np.ndarray, np.ndarray]:
         r, nu = self.space.rigid, self.nodal_diameter

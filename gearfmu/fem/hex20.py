@@ -156,19 +156,14 @@ def assembled(
                 for found in zip(*(matrices(nodes[batch], material) for batch in batches), strict=True)
             )
             dofs = (3 * chunk[:, :, None] + np.arange(3)).reshape(len(chunk), -1)
-            k_global = k_global + _scattered(stiffness, dofs, 3 * len(nodes))
-            m_scalar = m_scalar + _scattered(mass, chunk, len(nodes))
+            k_global = k_global + scattered(stiffness, dofs, 3 * len(nodes))
+            m_scalar = m_scalar + scattered(mass, chunk, len(nodes))
             del stiffness, mass
     return symmetric(k_global), sp.csr_array(sp.kron(symmetric(m_scalar), sp.identity(3), format="csr"))
 
 
-def scatter(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
-    """Sum of element matrices (E, k, k) at the unknowns (E, k), symmetric: (size, size)."""
-    return symmetric(_scattered(blocks, dofs, size))
-
-
-def _scattered(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
-    """As `scatter`, symmetric to rounding."""
+def scattered(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
+    """Sum of element matrices (E, k, k) at the unknowns (E, k), symmetric to rounding: (size, size)."""
     dofs = dofs.astype(np.int32 if size < 2**31 else np.int64)
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()

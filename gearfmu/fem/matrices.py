@@ -30,20 +30,15 @@ def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> 
     labels : (N,) node numbers of the mesh. Raises MeshError for what cannot be read, is not symmetric, or misses a
     node.
     """
-    found = _read(path)
-    if isinstance(found, Labelled):
-        unknowns = found.unknowns
-    matrix = _symmetric(path, found.matrix if isinstance(found, Labelled) else found)
-    if unknowns is None:
-        if matrix.shape[0] != 3 * len(labels):
-            raise MeshError(
-                f"{path}: {matrix.shape[0]} rows, but the mesh has {len(labels)} nodes, that is "
-                f"{3 * len(labels)} unknowns: "
-                "give `unknowns` when rows were left out or sorted differently"
-            )
-        return matrix
-    _as_many(path, matrix.shape[0], unknowns)
-    return _sorted(path, matrix, unknowns, labels)
+    matrix, unknowns = _square(path, unknowns)
+    if unknowns is not None:
+        return _sorted(path, matrix, unknowns, labels)
+    if matrix.shape[0] != 3 * len(labels):
+        raise MeshError(
+            f"{path}: {matrix.shape[0]} rows, but the mesh has {len(labels)} nodes, that is {3 * len(labels)} "
+            "unknowns: give `unknowns` when rows were left out or sorted differently"
+        )
+    return matrix
 
 
 def read_labelled(path: Path, unknowns: np.ndarray | None) -> Labelled:
@@ -51,14 +46,20 @@ def read_labelled(path: Path, unknowns: np.ndarray | None) -> Labelled:
 
     unknowns : (n, 2) label and component 0 … 5 of each row, −1 of a modal coordinate; None where the file says so
     itself (DMIG). Raises MeshError for what cannot be read, is not symmetric, or has no labels."""
-    found = _read(path)
-    if isinstance(found, Labelled):
-        return Labelled(_symmetric(path, found.matrix), found.unknowns)
+    matrix, unknowns = _square(path, unknowns)
     if unknowns is None:
-        raise MeshError(f"{path}: give `unknowns`: what each of its {found.shape[0]} rows is stands in no such matrix")
-    matrix = _symmetric(path, found)
-    _as_many(path, matrix.shape[0], unknowns)
+        raise MeshError(f"{path}: give `unknowns`: what each of its {matrix.shape[0]} rows is stands in no such matrix")
     return Labelled(matrix, unknowns)
+
+
+def _square(path: Path, unknowns: np.ndarray | None) -> tuple[sp.csr_array, np.ndarray | None]:
+    """A symmetric matrix and what its rows are, as the file says itself or else as `unknowns` do."""
+    found = _read(path)
+    own, unknowns = (found.matrix, found.unknowns) if isinstance(found, Labelled) else (found, unknowns)
+    matrix = _symmetric(path, own)
+    if unknowns is not None and len(unknowns) != (rows := matrix.shape[0]):
+        raise MeshError(f"{path}: {rows} rows, but `unknowns` names {len(unknowns)}: they belong to other runs")
+    return matrix, unknowns
 
 
 def read_recovery(path: Path, rows: np.ndarray, columns: int) -> sp.csr_array:
@@ -71,11 +72,6 @@ def read_recovery(path: Path, rows: np.ndarray, columns: int) -> sp.csr_array:
         wanted = f"{len(rows)} rows as `recovered`, {columns} columns as the superelement"
         raise MeshError(f"{path}: {found.shape[0]} rows and {found.shape[1]} columns, expected {wanted}")
     return found
-
-
-def _as_many(path: Path, rows: int, unknowns: np.ndarray) -> None:
-    if len(unknowns) != rows:
-        raise MeshError(f"{path}: {rows} rows, but `unknowns` names {len(unknowns)}: they belong to other runs")
 
 
 def read_unknowns(path: Path) -> np.ndarray:
@@ -161,9 +157,8 @@ def _sorted(path: Path, matrix: sp.csr_array, unknowns: np.ndarray, labels: np.n
     missing = np.setdiff1d(np.arange(3 * len(labels)), target)
     if len(missing):
         raise MeshError(
-            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node "
-            f"{labels[missing[0] // 3]}): export the free "
-            "body, without supports and constraints"
+            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node {labels[missing[0] // 3]}): export "
+            "the free body, without supports and constraints"
         )
     entries = matrix.tocoo()
     size = 3 * len(labels)

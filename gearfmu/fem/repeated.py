@@ -18,8 +18,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from gearfmu.fem.factor import CondensedFactor
-from gearfmu.fem.indefinite import Product, eliminate_symmetric, lu, refined
+from gearfmu.fem.factor import CondensedFactor, Product, eliminate_symmetric, lu, refined
 from gearfmu.geometry.plane import about_z
 
 _COLUMNS = 128

@@ -13,8 +13,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from gearfmu.fem.factor import Factor
-from gearfmu.fem.indefinite import SymmetricFactor
+from gearfmu.fem.factor import Factor, SymmetricFactor
 
 _REAL_DEFINITE, _REAL_INDEFINITE = 2, -2  # PARDISO's matrix types
 _RESIDUAL = 1e-8  # relative to the right-hand side; rounding leaves a hundredth of it on solid bodies
@@ -32,7 +31,7 @@ def definite_factor(matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.nda
 
 
 def symmetric_factor(matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray) -> Solves:
-    """Factor of a real symmetric matrix; arguments and errors as of `indefinite.SymmetricFactor`."""
+    """Factor of a real symmetric matrix; arguments and errors as of `factor.SymmetricFactor`."""
     return _pardiso(matrix, _REAL_INDEFINITE) or SymmetricFactor(matrix, cells, node_of_dof)
 
 

@@ -16,8 +16,6 @@ import scipy.sparse as sp
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import SectorSpace
 
-ACROSS = np.array([1.0, 1.0, 0.0])
-
 
 def turn_quarter(fields: np.ndarray) -> np.ndarray:
     """e_z × u of nodal vectors (3N, k)."""
@@ -27,19 +25,15 @@ def turn_quarter(fields: np.ndarray) -> np.ndarray:
 
 def leave_axial(fields: np.ndarray) -> np.ndarray:
     """Nodal vectors (3N, k) without their component along z."""
-    return fields * np.tile(ACROSS, len(fields) // 3).reshape(-1, *[1] * (fields.ndim - 1))
-
-
-def centrifugal_load(nodes: np.ndarray, mass: sp.csr_array) -> np.ndarray:
-    """f_c (3N,), kg·m: nodes (N, 3) m, mass (3N, 3N) kg."""
-    return np.asarray(mass @ leave_axial(nodes.ravel()))
+    return fields * np.tile([1.0, 1.0, 0.0], len(fields) // 3).reshape(-1, *[1] * (fields.ndim - 1))
 
 
 def growth(space: SectorSpace, nodes: np.ndarray, mass: sp.csr_array) -> np.ndarray:
     """Displacement (3N,) of a sector under the centrifugal load of all sectors per square of the speed, m·s²; space:
     symmetric about mid-width, or of all fields."""
     harmonic = space.harmonic(0)
-    load = harmonic.reduce((space.from_nodes @ centrifugal_load(nodes, mass))[:, None])
+    centrifugal = np.asarray(mass @ leave_axial(nodes.ravel()))  # f_c, kg·m
+    load = harmonic.reduce((space.from_nodes @ centrifugal)[:, None])
     return np.asarray(space.to_nodes @ harmonic.expand(harmonic.flexibility(load)))[:, 0]
 
 
@@ -60,4 +54,4 @@ def stress_stiffness(
     stress = 2 * d[3, 3] * strain + d[0, 1] * np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3)
     measure = np.linalg.det(jacobian) * weight
     blocks = np.einsum("eg,egan,egab,egbm->enm", measure, spatial, stress, spatial, optimize=True)
-    return hex20.scatter(blocks, elements, len(nodes))
+    return hex20.symmetric(hex20.scattered(blocks, elements, len(nodes)))

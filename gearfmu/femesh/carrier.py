@@ -22,7 +22,6 @@ from gearfmu.femesh.lattice import (
     extruded,
     graded,
     graded_to_both,
-    graded_to_end,
     mirrored,
     numbered,
     quads_of,
@@ -94,7 +93,7 @@ def _section(g: CarrierGeometry, mesh: CarrierMeshSpec) -> tuple[np.ndarray, np.
     bottom = core[2][-1] + np.outer(sides, core[0][0] - core[2][-1])
     bottom[0], bottom[-1], bottom[:, 1] = core[2][-1], core[0][0], 0.0
     inner = quads_of(transfinite(core[2][::-1], core[0], bottom, core[1][::-1]))
-    inward = graded_to_end(mesh.scaled(mesh.bolt), mesh.growth(_FOOT))
+    inward = 1 - graded(mesh.scaled(mesh.bolt), mesh.growth(_FOOT))[::-1]
     outward = graded_to_both(mesh.scaled(mesh.disc), mesh.growth(_DISC))
     ring = [quads_of(_between(core[k], circle[k], inward)) for k in range(3)]
     plate = [quads_of(_between(circle[k], edge[k], outward)) for k in range(3)]

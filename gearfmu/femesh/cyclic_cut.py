@@ -43,9 +43,8 @@ def cyclic_cut(nodes: np.ndarray, elements: dict[str, np.ndarray], teeth: int) -
     minus = np.flatnonzero(image >= 0)
     if len(minus) == 0:
         raise MeshError(
-            "this is neither a whole gear nor one sector: no node has an image one pitch further. Mesh the "
-            "whole gear, or "
-            "one sector with equal meshes on both cut faces"
+            "this is neither a whole gear nor one sector: no node has an image one pitch further. Mesh the whole gear, "
+            "or one sector with equal meshes on both cut faces"
         )
     return _sector(nodes, elements, np.arange(len(nodes)), minus, image[minus], teeth)
 

@@ -16,15 +16,14 @@ import meshio
 import numpy as np
 
 from gearfmu.errors import MeshError
+from gearfmu.fem.bulk_data import nastran_problems, nastran_sets
+from gearfmu.fem.hex20 import EDGES
 from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.gmsh import is_format_4, read_gmsh
 from gearfmu.femesh.mesh import LabelledMesh
-from gearfmu.femesh.nastran import nastran_problems, nastran_sets
 
-_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
 _SURFACES = ("vertex", "line", "line3", "triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 _FORMATS = {".bdf": "nastran", ".nas": "nastran", ".dat": "nastran", ".fem": "nastran", ".msh": "gmsh", ".vtu": "vtu"}
-QUADRATIC = {"hexahedron20": 20, "tetra10": 10}
 
 
 @dataclass(frozen=True)
@@ -156,16 +155,8 @@ def _read_by_meshio(source: Path, file_format: str) -> meshio.Mesh:
 
 
 def _meshio_sets(mesh: meshio.Mesh) -> dict[str, np.ndarray]:
-    """Node sets: of the file, of its physical groups (Gmsh), and point data that are 0 and 1 (.vtu)."""
-    sets = {name: np.asarray(nodes, int) for name, nodes in mesh.point_sets.items()}
-    for name, blocks in mesh.cell_sets.items():
-        nodes = [
-            block.data[np.asarray(members, int)].ravel()
-            for block, members in zip(mesh.cells, blocks, strict=False)
-            if members is not None and len(members)
-        ]
-        if nodes and not name.startswith("gmsh:"):
-            sets[name] = np.unique(np.concatenate(nodes))
+    """Node sets: of physical groups (Gmsh), and point data that are 0 and 1 (.vtu)."""
+    sets: dict[str, np.ndarray] = {}
     tags = mesh.cell_data.get("gmsh:physical", [])
     for name, (tag, *_) in mesh.field_data.items():
         nodes = [block.data[np.asarray(own) == tag].ravel() for block, own in zip(mesh.cells, tags, strict=False)]
@@ -182,7 +173,7 @@ def _refuse_others(cells: dict[str, np.ndarray], source: Path) -> None:
     if not cells:
         raise MeshError(f"{source}: there are no solid elements in this file: mesh with hex8, hex20 or tet10")
     remedies = {"tetra": "linear tetrahedra (tet4) are far too stiff: mesh with quadratic ones (tet10, C3D10)"}
-    wrong = sorted(set(cells) - {"hexahedron", *QUADRATIC})
+    wrong = sorted(set(cells) - {"hexahedron", "hexahedron20", "tetra10"})
     if wrong:
         told = [
             remedies.get(kind, f"elements of type {kind} are not taken: use hex8, hex20 or tet10") for kind in wrong
@@ -220,7 +211,7 @@ def _raised(mesh: ImportedMesh) -> ImportedMesh:
     linear = mesh.elements.get("hexahedron")
     if linear is None:
         return mesh
-    edges = np.sort(linear[:, _EDGES], axis=2).reshape(-1, 2)
+    edges = np.sort(linear[:, EDGES], axis=2).reshape(-1, 2)
     edges, place = np.unique(edges, axis=0, return_inverse=True)
     number = len(mesh.nodes) + np.arange(len(edges))
     raised = np.hstack([linear, number[place.reshape(len(linear), 12)]])

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 
 def graded(elements: int, growth: float) -> np.ndarray:
     """Parameters (2·elements + 1,) from 0 to 1 of corner and mid nodes; elements grow by the factor `growth`."""
     return _parameters(growth ** np.arange(elements))
-
-
-def graded_to_end(elements: int, growth: float) -> np.ndarray:
-    """The same with the smallest element at 1."""
-    return 1 - graded(elements, growth)[::-1]
 
 
 def graded_to_both(elements: int, growth: float) -> np.ndarray:
@@ -96,11 +93,7 @@ def _at_level(plane: np.ndarray, level: float) -> np.ndarray:
     return np.concatenate([plane, np.full((*plane.shape[:2], 1), level)], axis=2)
 
 
-class Finder:
-    """Index of points that are rows of a sorted unique array, by exact equality."""
-
-    def __init__(self, nodes: np.ndarray):
-        self._index = {(x, y): k for k, (x, y) in enumerate(nodes.tolist())}
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        return np.array([self._index[x, y] for x, y in (points + 0.0).tolist()])
+def finder(nodes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Index of points (P, 2) that are rows of a unique array, by exact equality."""
+    index = {(x, y): k for k, (x, y) in enumerate(nodes.tolist())}
+    return lambda points: np.array([index[x, y] for x, y in (points + 0.0).tolist()])

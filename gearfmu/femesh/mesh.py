@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,19 +26,14 @@ class FlankGrid:
 
     quads: (Q, 8) node indices, VTK_QUADRATIC_QUAD, normal by the right-hand rule out of the tooth; roll: (Q, 8)
     analytic roll s (m) of these nodes in the section at their z; z: (Q, 8) their face-width coordinate (m). Rows run
-    along the flank (outer)
-    and across the width (inner): shape = (along, across). All elements have the same length along the involute and
-    their mid nodes halve it: s² is linear in the element's natural coordinate.
+    along the flank (outer) and across the width (inner): shape = (along, across). All elements have the same length
+    along the involute and their mid nodes halve it: s² is linear in the element's natural coordinate.
     """
 
     quads: np.ndarray
     roll: np.ndarray
     z: np.ndarray
     shape: tuple[int, int]
-
-    def renumbered(self, index: np.ndarray) -> FlankGrid:
-        """The same grid with node i called index[i]."""
-        return FlankGrid(index[self.quads], self.roll, self.z, self.shape)
 
 
 @dataclass(frozen=True)
@@ -48,9 +43,8 @@ class FeMesh:
     nodes: (N, 3) m. elements: (E, 20) node indices, VTK_QUADRATIC_HEXAHEDRON. sets: named node indices ("bore").
     teeth: number of equal sectors of the whole body (1: this is the whole body). cut_minus, cut_plus: (C,) node
     indices of the sector's faces at angle −π/z and +π/z (at z = 0 of a helical gear); cut_plus[i] is cut_minus[i]
-    turned
-    by 2π/z. flank: index 0 ↔ sg = +1, 1 ↔ sg = −1. twist: angle by which the transverse section turns about +z per
-    metre of face width (rad/m, positive: right-handed).
+    turned by 2π/z. flank: index 0 ↔ sg = +1, 1 ↔ sg = −1. twist: angle by which the transverse section turns about +z
+    per metre of face width (rad/m, positive: right-handed).
     """
 
     nodes: np.ndarray
@@ -86,7 +80,7 @@ class FeMesh:
                 name: np.unique(np.concatenate([numbers[nodes] for numbers in index]))
                 for name, nodes in self.sets.items()
             },
-            flank={side: grid.renumbered(index[0]) for side, grid in self.flank.items()},
+            flank={side: replace(grid, quads=index[0][grid.quads]) for side, grid in self.flank.items()},
             twist=self.twist,
         )
 

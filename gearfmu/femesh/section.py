@@ -17,7 +17,7 @@ from typing import TypeAlias
 import numpy as np
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
+from gearfmu.femesh.lattice import edges, finder, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.geometry.gear import InternalGearGeometry
 from gearfmu.geometry.plane import direction
@@ -58,7 +58,7 @@ def section_of(blocks: Blocks, cut: np.ndarray, roll: np.ndarray) -> Section:
     upper = np.concatenate([quads_of(block) for block in blocks])
     points = np.concatenate([upper, mirrored(upper)])
     nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
-    find, held, flank = Finder(nodes), rim[-1], tooth[0, : len(roll)]
+    find, held, flank = finder(nodes), rim[-1], tooth[0, : len(roll)]
     return Section(
         nodes=nodes, quads=index.reshape(-1, 8),
         bore=find(np.concatenate([held, held[held[:, 1] != 0] * [1, -1]])),

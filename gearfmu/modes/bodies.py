@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from gearfmu.body import Body
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
 from gearfmu.femesh.carrier import whole_carrier
@@ -15,7 +14,7 @@ from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order, evenly_spaced, scaled_sector
-from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
+from gearfmu.reduction.toothed import RING_SCALE, toothed_full_order
 from gearfmu.stagefile.forms.expand import CARRIER
 from gearfmu.stagefile.forms.general import RingBody, Stage, ToothedBody
 from gearfmu.stagefile.forms.planetary import CarrierBody
@@ -102,8 +101,7 @@ def mounted_ring_modes(
     if progress:
         progress("finite elements", 0.1)
     mesh = body_sector(stage, "ring", scale).full()
-    own = ring.imported is None
-    full = ring_full_order(ring, stage.mounts, scale) if own else imported_full_order(ring, stage.mounts)
+    full = toothed_full_order(ring, stage.mounts, scale)
     found = whole_modes(full, mesh, {}, ring.material, count)
     return _damped(replace(found, name="ring_on_mounts"), ring.modal_damping)
 

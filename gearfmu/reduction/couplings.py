@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, moved, rigid_fields, rigid_modes
+from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, master_rows, moved, rigid_fields, rigid_modes
 from gearfmu.fem.hex20 import symmetric
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 
@@ -95,6 +95,11 @@ def averaging(body: Elements, nodes: np.ndarray, point: np.ndarray) -> sp.csr_ar
     return sp.csr_array(moved(about_origin, point))
 
 
+def rows_of(body: Elements, coupling: Coupling) -> sp.csr_array:
+    """Rows (6, 3N) of an averaging coupling at its point."""
+    return averaging(body, coupling.nodes, coupling.point) if coupling.rows is None else coupling.rows
+
+
 def _check(couplings: Sequence[Coupling]) -> None:
     claimed: dict[int, str] = {}
     for coupling in couplings:
@@ -141,10 +146,7 @@ def elimination(nodes: np.ndarray, rigid: Sequence[Coupling]) -> tuple[sp.csr_ar
 def _rigid_columns(nodes: np.ndarray, rigid: Sequence[Coupling]) -> np.ndarray:
     count = len(nodes)
     free = np.flatnonzero(_masters(count, rigid) < count)
-    parts = [rigid_modes(nodes[free])]
-    for coupling in rigid:
-        parts.append(np.vstack([rigid_fields(coupling.point), np.eye(6)[3:]]))
-    return np.vstack(parts)
+    return np.vstack([rigid_modes(nodes[free]), *(master_rows(coupling.point) for coupling in rigid)])
 
 
 def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigid: Sequence[Coupling]) -> Interface:
@@ -155,7 +157,7 @@ def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigi
         first = size - 6 * (len(rigid) - k)
         rows = sp.csr_array((np.ones(6), (np.arange(6), first + np.arange(6))), shape=(6, size))
     elif coupling.kind == "averaging":
-        rows = (averaging(body, coupling.nodes, coupling.point) if coupling.rows is None else coupling.rows) @ transform
+        rows = rows_of(body, coupling) @ transform
     else:
         assert coupling.kind == "nodes" and len(coupling.nodes) == 1
         components = COMPONENTS[:3]

@@ -25,12 +25,17 @@ _MEMORY_TABLE = Path("/proc/meminfo")
 
 @dataclass(frozen=True)
 class Need:
-    """Unknowns of a sector or (`whole`) of a body, and bytes of memory that its reduction takes at most, estimated
-    within a quarter."""
+    """Unknowns of one of the `sectors` of a body, or of all of it, and bytes of memory that its reduction takes at
+    most, estimated within a quarter."""
 
     unknowns: int
     memory: float
-    whole: bool = False
+    sectors: int = 1
+
+    @property
+    def whole(self) -> bool:
+        """Is the body reduced as a whole?"""
+        return self.sectors == 1
 
     @property
     def size(self) -> str:
@@ -54,7 +59,8 @@ def sector_need(sector: FeMesh | CyclicCut, teeth: int, modes: int, tooth_loads:
     loads, family = 2 * tooth_loads, modes / teeth + 4
     matrices = 3 * (2 * cut) ** 2 + loads**2 * (teeth / 2 + 4)
     fields = unknowns * (3 * loads + 2 * _SPACE * family)
-    return Need(unknowns, _BASE + 8 * (_FACTOR * unknowns ** (4 / 3) + matrices + fields) + _SPARSE * unknowns)
+    memory = _BASE + 8 * (_FACTOR * unknowns ** (4 / 3) + matrices + fields) + _SPARSE * unknowns
+    return Need(unknowns, memory, teeth)
 
 
 def available_memory() -> float | None:
@@ -70,13 +76,13 @@ def available_memory() -> float | None:
 def whole_need(unknowns: int, vectors: int, factors: int) -> Need:
     """Need of a body that is reduced as a whole: so many factors of its matrices and full vectors beside them."""
     numbers = factors * _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
-    return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
+    return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns)
 
 
 def parts_need(unknowns: int, parts: int, vectors: int) -> Need:
     """Need of a body of equal parts (`fem.repeated`), of its `unknowns` in all, and full vectors beside the factors."""
     factors = 4 * _PART_FACTORS * _PART_FACTOR * (unknowns / parts) ** (4 / 3)
-    return Need(unknowns, _BASE + factors + 8 * unknowns * vectors + _SPARSE * unknowns, True)
+    return Need(unknowns, _BASE + factors + 8 * unknowns * vectors + _SPARSE * unknowns)
 
 
 def modes_need(unknowns: int) -> Need:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.reduction.basis import Basis
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.moments import static_response
@@ -32,7 +31,6 @@ class Oscillators:
     """
 
     name: str
-    method: str
     omega: np.ndarray
     damping_ratio: np.ndarray
     rows: np.ndarray
@@ -64,42 +62,33 @@ class Oscillators:
         return self.static - kept @ kept.T
 
 
-def oscillators(body: FullOrder, basis: Basis, damping_ratio: float) -> Oscillators:
-    """Oscillators of `body` in `basis`, all with modal damping `damping_ratio`; costs n products with K and the static
-    response to all interfaces, which is kept."""
-    projected = basis.vectors.T @ (body.stiffness @ basis.vectors)
+def oscillators(body: FullOrder, vectors: np.ndarray, damping_ratio: float) -> Oscillators:
+    """Oscillators of `body` in the basis V (N, n) of a method, all with modal damping `damping_ratio`; costs n products
+    with K and the static response to all interfaces, which is kept."""
+    projected = vectors.T @ (body.stiffness @ vectors)
     rows = body.rows()
     static = (rows @ static_response(body)) * body.scales()
     static = 0.5 * (static + static.T)
-    return decoupled(body, Projection(basis.method, projected, rows @ basis.vectors, static), damping_ratio)
+    return decoupled(body, projected, rows @ vectors, static, damping_ratio)
 
 
-@dataclass(frozen=True)
-class Projection:
-    """A body in a basis orthonormal in M: VᵀKV (n, n), interface rows B V (m, n), and C_static (m, m)."""
-
-    method: str
-    stiffness: np.ndarray
-    rows: np.ndarray
-    static: np.ndarray
-
-
-def decoupled(body: FullOrder, projection: Projection, damping_ratio: float) -> Oscillators:
-    """Oscillators of a projection of `body`."""
-    squared, turn = np.linalg.eigh(0.5 * (projection.stiffness + projection.stiffness.T))
+def decoupled(
+    body: FullOrder, stiffness: np.ndarray, rows: np.ndarray, static: np.ndarray, damping_ratio: float
+) -> Oscillators:
+    """Oscillators of `body` in a basis orthonormal in M: VᵀKV (n, n), interface rows B V (m, n), C_static (m, m)."""
+    squared, turn = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
     assert squared.min(initial=1.0) > 0, "a basis with a motion that costs no energy"
     fields = _rigid_fields(body)
     return Oscillators(
         name=body.name,
-        method=projection.method,
         omega=np.sqrt(squared),
         damping_ratio=np.full(len(squared), damping_ratio),
-        rows=projection.rows @ turn,
+        rows=rows @ turn,
         labels=tuple((i.name, component) for i in body.interfaces for component in i.components),
         scales=body.scales(),
         rigid_rows=body.rows() @ fields,
         rigid_mass=fields.T @ (body.mass @ fields),
-        static=projection.static,
+        static=static,
         turn=turn,
     )
 

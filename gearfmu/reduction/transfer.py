@@ -1,4 +1,5 @@
-"""Transfer matrices of full and reduced bodies and their distance: relative Frobenius error (paper eq. 3).
+"""Transfer matrices of full and reduced bodies and their distance, the relative Frobenius error (paper eq. 3), by which
+reduction methods are judged.
 
     H(Ω) = Σ N Nᵀ/(ω²(1 + 2iζ) − Ω²) + rigid motion,    e(Ω) = ‖H − H̄‖_F / ‖H‖_F
 
@@ -11,16 +12,18 @@ nowhere in the band by more than 1e-12 of its norm or by what rounding leaves. T
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import BAND, Growing
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion
-from gearfmu.reduction.oscillators import Oscillators, Projection, decoupled
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import BAND, Expansion, Growing, Size
+from gearfmu.reduction.oscillators import Oscillators, decoupled, oscillators
 
 LINES = 400
 _POINTS = (0.0, 0.5, 1.0)  # expansion points of a reference, in parts of the band's upper end
@@ -95,11 +98,12 @@ def reference(body: FullOrder, judging: Judging) -> Reference:
     moments = _Moments(body, [(share * top) ** 2 for share in _POINTS])
     step = max(1, len(judging.frequency) // _CHECKED)
     watched = Judging(judging.frequency[::step], judging.damping_ratio)
+    without_residual = np.zeros((len(moments.rows),) * 2)
     last: np.ndarray | None = None
     best = float("inf")
     for _ in range(_BLOCKS):
         grown = moments.grow()
-        model = decoupled(body, moments.projection(), judging.damping_ratio)
+        model = decoupled(body, moments.stiffness, moments.rows, without_residual, judging.damping_ratio)
         now = transfer(model, watched, body.ground)
         change = float("inf") if last is None else float(relative_error(now, last).max())
         if change < _CONVERGED or not grown or (best < _ROUNDING and change > 0.2 * best):
@@ -136,6 +140,50 @@ class _Moments:
         self.stiffness = grown
         self.rows = np.hstack([self.rows, self.body.rows() @ added])
 
-    def projection(self) -> Projection:
-        """What is there so far, without static residual."""
-        return Projection("moments", self.stiffness, self.rows, np.zeros((len(self.rows),) * 2))
+
+@dataclass(frozen=True)
+class Trial:
+    """A method on the body: matrix (F, m, m) of the oscillators alone, error (F,) of it, mended (F,) with the static
+    residual, seconds of processor time beyond what methods before it had made."""
+
+    method: str
+    size: int
+    matrix: np.ndarray
+    error: np.ndarray
+    mended: np.ndarray
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """full : the body; exact : its own transfer matrix; trials : one a method, in the order asked for."""
+
+    full: FullOrder
+    exact: Reference
+    trials: tuple[Trial, ...]
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Lines (F,), Hz."""
+        return self.exact.judging.frequency
+
+    @property
+    def rows(self) -> list[str]:
+        """Names of the m rows and columns of the matrices: "bolt0.ux"."""
+        return [".".join(label) for label in self.exact.labels]
+
+
+def judged(full: FullOrder, methods: Sequence[tuple[str, Size]], judging: Judging) -> Judgement:
+    """The body reduced by each method, against itself."""
+    exact = reference(full, judging)
+    return Judgement(full, exact, tuple(_tried(full, exact, *entry) for entry in methods))
+
+
+def _tried(full: FullOrder, exact: Reference, method: str, size: Size) -> Trial:
+    clock, judging = time.process_time(), exact.judging
+    model = oscillators(full, METHODS[method](full, size), judging.damping_ratio)
+    seconds = time.process_time() - clock
+    matrix = transfer(model, judging, full.ground)
+    mended = transfer(model, judging, full.ground, residual=True)
+    errors = relative_error(exact.matrix, matrix), relative_error(exact.matrix, mended)
+    return Trial(method, model.size, matrix, *errors, seconds)

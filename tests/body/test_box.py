@@ -20,14 +20,14 @@ from gearfmu.body import Body, bodies, load_body, sound
 from gearfmu.body.body import How
 from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import save_body
-from gearfmu.body.whole import Read, whole_body
+from gearfmu.body.whole import whole_body
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.surface import faces_within
 from gearfmu.femesh.imported import ImportedMesh
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
-from gearfmu.reduction.imported.skin import enveloping_surface
+from gearfmu.reduction.imported.housing import ImportedHousing, Surface, enveloping_surface
+from gearfmu.reduction.moments import Size
 from gearfmu.reduction.transfer import Judging
 from gearfmu.sound import skin_of
 from gearfmu.stage.assembly.ground_part import ground_part
@@ -95,7 +95,7 @@ def _parted(order: FullOrder) -> tuple[FullOrder, tuple[Interface, ...]]:
 def body() -> Body:
     order, sensors = full()
     points, faces, rows = surface()
-    seen = Read(sensors, points, faces, rows)
+    seen = ImportedHousing(order, {}, {}, sensors, Surface(points, faces, sp.csr_array((len(points), 0)), 0), rows)
     return whole_body(order, How("1" * 64, "krylov"), Size(150), Judging.over(lines=60, damping_ratio=DAMPING), seen)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gearfmu.body import body_path, load_bodies, load_body, reduce_bodies, reduce_body
-from gearfmu.body.body import _FORMER
-from gearfmu.body.layout import ENTRIES, entries_of, value_of
+from gearfmu.body.body import _FORMER, ENTRIES
+from gearfmu.body.layout import entries_of, value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.files import seal

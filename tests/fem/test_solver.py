@@ -9,8 +9,7 @@ import scipy.linalg as sl
 from blocks import STEEL, box
 
 from gearfmu.fem import hex20, solver
-from gearfmu.fem.factor import Factor
-from gearfmu.fem.indefinite import FactorError, SymmetricFactor
+from gearfmu.fem.factor import Factor, FactorError, SymmetricFactor
 
 NODES, ELEMENTS = box((6, 3, 2), (0.09, 0.04, 0.02))
 STIFFNESS, MASS = hex20.assemble(NODES, ELEMENTS, STEEL)

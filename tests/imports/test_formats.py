@@ -18,7 +18,7 @@ from gearfmu.femesh.imported import ImportedMesh, read_mesh, repeated_cells
 from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.couplings import elements_of, set_coupling
+from gearfmu.reduction.imported.files import elements_of, set_coupling
 
 MM = 1e-3
 KINDS = ("hexahedron20", "tetra10", "hexahedron")

@@ -14,7 +14,7 @@ from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.shapes import MOST, energy_shares, harmonic_shares
 from gearfmu.modes.whole import whole_modes
-from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
 
@@ -108,7 +108,7 @@ def test_a_ring_by_sectors_and_as_a_whole() -> None:
     mesh, material = set_body("ring", 0.2)
     sectors = cyclic_modes("ring", mesh, material, 8)
     whole = whole_modes(
-        ring_full_order(load_stage("planetary54").by_file["ring"], None, 0.2), mesh.full(), {}, material, 8
+        toothed_full_order(load_stage("planetary54").by_file["ring"], None, 0.2), mesh.full(), {}, material, 8
     )
     assert np.allclose(frequencies(sectors)[:8], frequencies(whole)[:8], rtol=1e-7)
     assert [m.nodal_diameter for m in whole.modes] == [m.nodal_diameter for m in sectors.modes]

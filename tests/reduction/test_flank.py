@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from small_gear import COARSE, FINER, GEAR, WIDTH, flank
+from small_gear import FINER, GEAR, WIDTH, flank
 
-from gearfmu.errors import MeshError
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.cyclic.flank import Points, flank_loads
 
@@ -58,14 +55,3 @@ def test_width_functions_read_legendre_fields_back():
         expected = np.zeros(5)
         expected[degree] = 1 / (2 * degree + 1)
         assert np.allclose(loads @ field.ravel(), expected, atol=1e-3)
-
-
-def test_a_flank_that_is_not_meshed_whole_is_refused():
-    mesh = gear_sector(GEAR, WIDTH, COARSE)
-    points = Points(flank().chebyshev_rolls(4), 2)
-    with pytest.raises(MeshError, match="mesh the whole flank"):
-        flank_loads(mesh.nodes, mesh.flank[0].quads[:-2], flank(), 0, points)
-    with pytest.raises(MeshError, match="holes"):
-        flank_loads(mesh.nodes, mesh.flank[0].quads[1:], flank(), 0, points)
-    with pytest.raises(MeshError, match="face width"):
-        flank_loads(mesh.nodes, mesh.flank[0].quads, replace(flank(), face_width=2 * WIDTH), 0, points)

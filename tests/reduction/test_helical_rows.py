@@ -90,7 +90,8 @@ def test_resultants_are_the_closed_forms(kind: str, beta: float) -> None:
     """Forces to 1e-10: 1 N along n, axial part sin β_b; moments to the mesh's interpolation of r, worst near the base
     circle (6e-7, along the profile 5e-6). In the closed form F_t tan β = F_a with F_t = M_z / r."""
     body, shape = MAKERS[kind](beta, FINE), SHAPES[kind](beta)
-    normal, tangent = (rows.reshape(2, 4, 3, -1) for rows in (body.flank_rows, body.tangent_rows))
+    loads = body.load_matrix[: body.flank_count], body.load_matrix[body.profile_loads :]
+    normal, tangent = (rows.toarray().reshape(2, 4, 3, -1) for rows in loads)
     for side, sg in ((0, 1), (1, -1)):
         along_normal, along_profile = closed_form(body, shape, side)
         for loads, expected, most in ((normal, along_normal, 1e-6), (tangent, along_profile, 1e-5)):

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.reduction.carrier import carrier_full_order
-from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.mesh_error import (
+from gearfmu.reduction.carrier import (
     COMPARED,
     FINER,
+    carrier_full_order,
     carrier_mesh_error,
     compared_scale,
     extrapolated,
     free_frequencies,
 )
+from gearfmu.reduction.elastic import Elastic
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.stage import load_stage
 

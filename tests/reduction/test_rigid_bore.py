@@ -66,7 +66,7 @@ def test_frequencies_are_those_of_the_whole_gear(case: Case) -> None:
 
 def test_static_tables_are_those_of_the_whole_gear(case: Case) -> None:
     full = case.rows @ case.whole.flexibility(case.rows.T)
-    points, every = len(case.rigid.flank_rows), case.rigid.load_matrix.shape[0]
+    points, every = case.rigid.flank_count, case.rigid.load_matrix.shape[0]
     mine = case.statics.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)
     assert np.abs(mine - full[:points, :points]).max() < 1e-9 * np.abs(mine).max()
     bore = case.statics.static_fb.reshape(points, 6)
@@ -77,7 +77,7 @@ def test_static_tables_are_those_of_the_whole_gear(case: Case) -> None:
 def test_a_held_bore_is_a_clamped_bore(case: Case) -> None:
     """With the reaction that balances the load, statics of the free gear answer as the finite elements with all nodes
     of the bore clamped; the averaged bore is softer."""
-    points, motions = len(case.rigid.flank_rows), case.rigid.rigid_rows()
+    points, motions = case.rigid.flank_count, case.rigid.rigid_rows()
 
     def held(statics: Statics, row: int) -> float:
         ff = statics.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)[row, row]

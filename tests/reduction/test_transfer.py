@@ -7,8 +7,8 @@ import pytest
 from line_by_line import direct
 from small_body import mounted, small
 
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import Size
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
 

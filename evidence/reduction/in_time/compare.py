@@ -32,8 +32,8 @@ from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, ham
 from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
 from evidence.tables import read_rows, told, write_columns, write_rows
 from gearfmu.files import written_whole
-from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import Size
 from gearfmu.reduction.oscillators import oscillators
 
 HERE = Path(__file__).parent

@@ -26,7 +26,7 @@ from evidence.reduction.in_time.scenes import (
 )
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.reduction.full_order import Interface
-from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -56,7 +56,7 @@ def placed_ring(spec: Any, meshes: Meshes) -> Placed:
 
 def _ring(stage: Stage, meshes: Meshes, flank: sp.csr_array) -> Solid:
     """The ring with the springs of its mounts, one node a tooth, and rows of its contact points."""
-    inputs = ring_full_order(stage.by_file["ring"], stage.mounts, meshes.ring)
+    inputs = toothed_full_order(stage.by_file["ring"], stage.mounts, meshes.ring)
     labels = tuple(f"n{k}" for k in range(flank.shape[0]))
     full = replace(inputs, interfaces=(*inputs.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
     return Solid(full, inputs)

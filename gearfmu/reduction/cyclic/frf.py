@@ -20,7 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearfmu.fem.harmonic import Harmonic, flexibilities
-from gearfmu.reduction.cyclic.modal import Modes, Progress
+from gearfmu.files import stored
+from gearfmu.reduction.cyclic.modal import Modes, Progress, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.cyclic.statics import Statics
 
@@ -33,23 +34,23 @@ _AT_ONCE = 5  # nodal diameters whose loads the interior answers together
 
 @dataclass(frozen=True)
 class FrfError:
-    """Relative Frobenius error of a reduced body: frequency (F,) Hz, error (F,) with the nodes `ground` held.
+    """Relative Frobenius error of a reduced body with the nodes `ground` held. Of a gear also error_free; cut and size:
+    which modes were dynamic."""
 
-    band : Hz, in which `max_error` is the largest error. trusted_to : Hz, up to which the error stays below 1 %.
-    length : m, scale of the rotations. Of a gear also error_free (F,); cut : Hz, modes below it are dynamic, their
-    number is `size`.
-    """
-
-    frequency: np.ndarray
-    error: np.ndarray
-    band: tuple[float, float]
-    max_error: float
-    trusted_to: float
-    length: float
+    frequency: np.ndarray = stored(("F",), "Hz", "frequency lines")
+    error: np.ndarray = stored(("F",), "", "relative Frobenius error with the ground held (paper eq. 3)")
+    band: tuple[float, float] = stored((2,), "Hz", "band of max_error")
+    max_error: float = stored((), "", "largest error (ground held) in the band")
+    trusted_to: float = stored((), "Hz", "the error stays below 1 % up to this frequency")
+    length: float = stored((), "m", "length by which rotations are multiplied")
     ground: tuple[str, ...] = ()
-    error_free: np.ndarray | None = None
-    cut: float | None = None
-    size: int | None = None
+    error_free: np.ndarray | None = stored(
+        ("F",), "", "error of the free body's elastic part, with bore ports", optional=True
+    )
+    cut: float | None = stored(
+        (), "Hz", "modes below this were dynamic in the comparison, the others static", optional=True
+    )
+    size: int | None = stored((), "", "number of modes below the cut", "i8", optional=True)
 
     @classmethod
     def of(
@@ -84,9 +85,7 @@ class Series:
     moments: list[np.ndarray]
 
 
-def frf_error(
-    body: SectorBody, modes: Modes, statics: Statics, case: FrfCase, progress: Progress | None = None
-) -> FrfError:
+def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase, progress: Progress = untold) -> FrfError:
     """Relative error of modes below the cut + static residual against the finite elements (see the head of this
     file)."""
     inputs = frf_inputs(len(body.points.rolls), body.points.functions)
@@ -142,15 +141,14 @@ def static_matrix(statics: Statics, inputs: np.ndarray) -> np.ndarray:
     return np.block([[flank, bore], [bore.T, statics.static_bb]])
 
 
-def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress | None) -> list[np.ndarray]:
+def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress) -> list[np.ndarray]:
     """Fᵀ C (M C)^j F for j = 1, 2, 3 over the whole body, flank loads on tooth 0 and bore loads."""
     size = len(inputs) + 6
     total = [np.zeros((size, size)) for _ in range(3)]
     diameters = body.diameters()
     for space in body.spaces:
         for start in range(0, len(diameters), _AT_ONCE):
-            if progress:
-                progress(f"frequency response, nodal diameter {start}", start / len(diameters))
+            progress(f"frequency response, nodal diameter {start}", start / len(diameters))
             harmonics = [space.harmonic(nu) for nu in diameters[start : start + _AT_ONCE]]
             _add_moments(total, body, harmonics, inputs)
     return total

@@ -11,7 +11,7 @@ of the speed: they are numbers of the body.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,38 +19,37 @@ import scipy.sparse as sp
 from gearfmu.fem.cyclic import SectorSpace
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.fem.low_fields import LowFields
-from gearfmu.fem.refined import refined_modes
+from gearfmu.fem.low_fields import LowFields, refined_modes
 from gearfmu.fem.spinning import leave_axial, turn_quarter
+from gearfmu.files import ROW_BITS, stored
 from gearfmu.reduction.cyclic.sector import SectorBody
 
 _SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
 _SAMPLED = 1e-4  # residual of their modes
 _BESIDE = 3  # modes of a family beyond its share that join the space
 _SPACE_SHARE = 0.4  # of the time, for the space
-_SHAPES = 4  # lowest shapes of each family kept for pictures
-COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
 
-Progress = Callable[[str, float], None]
+Progress = Callable[[str, float], None]  # what is being done, share done of it
+
+
+def untold(what: str, share: float) -> None:
+    """Progress that nobody asks for."""
 
 
 @dataclass(frozen=True)
 class Spin:
-    """Terms of the turning axes, n real modes.
+    """Terms of the turning axes, n real modes: Ω turns the pair of a mode by 2Ω coupling."""
 
-    coupling (n, n), skew: ∫ρ φ_k · (e_z × φ_l), so that Ω turns the pair of a mode by 2Ω coupling; tilt (2, n),
-    kg^½·m: ∫ρ z (φ_x, φ_y), the same coupling with rigid tilt about x and y; load (n,), kg^½·m: centrifugal load per
-    Ω²; stiffening (n,): B of ω² = ω₀² + B Ω², stresses less softening; growth (2, R, A), m·s²: outward normal
-    displacement of tooth 0 under centrifugal load per Ω²; inertia (), kg·m²·s²: what that adds to the polar moment of
-    inertia per Ω².
-    """
-
-    coupling: np.ndarray
-    tilt: np.ndarray
-    load: np.ndarray
-    stiffening: np.ndarray
-    growth: np.ndarray
-    inertia: float
+    coupling: np.ndarray = stored(
+        ("n", "n"), "", "integral of density times mode k . (e_z x mode l), skew", bits=ROW_BITS
+    )
+    tilt: np.ndarray = stored((2, "n"), "kg1/2.m", "the same with rigid tilt about x and y: of z u_x and z u_y")
+    load: np.ndarray = stored(("n",), "kg1/2.m", "centrifugal load per square of the speed")
+    stiffening: np.ndarray = stored(("n",), "", "B in ω² = ω₀² + B Ω²: stresses less softening")
+    growth: np.ndarray = stored(
+        (2, "R", "A"), "m.s2", "flank rows of tooth 0 under centrifugal load per square of the speed"
+    )
+    inertia: float = stored((), "kg.m2.s2", "what that adds to the polar inertia per square of the speed")
 
 
 @dataclass(frozen=True)
@@ -70,10 +69,9 @@ class Modes:
 
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
     and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are
-    none, kg^-½: like flank_rows, along the profile. shapes : index of a mode → (3N,) sector
-    displacement in kg^-½, complex for a pair's first mode. surface (n, P, 3) or None, kg^-½: displacement of chosen
-    points of sector 0 in every mode, the second of a pair its imaginary part. spin : what they feel when the body
-    turns; None where that was not made.
+    none, kg^-½: like flank_rows, along the profile. surface (n, P, 3) or None, kg^-½: displacement of chosen points of
+    sector 0 in every mode, the second of a pair its imaginary part. spin : what they feel when the body turns; None
+    where that was not made.
     """
 
     frequency: np.ndarray
@@ -83,7 +81,6 @@ class Modes:
     flank_rows: np.ndarray
     bore_rows: np.ndarray
     patch_rows: np.ndarray
-    shapes: dict[int, np.ndarray]
     tangent_rows: np.ndarray | None = None
     surface: np.ndarray | None = None
     spin: Spin | None = None
@@ -91,22 +88,57 @@ class Modes:
 
 @dataclass(frozen=True)
 class _FamilyModes:
-    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), lowest shapes (3N, k
-    at most) for pictures, displacement (k, P, 3) of the chosen points, complex for weight 2; what they feel when the
-    body turns."""
+    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), displacement (k, P,
+    3) of the chosen points, complex for weight 2; what they feel when the body turns."""
 
     weight: int
     complete: bool
     squared: np.ndarray
     flank_rows: np.ndarray
     bore_rows: np.ndarray
-    shapes: np.ndarray
     surface: np.ndarray
     spin: FamilySpin | None
 
 
+@dataclass(frozen=True)
+class Pattern:
+    """A real mode, or two as one complex: ω², nodal diameter, parity, and by name what is read of it."""
+
+    squared: float
+    diameter: int
+    parity: int
+    read: dict[str, np.ndarray]
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """Numbers of its real modes: 0 single, 1 and 2 of a pair."""
+        return (1, 2) if any(map(np.iscomplexobj, self.read.values())) else (0,)
+
+
+def real_modes(patterns: Sequence[Pattern], count: int) -> tuple[dict[str, np.ndarray], list[int]]:
+    """The first `count` real modes of patterns, as far as whole patterns go: columns of `Modes` that all bodies have,
+    (n,), and what is read, by name, (…, n) of rows and (n, …) of points; and the number of every mode's pattern."""
+    found: list[tuple[int, int]] = []
+    for number, pattern in enumerate(patterns):
+        if len(found) + len(pattern.parts) > count:
+            break
+        found += [(number, part) for part in pattern.parts]
+    owner, part = [number for number, _ in found], np.array([part for _, part in found], int)
+    mine = [patterns[number] for number in owner]
+    columns = {
+        "frequency": np.array([np.sqrt(own.squared) / (2 * np.pi) for own in mine]),
+        "nodal_diameter": np.array([own.diameter for own in mine], int),
+        "part": part,
+        "parity": np.array([own.parity for own in mine], int),
+    }
+    for name, first in patterns[0].read.items():
+        both = [own.read[name].imag if k == 2 else own.read[name].real for own, k in zip(mine, part, strict=True)]
+        columns[name] = np.stack(both, 1 if first.ndim == 1 else 0)
+    return columns, owner
+
+
 def elastic_modes(
-    body: SectorBody, count: int, progress: Progress | None = None, sample: sp.csr_array | None = None
+    body: SectorBody, count: int, progress: Progress = untold, sample: sp.csr_array | None = None
 ) -> Modes:
     """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
 
@@ -131,27 +163,24 @@ def elastic_modes(
         for index, low in enumerate(lows):
             for mine in refined_modes(low, {nu: wanted[s, nu] for s, nu in open_families if s == index}):
                 nu = mine[0].nodal_diameter
-                if progress:
-                    done = number / len(open_families)
-                    progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
+                done = number / len(open_families)
+                progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
                 found[index, nu] = _made(body, mine, chosen)
                 number += 1
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
-            modes = _assembled(body, found, count)
-            return modes if sample is not None else replace(modes, surface=None)
+            return _assembled(body, found, count)
         for key in again:
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
 
-def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress | None) -> LowFields:
+def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress) -> LowFields:
     """The space of the modes of a few nodal diameters; low ones have the most modes in a band."""
     low, last = LowFields(space), body.diameters()[-1]
     diameters = sorted({round(part * last) for part in _SAMPLES})
     for number, nu in enumerate(diameters):
-        if progress:
-            progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
+        progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
         harmonic, wide = space.harmonic(nu), 2 - 1.5 * nu / last
         low.add(harmonic, lowest_modes(harmonic, int(wide * _share(body, count)) + _BESIDE, _SAMPLED)[1])
     return low
@@ -188,18 +217,17 @@ def _made(body: SectorBody, modes: tuple[Harmonic, np.ndarray, np.ndarray], samp
     fields = harmonic.space.to_nodes @ harmonic.expand(shapes)
     flank = np.zeros((body.load_matrix.shape[0], len(squared)), shapes.dtype)
     flank[seen] = body.load_matrix[seen] @ fields
-    gauge = _gauge(flank[: body.profile_loads])
+    gauge = _phases(flank[: body.profile_loads])
     fields, flank = fields * gauge, flank * gauge
     bore = body.teeth * (body.bore_parts(harmonic).conj().T @ (body.bore_moments[0] @ fields))
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
     for k in range(len(squared) if sample.shape[0] else 0):
         surface[k] = sample @ fields[:, k].reshape(-1, 3)
     spin = family_spin(body, harmonic.nodal_diameter, weight, fields) if body.knows_stress else None
-    pictures = fields[:, :_SHAPES].copy()
-    return _FamilyModes(weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
+    return _FamilyModes(weight, len(squared) >= harmonic.elastic, squared, flank, bore, surface, spin)
 
 
-def _gauge(rows: np.ndarray) -> np.ndarray:
+def _phases(rows: np.ndarray) -> np.ndarray:
     """Factors that fix the free sign, or the free phase of a pair: the real part dominates the flank rows, its largest
     entry is positive. Modes that leave the flanks at rest keep their sign."""
     square = (rows**2).sum(axis=0)
@@ -214,41 +242,19 @@ def _gauge(rows: np.ndarray) -> np.ndarray:
 def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], count: int) -> Modes:
     entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
     entries.sort(key=lambda entry: entry[0])
-    columns: dict[str, list] = {name: [] for name in COLUMNS}
-    spins: list[tuple[FamilySpin, int, int]] = []  # none where the body does not know them
-    shapes: dict[int, np.ndarray] = {}
-    for squared, key, k in entries:
-        modes = found[key]
-        pair = modes.weight == 2
-        if len(columns["part"]) + (2 if pair else 1) > count:
-            break
-        if k < modes.shapes.shape[1]:
-            shapes[len(columns["part"])] = modes.shapes[:, k]
-        for part in (1, 2) if pair else (0,):
-            columns["frequency"].append(np.sqrt(squared) / (2 * np.pi))
-            columns["diameter"].append(key[1])
-            columns["part"].append(part)
-            if modes.spin is not None:
-                spins.append((modes.spin, k, part))
-            columns["parity"].append(body.spaces[key[0]].parity)
-            columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
-            columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
-            columns["surface"].append(modes.surface[k].imag if part == 2 else modes.surface[k].real)
-    numbers, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [body.flank_count, body.profile_loads])
-    return Modes(
-        np.array(columns["frequency"]),
-        numbers,
-        parts,
-        parities,
-        flank,
-        np.stack(columns["bore"], 1),
-        patch,
-        shapes,
-        tangent,
-        np.array(columns["surface"]),
-        _joined_spin(body, spins) if spins else None,
-    )
+    patterns = []
+    for squared, (index, nu), k in entries:
+        m = found[index, nu]
+        read = {"all_rows": m.flank_rows[:, k], "bore_rows": m.bore_rows[:, k], "surface": m.surface[k]}
+        patterns.append(Pattern(squared, nu, body.spaces[index].parity, read))
+    columns, owner = real_modes(patterns, count)
+    flank, patch, tangent = np.split(columns.pop("all_rows"), [body.flank_count, body.profile_loads])
+    spins = []  # none where the body does not know them
+    for (_, key, k), part in zip((entries[number] for number in owner), columns["part"].tolist(), strict=True):
+        if (spin := found[key].spin) is not None:
+            spins.append((spin, k, part))
+    joined = _joined_spin(body, spins) if spins else None
+    return Modes(flank_rows=flank, patch_rows=patch, tangent_rows=tangent, spin=joined, **columns)
 
 
 def family_spin(body: SectorBody, diameter: int, weight: int, shapes: np.ndarray) -> FamilySpin:

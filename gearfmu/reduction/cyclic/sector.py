@@ -14,7 +14,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.geometry.plane import about_z
+from gearfmu.geometry.plane import frames
 from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, flank_loads
 
 
@@ -46,7 +46,8 @@ class SectorBody:
             bool(flank.base_helix_angle), self._held_faces.nodes if rigid_bore else None,
         )  # fmt: skip
         self.spaces = sector_spaces(sector)
-        self.load_matrix = self._all_loads()
+        loads = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
+        self.load_matrix = sp.csr_array(sp.vstack(loads))
 
     def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
         """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
@@ -61,16 +62,6 @@ class SectorBody:
         """Number 2·R·A of flank loads of a tooth."""
         return 2 * len(self.points.rolls) * self.points.functions
 
-    @property
-    def flank_rows(self) -> np.ndarray:
-        """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
-        return self.load_matrix[: self.flank_count].toarray()
-
-    @property
-    def tangent_rows(self) -> np.ndarray:
-        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
-        return self.load_matrix[self.profile_loads :].toarray()
-
     @cached_property
     def patch_rows(self) -> np.ndarray:
         """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
@@ -82,10 +73,6 @@ class SectorBody:
     def patch_point(self) -> np.ndarray:
         """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
         return self.mesh.nodes[self._held_nodes].mean(axis=0)
-
-    def _all_loads(self) -> sp.csr_array:
-        parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
-        return sp.csr_array(sp.vstack(parts))
 
     @property
     def profile_loads(self) -> int:
@@ -167,8 +154,4 @@ class SectorBody:
 
     def turned_sum(self, matrix: np.ndarray) -> np.ndarray:
         """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
-        total = np.zeros((6, 6))
-        for angle in 2 * np.pi * np.arange(self.teeth) / self.teeth:
-            turn = np.kron(np.eye(2), about_z(angle))
-            total += turn @ matrix @ turn.T
-        return total
+        return sum((turn @ matrix @ turn.T for turn in frames(self.teeth)), np.zeros((6, 6)))

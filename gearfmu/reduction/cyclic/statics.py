@@ -12,7 +12,7 @@ inertia forces of rigid motion, which are loads of the sector like others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from gearfmu.fem.cyclic import SectorSpace
 from gearfmu.fem.harmonic import Harmonic
 from gearfmu.reduction.cyclic.flank import Points
-from gearfmu.reduction.cyclic.modal import Progress
+from gearfmu.reduction.cyclic.modal import Progress, untold
 from gearfmu.reduction.cyclic.sector import SectorBody
 
 _NEGLIGIBLE = 1e-11  # of the largest: singular values of the loads on the cuts that are left out
@@ -32,22 +32,22 @@ _COLUMNS = 128
 class Statics:
     """Static compliance, conventions of `body.body.Flank`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
     1/N; C_bb (6, 6), m/N … 1/(N·m). pictures : (p, z, 3N) displacement of all sectors, in sector frames, under the
-    unit flank loads asked for, m/N. Of a ring also static_fp (2, z, R, A, 3), flank row of tooth 0 per unit force x, y,
-    z (sector frame) on the rim patch of sector m, and static_pp (z, 3, 3), m/N; empty (last index 0) of a gear.
-    static_nt, static_tt (2, 2, R, R, A, A), m/N: displacement along the normal and along the profile at (tooth 0, flank
-    f, roll i, function a) per load along the profile at (tooth 0, g, j, b); None where there are no such rows."""
+    unit flank loads asked for, m/N. static_nt, static_tt (2, 2, R, R, A, A), m/N: displacement along the normal and
+    along the profile at (tooth 0, flank f, roll i, function a) per load along the profile at (tooth 0, g, j, b); None
+    where there are no such rows. Of a ring also static_fp (2, z, R, A, 3), flank row of tooth 0 per unit force x, y, z
+    (sector frame) on the rim patch of sector m, and static_pp (z, 3, 3), m/N; last index 0 of a gear by its sector."""
 
     static_ff: np.ndarray
     static_fb: np.ndarray
     static_bb: np.ndarray
-    static_fp: np.ndarray
-    static_pp: np.ndarray
     pictures: np.ndarray
     static_nt: np.ndarray | None = None
     static_tt: np.ndarray | None = None
+    static_fp: np.ndarray | None = None
+    static_pp: np.ndarray | None = None
 
 
-def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress | None = None) -> Statics:
+def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress = untold) -> Statics:
     """Compliance of all flank points and the bore for every tooth offset.
 
     picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
@@ -60,13 +60,13 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
         loads = _CondensedLoads(body, space)
         seen, normal = loads.columns, np.flatnonzero(loads.columns < size)
         shown = [load for load in picture_loads if load in seen]
-        rest = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
+        kernels, moved = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
         table = np.zeros((z, len(normal), len(normal)))
         for m in range(z):
-            table[m] = loads.parts[:, normal].T @ rest.kernels[m] @ loads.parts[:, normal]
+            table[m] = loads.parts[:, normal].T @ kernels[m] @ loads.parts[:, normal]
         inner = loads.gram[: loads.count, : loads.count]
         table[0] += inner[np.ix_(normal, normal)]
-        own[np.ix_(seen, seen)] += inner + loads.parts.T @ rest.kernels[0] @ loads.parts
+        own[np.ix_(seen, seen)] += inner + loads.parts.T @ kernels[0] @ loads.parts
         for nu in (0, 1):
             harmonic = space.harmonic(nu)
             product = loads.compliance(harmonic, loads.tooth, loads.tooth) - inner
@@ -79,9 +79,8 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
             bb += z * harmonic.weight * loads.compliance(harmonic, bore, bore).real
         ff[np.ix_(np.arange(z), seen[normal], seen[normal])] += table
         for number, load in enumerate(shown):
-            pictures[picture_loads.index(load)] += _picture(body, index, load, rest.moved[:, :, [number]])
-    shaped = _shaped(body, ff, fb[:size], bb, pictures)
-    return replace(shaped, **_along_profile(body, 0.5 * (own + own.T)))
+            pictures[picture_loads.index(load)] += _picture(body, index, load, moved[:, :, [number]])
+    return _shaped(body, symmetric_offsets(ff), fb, bb, 0.5 * (own + own.T), pictures)
 
 
 class _CondensedLoads:
@@ -143,33 +142,25 @@ def _low_rank(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return left[:, kept], values[kept, None] * right[kept]
 
 
-@dataclass(frozen=True)
-class _Diameters:
-    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `_CondensedLoads.kernel` by tooth offset, and
-    moved (ν, c, p), the cut's displacement under the loads that are shown."""
-
-    kernels: np.ndarray
-    moved: np.ndarray
-
-
 def _all_diameters(
-    body: SectorBody, index: int, loads: _CondensedLoads, shown: np.ndarray, progress: Progress | None
-) -> _Diameters:
+    body: SectorBody, index: int, loads: _CondensedLoads, shown: np.ndarray, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
+    """What ν = 2, 3, … do on the cuts: Fourier sums (z, r, r) of `_CondensedLoads.kernel` by tooth offset, and the
+    cut's displacement (ν, c, p) under the loads that are shown."""
     z, found = body.teeth, []
     diameters = np.arange(2, z // 2 + 1)
     for nu in diameters.tolist():
-        if progress:
-            progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+        progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
         harmonic = body.spaces[index].harmonic(nu)
         moved, kernel = loads.kernel(harmonic)
         found.append((moved @ loads.parts[:, shown], kernel))
     turn = _weights(z, diameters) * np.exp(2j * np.pi * np.multiply.outer(np.arange(z), diameters) / z)
     rank = loads.patterns.shape[1]
     if not found:
-        return _Diameters(np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown))))
+        return np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown)))
     stacked = np.array([kernel for _, kernel in found]).reshape(len(found), -1)
     kernels = turn.real @ stacked.real + turn.imag @ stacked.imag
-    return _Diameters(kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found]))
+    return kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found])
 
 
 def _weights(z: int, diameters: np.ndarray) -> np.ndarray:
@@ -198,26 +189,24 @@ def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.n
     return total
 
 
-def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
-    """Tables of loads along the profile from the compliance (every, every) of all loads of one tooth."""
-    points, first = body.flank_count, body.profile_loads
-    if first == len(own):
-        return {}
-    shape = (2, len(body.points.rolls), body.points.functions)
-    blocks = {"static_nt": own[:points, first:], "static_tt": own[first:, first:]}
-    return {
-        name: np.ascontiguousarray(block.reshape(*shape, *shape).transpose(0, 3, 1, 4, 2, 5))
-        for name, block in blocks.items()
-    }
-
-
-def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
-    points, z, flank = body.points, body.teeth, body.flank_count
-    both = symmetric_offsets(ff)
-    static_fp = both[:, :flank, flank:].reshape(z, 2, len(points.rolls), points.functions, -1).transpose(1, 0, 2, 3, 4)
-    static_fb = fb[:flank].reshape(2, len(points.rolls), points.functions, 6)
-    static_ff = by_load(both[:, :flank, :flank], points)
-    return Statics(static_ff, static_fb, 0.5 * (bb + bb.T), static_fp, both[:, flank:, flank:], pictures)
+def _shaped(
+    body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, own: np.ndarray, pictures: np.ndarray
+) -> Statics:
+    """The tables by flank, roll and function; own (every, every): compliance of all loads of one tooth."""
+    z, flank, profile = body.teeth, body.flank_count, body.profile_loads
+    loads = 2, len(body.points.rolls), body.points.functions
+    of_profile = (block.reshape(*loads, *loads) for block in (own[:flank, profile:], own[profile:, profile:]))
+    normal, tangent = (np.ascontiguousarray(block.transpose(0, 3, 1, 4, 2, 5)) for block in of_profile)
+    return Statics(
+        static_ff=by_load(ff[:, :flank, :flank], body.points),
+        static_fb=fb[:flank].reshape(*loads, 6),
+        static_bb=0.5 * (bb + bb.T),
+        pictures=pictures,
+        static_nt=normal,
+        static_tt=tangent,
+        static_fp=ff[:, :flank, flank:].reshape(z, *loads, -1).transpose(1, 0, 2, 3, 4),
+        static_pp=ff[:, flank:, flank:],
+    )
 
 
 def symmetric_offsets(tables: np.ndarray) -> np.ndarray:

@@ -17,8 +17,7 @@ from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.mesh import CarrierGeometry
 from gearfmu.reduction.couplings import full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported.couplings import elements_of, set_coupling
-from gearfmu.reduction.imported.files import naming, ready_matrices, sound_mesh, whole_facts
+from gearfmu.reduction.imported.files import elements_of, naming, ready_matrices, set_coupling, sound_mesh, whole_facts
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import carrier_geometry

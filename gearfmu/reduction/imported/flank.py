@@ -66,11 +66,9 @@ def fit_flanks(nodes: np.ndarray, faces: Faces, teeth: int, flank: ToothFlank, t
         ) from None
     if fit.worst > tolerance:
         raise MeshError(
-            f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} "
-            "µm) off the "
-            f"best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * r_b:.5g} mm), allowed are "
-            f"{1e6 * tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage "
-            "file), or raise "
+            f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} µm) off "
+            f"the best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * r_b:.5g} mm), allowed are "
+            f"{1e6 * tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage file), or raise "
             "`flank_tolerance`"
         )
     return fit
@@ -232,9 +230,8 @@ def _on_surface(chart: np.ndarray, part: Faces, place: np.ndarray) -> sp.csr_arr
     if best.max() > _OUTSIDE:
         lost = place[best > _OUTSIDE]
         raise MeshError(
-            f"the faces do not cover the flank: nothing at {1e3 * lost[0, 0]:.4g} mm along the involute, "
-            f"z = {1e3 * lost[0, 1]:.4g} mm from mid-width ({len(lost)} of {len(place)} points); does the "
-            "mesh end before "
+            f"the faces do not cover the flank: nothing at {1e3 * lost[0, 0]:.4g} mm along the involute, z = "
+            f"{1e3 * lost[0, 1]:.4g} mm from mid-width ({len(lost)} of {len(place)} points); does the mesh end before "
             "the form or tip circle of the stage file?"
         )
     return answer

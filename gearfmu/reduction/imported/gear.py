@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,79 +12,107 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
+from gearfmu.fem.coupling import averaging_rows
+from gearfmu.fem.surface import Faces
 from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
-from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.femesh.imported import ImportedMesh, repeated_cells
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.involute_fit import InvoluteFit
 from gearfmu.reduction.couplings import full_order
-from gearfmu.reduction.cyclic.flank import Points, ToothFlank
+from gearfmu.reduction.cyclic.flank import Direction, Points, ToothFlank, tooth_flank
+from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
-from gearfmu.reduction.imported.files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.imported.files import (
+    Matrices,
+    elements_of,
+    mesh_facts,
+    naming,
+    ready_matrices,
+    set_coupling,
+    sound_mesh,
+)
 from gearfmu.reduction.imported.flank import fit_flanks, tooth_loads
 from gearfmu.reduction.imported.mean_tooth import WholeGear
-from gearfmu.reduction.imported.sector import ImportedSector
-from gearfmu.reduction.memory import MESH_COARSER, Need, require_memory, sector_need, whole_need
+from gearfmu.reduction.memory import MESH_COARSER, require_memory, sector_need, whole_need
+from gearfmu.stagefile.forms.general import RingBody, ToothedBody
+from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 BORE = "bore"
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
-_WIDTH = 2e-3  # relative difference of face width, base radius and tooth thickness to the stage file
+_WIDTH, _THICKNESS = 2e-3, 0.05  # relative difference of face width and base radius, of tooth thickness to the file
 _HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibration of a solid body
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """The gear that the stage file describes: teeth, flank and its load points, radius (m) of the bore (internal: of
-    the rim), material, number of modes that will be stored."""
-
-    teeth: int
-    flank: ToothFlank
-    points: Points
-    bore_radius: float
-    material: Any
-    modes: int
-
-
-@dataclass(frozen=True)
-class ImportedGear:
-    """An imported gear ready to be reduced: its body, on one sector or whole; the nodes (N, 3), m, of the whole file in
-    the frame of the gear; plain facts about mesh and fit."""
-
-    body: ImportedSector | WholeGear
-    nodes: np.ndarray
-    facts: dict[str, Any]
 
 
 @dataclass(frozen=True)
 class CheckedGear:
     """An imported gear that has been read, checked, fitted and placed: its mesh in the frame of the gear, ready-made
-    matrices or None, its sector or None, plain facts."""
+    matrices or None, its sector or None, plain facts, and the flank that is meant with its load points."""
 
     mesh: ImportedMesh
     matrices: Matrices | None
     cut: CyclicCut | None
     facts: dict[str, Any]
+    flank: ToothFlank
+    points: Points
+
+    @property
+    def bore_of_cut(self) -> np.ndarray:
+        """Nodes of the sector on the bore, of a ring on the rim."""
+        assert self.cut is not None
+        return np.flatnonzero(np.isin(self.cut.of_mesh, self.mesh.sets[BORE]))
 
 
-def checked_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> CheckedGear:
+class ImportedSector(SectorBody):
+    """`SectorBody` on a cut of an imported mesh.
+
+    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). matrices : stiffness
+    (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
+    """
+
+    def __init__(
+        self, cut: CyclicCut, bore: np.ndarray, teeth: int, matrices: Matrices, flank: ToothFlank, points: Points
+    ):
+        self.faces = solids.boundary(cut.elements)
+        sets = {"rim" if flank.internal else "bore": bore}
+        mesh = FeMesh(cut.nodes, repeated_cells(cut.elements), sets, teeth, cut.cut_minus, cut.cut_plus)
+        super().__init__(mesh, matrices, flank, points)
+
+    def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
+        return tooth_loads(self.mesh.nodes, self.faces, self.flank, self.points, direction=direction)
+
+    @cached_property
+    def patch_rows(self) -> np.ndarray:
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
+        if not self.internal:
+            return np.zeros((0, self.mesh.nodes.size))
+        return averaging_rows(self.mesh.nodes - self.patch_point, self._held_faces)[:3]
+
+    @property
+    def _held_faces(self) -> Faces:
+        return self.faces.within(self._held_nodes)
+
+
+def checked_gear(gear: ToothedBody) -> CheckedGear:
     """Read, check, fit and place the finite elements of a gear.
 
-    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, is reduced by
-    cyclic symmetry; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore by the mean tooth.
-    MeshError lists the faults of the files.
+    A sector mesh, and a whole mesh that is cyclic, is reduced by cyclic symmetry; a whole mesh that is not, a whole
+    gear's ready-made matrices and a rigid bore by the mean tooth. MeshError lists the faults of the files.
     """
-    file = Path(source.file)
+    source, (flank, points) = _source(gear), tooth_flank(gear_shape(gear), gear)
+    if gear.helix_angle:
+        raise MeshError(f"{source.file}: finite elements made elsewhere are read for spur gears only")
     mesh = sound_mesh(source)
-    with naming(file):
-        fit = _fit(mesh, source, wanted)
+    with naming(Path(source.file)):
+        fit = _fit(mesh, source, gear.teeth, flank)
         placed = replace(mesh, nodes=fit.in_gear_frame(mesh.nodes))
-        _same_gear(placed, fit, wanted)
-        placed.sets[BORE] = _bore_nodes(placed, source.bore, wanted)
-        matrices = ready_matrices(source, placed, fit.turn(), wanted.material)
-        whole, cut = is_whole(placed.nodes, wanted.teeth), None
+        _same_gear(placed, fit, flank)
+        placed.sets[BORE] = _bore_nodes(placed, source.bore, gear)
+        matrices = ready_matrices(source, placed, fit.turn(), gear.material)
+        whole, cut = is_whole(placed.nodes, gear.teeth), None
         if source.bore_coupling == "averaging" and (matrices is None or not whole):
-            cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
-        if cut is None and wanted.flank.internal:
+            cut = cyclic_cut(placed.nodes, placed.elements, gear.teeth)
+        if cut is None and flank.internal:
             raise MeshError(
                 "a ring is taken by sectors only, for the sake of its mounts: give one sector that holds a whole tooth "
                 "space, with its matrices if they are ready-made, or a whole mesh that repeats itself from space to "
@@ -94,42 +123,38 @@ def checked_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> Checked
                 'a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear'
             )
         method = "mean tooth" if cut is None else "cyclic"
-        dofs = 3 * (len(mesh.nodes) if cut is None else wanted.teeth * (len(cut.nodes) - len(cut.cut_plus)))
-        facts = _facts(placed, fit) | {"method": method, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
-        return CheckedGear(placed, matrices, cut, facts)
+        dofs = 3 * (len(mesh.nodes) if cut is None else gear.teeth * (len(cut.nodes) - len(cut.cut_plus)))
+        facts = _facts(placed, fit) | {"method": method, "dof_sector": dofs // gear.teeth, "dof_body": dofs}
+        return CheckedGear(placed, matrices, cut, facts, flank, points)
 
 
-def imported_gear(source: ImportSpec | RingImportSpec, wanted: Wanted) -> ImportedGear:
-    """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
-    found = checked_gear(source, wanted)
+def loaded_gear(found: CheckedGear, gear: ToothedBody) -> ImportedSector | WholeGear:
+    """A checked gear with the loads of its teeth, ready to be reduced, on one sector or whole. Raises MeshError."""
+    source, cut = _source(gear), found.cut
     with naming(Path(source.file)):
-        require_memory(_need(found, wanted), MESH_COARSER)
-        body: ImportedSector | WholeGear
-        if found.cut is None:
-            body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
-        else:
-            bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
-            matrices = found.matrices or solids.assemble(found.cut.nodes, found.cut.elements, wanted.material)
-            body = ImportedSector(found.cut, bore, wanted.teeth, matrices, wanted.flank, wanted.points)
-    return ImportedGear(body, found.mesh.nodes, found.facts)
+        loads = 2 * len(found.points.rolls) * found.points.functions
+        if cut is None:
+            need = whole_need(found.mesh.nodes.size, gear.body.modes + 3 * loads, 1)
+            require_memory(need, MESH_COARSER)
+            return _whole(found, source.bore_coupling, gear)
+        require_memory(sector_need(cut, gear.teeth, gear.body.modes, loads), MESH_COARSER)
+        matrices = found.matrices or solids.assemble(cut.nodes, cut.elements, gear.material)
+        return ImportedSector(cut, found.bore_of_cut, gear.teeth, matrices, found.flank, found.points)
 
 
-def _need(found: CheckedGear, wanted: Wanted) -> Need:
-    """Memory that the reduction of checked finite elements takes."""
-    loads = 2 * len(wanted.points.rolls) * wanted.points.functions
-    if found.cut is not None:
-        return sector_need(found.cut, wanted.teeth, wanted.modes, loads)
-    return whole_need(found.mesh.nodes.size, wanted.modes + 3 * loads, 1)
+def _source(gear: ToothedBody) -> ImportSpec | RingImportSpec:
+    assert gear.imported is not None
+    return gear.imported
 
 
-def _fit(mesh: ImportedMesh, source: ImportSpec | RingImportSpec, wanted: Wanted) -> InvoluteFit:
+def _fit(mesh: ImportedMesh, source: ImportSpec | RingImportSpec, teeth: int, flank: ToothFlank) -> InvoluteFit:
     middle = (
         mesh.nodes[mesh.node_set(source.bore)].mean(axis=0)
         if source.bore and _around(mesh, source.bore)
         else np.zeros(3)
     )
     faces = solids.boundary(mesh.elements)
-    fit = fit_flanks(mesh.nodes - middle, faces, wanted.teeth, wanted.flank, source.flank_tolerance)
+    fit = fit_flanks(mesh.nodes - middle, faces, teeth, flank, source.flank_tolerance)
     return replace(fit, origin=fit.origin + middle)
 
 
@@ -140,20 +165,19 @@ def _around(mesh: ImportedMesh, name: str) -> bool:
     return bool(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi / 2)
 
 
-def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
+def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, flank: ToothFlank) -> None:
     """MeshError when the fitted gear is not the one of the stage file."""
-    flank = wanted.flank
-    width = 2 * float(np.abs(mesh.nodes[:, 2][_flank_nodes(mesh, wanted)]).max())
+    radius, (low, high) = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1]), flank.radii()
+    width = 2 * float(np.abs(mesh.nodes[(radius > low) & (radius < high), 2]).max())
     pairs = {
-        "base radius": (1e3 * fit.r_b, 1e3 * flank.r_b, "mm"),
-        "half tooth thickness at the base circle": (1e3 * fit.psi_b * fit.r_b, 1e3 * flank.psi_b * flank.r_b, "mm"),
-        "face width": (1e3 * width, 1e3 * flank.face_width, "mm"),
+        "base radius": (fit.r_b, flank.r_b, _WIDTH),
+        "half tooth thickness at the base circle": (fit.psi_b * fit.r_b, flank.psi_b * flank.r_b, _THICKNESS),
+        "face width": (width, flank.face_width, _WIDTH),
     }
-    slack = {"half tooth thickness at the base circle": 0.05}
     wrong = [
-        f"{name} {own:.5g} {unit} instead of {meant:.5g} {unit}"
-        for name, (own, meant, unit) in pairs.items()
-        if abs(own - meant) > slack.get(name, _WIDTH) * meant
+        f"{name} {1e3 * own:.5g} mm instead of {1e3 * meant:.5g} mm"
+        for name, (own, meant, slack) in pairs.items()
+        if abs(own - meant) > slack * meant
     ]
     if wrong:
         raise MeshError(
@@ -161,22 +185,16 @@ def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
         )
 
 
-def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
-    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
-    low, high = wanted.flank.radii()
-    return (radius > low) & (radius < high)
-
-
-def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
+def _bore_nodes(mesh: ImportedMesh, name: str, gear: ToothedBody) -> np.ndarray:
     if name:
         return mesh.node_set(name)
+    where, diameter = ("rim", gear.rim_diameter) if isinstance(gear, RingBody) else ("bore", gear.bore_diameter)
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
-    found = np.flatnonzero(np.abs(radius - wanted.bore_radius) < _ON_BORE * wanted.bore_radius)
+    found = np.flatnonzero(np.abs(radius - 0.5 * diameter) < _ON_BORE * (0.5 * diameter))
     faces = solids.boundary(mesh.elements).within(found)
     if len(faces.nodes) == 0:
-        where = "rim" if wanted.flank.internal else "bore"
         raise MeshError(
-            f"no face lies on the {where} of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the {where} in "
+            f"no face lies on the {where} of {1e3 * diameter:.4g} mm: name the node set of the {where} in "
             f"`{where}`, or correct {where}_diameter"
         )
     return faces.nodes
@@ -195,28 +213,27 @@ def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
     }
 
 
-def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted: Wanted) -> WholeGear:
-    faces = solids.boundary(mesh.elements)
+def _whole(found: CheckedGear, coupling: str, gear: ToothedBody) -> WholeGear:
+    mesh, faces = found.mesh, solids.boundary(found.mesh.elements)
     bore = set_coupling(mesh, faces, BORE, coupling, np.zeros(3))
-    elements = elements_of(mesh, matrices, wanted.material)
-    body = full_order(mesh.source.stem, elements, [bore], (BORE,), wanted.flank.r_b)
-    angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
-    rows = [tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles]
+    elements = elements_of(mesh, found.matrices, gear.material)
+    body = full_order(mesh.source.stem, elements, [bore], (BORE,), found.flank.r_b)
+    angles = 2 * np.pi * np.arange(gear.teeth) / gear.teeth
+    rows = [tooth_loads(mesh.nodes, faces, found.flank, found.points, angle) for angle in angles]
     if coupling == "rigid":
         kept = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.sets[BORE])
         pick = (3 * kept[:, None] + np.arange(3)).ravel()
         masters = sp.csr_array((rows[0].shape[0], body.size - len(pick)))
         rows = [sp.csr_array(sp.hstack([row[:, pick], masters])) for row in rows]
-    return WholeGear(body, tuple(rows), wanted.points)
+    return WholeGear(body, tuple(rows), found.points)
 
 
-def hinge_problem(space: Elastic, first_squared: float) -> str | None:
-    """Why a body whose lowest elastic mode has ω² = first_squared cannot be one solid, or None."""
+def hinge_problem(space: Elastic) -> str | None:
+    """Why a body cannot be one solid, by its lowest elastic mode, or None. Raises FactorError and ModesError."""
     stiffest = float((space.stiffness.diagonal() / space.mass_matrix.diagonal()).max())
-    if first_squared > _HINGE**2 * stiffest:
+    if float(space.modes(1)[0][0]) > _HINGE**2 * stiffest:
         return None
     return (
-        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: "
-        "connect it, or "
-        "export it without mechanisms"
+        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: connect it, "
+        "or export it without mechanisms"
     )

@@ -15,11 +15,12 @@ Source: the mean over a group of turns is the nearest block-circulant matrix: Ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 import scipy.sparse as sp
 
-from gearfmu.geometry.plane import about_z
+from gearfmu.geometry.plane import frames
 from gearfmu.reduction.cyclic.flank import Points
 from gearfmu.reduction.cyclic.frf import (
     FrfCase,
@@ -31,7 +32,7 @@ from gearfmu.reduction.cyclic.frf import (
     rigid_compliance,
     static_matrix,
 )
-from gearfmu.reduction.cyclic.modal import Modes, Progress
+from gearfmu.reduction.cyclic.modal import Modes, Pattern, Progress, real_modes, untold
 from gearfmu.reduction.cyclic.statics import Statics, by_load, symmetric_offsets
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
@@ -62,32 +63,23 @@ class WholeGear:
     @property
     def inertia(self) -> np.ndarray:
         """Mass matrix (6, 6) of the rigid body about the origin, mean over the teeth."""
-        turns = _frames(self.teeth)
+        turns = frames(self.teeth)
         whole = self.body.rigid.T @ (self.body.mass @ self.body.rigid)
         return np.mean([turn.T @ whole @ turn for turn in turns], axis=0)
 
 
-@dataclass(frozen=True)
-class _Found:
-    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last, strongest whole
-    mode."""
-
-    squared: float
-    nodal_diameter: int
-    amplitude: np.ndarray
-    mode: int
+_Found = tuple[float, int, np.ndarray]  # of an oscillator: ω², nodal diameter, amplitude (L + 6,) with the bore last
 
 
-def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress | None = None) -> tuple[Modes, float]:
+def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress = untold) -> tuple[Modes, float]:
     """Modes of the mean tooth from the `count` lowest modes of the whole gear, and the share of their static compliance
     that was left to the residual."""
-    if progress:
-        progress("modes of the whole gear", 0.0)
+    progress("modes of the whole gear", 0.0)
     squared, shapes = space.modes(count)
     rows = np.stack(
         [
             np.vstack([r @ shapes, turn.T @ (gear.bore_rows @ shapes)])
-            for r, turn in zip(gear.flank_rows, _frames(gear.teeth), strict=True)
+            for r, turn in zip(gear.flank_rows, frames(gear.teeth), strict=True)
         ]
     )
     flank = rows.shape[1] - 6
@@ -100,10 +92,10 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress |
     for members in _clusters(np.sqrt(squared)):
         weighted = amplitude[:, :, members] / np.sqrt(squared[members])
         kept, lost = _directions(weighted, squared[members], gear.teeth)
-        found += [_Found(o.squared, o.nodal_diameter, o.amplitude / scale, int(members[o.mode])) for o in kept]
+        found += [(mean, diameter, part / scale) for mean, diameter, part in kept]
         left += lost
     total = float((np.abs(amplitude) ** 2 / squared).sum())
-    return _as_modes(sorted(found, key=lambda o: o.squared), gear, shapes, count), left / total
+    return _as_modes(sorted(found, key=itemgetter(0)), gear, count), left / total
 
 
 def _clusters(frequency: np.ndarray) -> list[np.ndarray]:
@@ -123,43 +115,21 @@ def _directions(weighted: np.ndarray, squared: np.ndarray, teeth: int) -> tuple[
             if size**2 < _WEAK * whole:
                 left += float(size**2)
                 continue
-            weight = np.abs(share) ** 2
-            mean = float(1 / (weight / squared).sum())
-            found.append(_Found(mean, nu, direction * size * np.sqrt(mean), int(weight.argmax())))
+            mean = float(1 / (np.abs(share) ** 2 / squared).sum())
+            found.append((mean, nu, direction * size * np.sqrt(mean)))
     return found, left
 
 
-def _as_modes(found: list[_Found], gear: WholeGear, shapes: np.ndarray, count: int) -> Modes:
-    functions = gear.points.functions
-    odd = np.tile(np.arange(functions), 2 * len(gear.points.rolls)) % 2 == 1
-    columns: dict[str, list] = {name: [] for name in ("frequency", "diameter", "part", "parity", "flank", "bore")}
-    pictures: dict[int, np.ndarray] = {}
-    for item in found:
-        pair = 0 < 2 * item.nodal_diameter < gear.teeth
-        if len(columns["part"]) + 1 + pair > count:
-            break
-        amplitude = _turned(item.amplitude, len(odd))
+def _as_modes(found: list[_Found], gear: WholeGear, count: int) -> Modes:
+    odd = np.tile(np.arange(gear.points.functions), 2 * len(gear.points.rolls)) % 2 == 1
+    patterns = []
+    for squared, nu, amplitude in found:
+        amplitude = _turned(amplitude, len(odd))
         flank, parity = _of_one_parity(amplitude[: len(odd)], odd)
-        pictures[len(columns["part"])] = shapes[:, item.mode]
-        for part in (1, 2) if pair else (0,):
-            take = np.imag if part == 2 else np.real
-            columns["frequency"].append(np.sqrt(item.squared) / (2 * np.pi))
-            columns["diameter"].append(item.nodal_diameter)
-            columns["part"].append(part)
-            columns["parity"].append(parity)
-            columns["flank"].append(take(flank))
-            columns["bore"].append(take(amplitude[len(odd) :]))
-    diameters, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    return Modes(
-        frequency=np.array(columns["frequency"]),
-        nodal_diameter=diameters,
-        part=parts,
-        parity=parities,
-        flank_rows=np.stack(columns["flank"], 1),
-        bore_rows=np.stack(columns["bore"], 1),
-        patch_rows=np.zeros((0, len(parts))),
-        shapes=pictures,
-    )
+        read = {"flank_rows": flank, "bore_rows": amplitude[len(odd) :]}
+        patterns.append(Pattern(squared, nu, parity, read))
+    columns, _ = real_modes(patterns, count)
+    return Modes(patch_rows=np.zeros((0, len(columns["part"]))), spin=None, **columns)
 
 
 def _turned(amplitude: np.ndarray, flank: int) -> np.ndarray:
@@ -182,18 +152,17 @@ def _of_one_parity(flank: np.ndarray, odd: np.ndarray) -> tuple[np.ndarray, int]
 
 
 def mean_statics(
-    gear: WholeGear, space: Elastic, picture_loads: list[int], progress: Progress | None = None
+    gear: WholeGear, space: Elastic, picture_loads: list[int], progress: Progress = untold
 ) -> tuple[Statics, float]:
     """Static tables of the mean tooth, and how far teeth are from it: largest relative deviation of the compliance
     under the uniform load at mid flank. Pictures: displacement (p, N) under loads on tooth 0."""
     z, points = gear.teeth, gear.points
-    size, turns = gear.flank_rows[0].shape[0], _frames(z)
+    size, turns = gear.flank_rows[0].shape[0], frames(z)
     bore = space.flexibility(gear.bore_rows.T.toarray())
     tables, fb, pictures, mid = np.zeros((z, size, size)), np.zeros((size, 6)), np.zeros((0, space.size)), []
     place = (len(points.rolls) // 2) * points.functions
     for tooth, rows in enumerate(gear.flank_rows):
-        if progress:
-            progress("static compliance", tooth / z)
+        progress("static compliance", tooth / z)
         response = space.flexibility(rows.T.toarray())
         if tooth == 0:
             pictures = response[:, picture_loads].T.copy()
@@ -208,8 +177,6 @@ def mean_statics(
         static_ff=by_load(symmetric_offsets(tables), points),
         static_fb=fb.reshape(2, rolls, functions, 6),
         static_bb=0.5 * (bb + bb.T),
-        static_fp=np.zeros((2, z, rolls, functions, 0)),
-        static_pp=np.zeros((z, 0, 0)),
         pictures=pictures,
     )
     return statics, float(np.abs(np.array(mid) / np.mean(mid) - 1).max())
@@ -232,8 +199,3 @@ def mean_frf(gear: WholeGear, space: Elastic, modes: Modes, statics: Statics, ca
     rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
     rigid = rigid_compliance(gear.flank_rows[0][inputs] @ gear.body.rigid, gear.inertia) * weight
     return compare(full, Series(rows, modes.frequency, [static]), rigid, case)
-
-
-def _frames(teeth: int) -> np.ndarray:
-    """(z, 6, 6): vectors of each tooth's frame in the frame of the gear, displacements and rotations."""
-    return np.array([np.kron(np.eye(2), about_z(angle)) for angle in 2 * np.pi * np.arange(teeth) / teeth])

@@ -19,14 +19,13 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem.bulk_data import bulk_cards, bulk_number
-from gearfmu.fem.coupling import rigid_fields
+from gearfmu.fem.coupling import master_rows, rigid_fields
 from gearfmu.fem.matrices import read_labelled, read_recovery, read_unknowns
 from gearfmu.fem.nastran_matrices import Labelled
 from gearfmu.femesh.abaqus import read_deck
 from gearfmu.femesh.imported import read_surface
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
-from gearfmu.reduction.imported.housing import ImportedHousing
-from gearfmu.reduction.imported.skin import Surface, enclosed
+from gearfmu.reduction.imported.housing import ImportedHousing, Surface, enclosed
 from gearfmu.stagefile.tables.housing import HousingBody, HousingReducedSpec
 
 MOST = 3000  # unknowns: matrices are full
@@ -163,8 +162,7 @@ def _rigid_motion(read: _Read, source: HousingReducedSpec) -> np.ndarray:
             continue
         turning = label in turned
         place = read.place(labels[turned[label]] if turning else label, f"row {label}.{component + 1}")
-        motion = np.vstack([rigid_fields(place), np.eye(6)[3:]])
-        fields[k], known[k] = motion[component + 3 * turning], True
+        fields[k], known[k] = master_rows(place)[component + 3 * turning], True
     free = ~known
     if free.any():
         force = read.stiffness[np.ix_(free, known)] @ fields[known]

@@ -13,13 +13,12 @@ import numpy as np
 import scipy.linalg as sl
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import input_loads, static_response
+from gearfmu.reduction.moments import Growing, Size, input_loads, static_response
 
 
-def reduce(body: FullOrder, size: Size) -> Basis:
+def reduce(body: FullOrder, size: Size) -> np.ndarray:
     """Constraint modes first, then fixed-interface modes up to n. Raises BodyError when n is less than the former."""
     space, basis = elastic(body), Growing(elastic(body))
     basis.add(static_response(body) @ balanced(space, input_loads(body)))
@@ -33,7 +32,7 @@ def reduce(body: FullOrder, size: Size) -> Basis:
     if wanted:
         inside = Elastic(body.held(body.rows()), twin=space)
         basis.add(inside.modes(min(wanted, inside.elastic))[1])
-    return Basis("craig_bampton", np.array(basis.vectors), {"constraint_modes": constraint, "fixed_modes": wanted})
+    return np.array(basis.vectors)
 
 
 def balanced(space: Elastic, loads: np.ndarray) -> np.ndarray:

@@ -12,15 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion, expansion_points
+from gearfmu.reduction.moments import Expansion, Growing, Size, expansion_points
 
 _POINTS = 3  # expansion points; more blocks than that become higher powers at the same points
 
 
-def reduce(body: FullOrder, size: Size) -> Basis:
+def reduce(body: FullOrder, size: Size) -> np.ndarray:
     """Krylov basis with as many whole blocks as `size` allows. Raises BodyError when that is less than one block."""
     inputs = body.rows().shape[0]
     blocks = size.count // inputs
@@ -31,11 +30,9 @@ def reduce(body: FullOrder, size: Size) -> Basis:
         )
     points = expansion_points(min(blocks, _POINTS), size.band)
     powers = [blocks // len(points) + (k < blocks % len(points)) for k in range(len(points))]
-    basis, used = Growing(elastic(body)), []
+    basis = Growing(elastic(body))
     for shift, power in zip(points, powers, strict=True):
         point = Expansion(body, shift, basis)
         for _ in range(power):
             point.advance(basis)
-        used.append(point.shift)
-    facts = {"inputs": inputs, "points_Hz": [float(np.sqrt(s) / (2 * np.pi)) for s in used], "powers": powers}
-    return Basis("krylov", np.array(basis.vectors), facts)
+    return np.array(basis.vectors)

@@ -13,13 +13,12 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.errors import BodyError
-from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import static_response
+from gearfmu.reduction.moments import Growing, Size, static_response
 
 
-def reduce(body: FullOrder, size: Size) -> Basis:
+def reduce(body: FullOrder, size: Size) -> np.ndarray:
     """One attachment mode per input and free modes up to n. Raises BodyError when n is less than the inputs."""
     space, inputs = elastic(body), body.rows().shape[0]
     if size.count < inputs:
@@ -30,6 +29,5 @@ def reduce(body: FullOrder, size: Size) -> Basis:
     basis = Growing(space)
     if size.count > inputs:
         basis.add(space.modes(min(size.count, space.elastic) - inputs)[1])
-    modes = basis.size
     basis.add(static_response(body))
-    return Basis("rubin", np.array(basis.vectors), {"free_modes": modes, "attachment_modes": basis.size - modes})
+    return np.array(basis.vectors)
