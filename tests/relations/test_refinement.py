@@ -217,3 +217,16 @@ def test_any_number_of_parts_finds_equilibrium(kind: Kind, yields: str) -> None:
     means = np.array([result.te.mean() for result in found])
     assert np.isfinite(means).all()
     assert means[[0, 2]] == pytest.approx(means[1], rel=1e-2)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("slices", [5, 7])
+def test_no_line_of_the_transmission_error_at_the_parts(slices: int) -> None:
+    """Of parts that entered one after the other there would be orders k·slices/overlap: none is above its neighbours by
+    more than half."""
+    kind, overlap = KINDS["helical"], 1.016
+    found = loaded_te(kind.model(), [kind.torque], 400, slices=float(slices)).harmonics(80)[0]
+    for order in np.round(np.arange(1, 80 * overlap / slices) * slices / overlap).astype(int):
+        if 3 < order < 77:
+            near = np.r_[found[order - 4 : order - 1], found[order : order + 3]]  # found[k - 1]: order k
+            assert found[order - 1] < 1.5 * near.max(), order
