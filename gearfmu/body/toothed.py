@@ -57,8 +57,8 @@ def reduced_gear(gear: ToothedBody, progress: Progress | None = None) -> Body:
     name, kind = "rim" if flank.internal else "bore", "rigid" if gear.rigid_bore else "averaging"
     return Body(
         name=gear.name,
-        how=How.of(gear, GEAR_METHOD, made.facts).since(started),
         mass=symmetric_mass(made.inertia),
+        how=How.of(gear, GEAR_METHOD, made.facts).since(started),
         frequency=made.modes.frequency,
         damping_ratio=np.full(len(made.modes.frequency), gear.modal_damping),
         nodes=(Node(name, kind, COMPONENTS, np.zeros(3)),),
