@@ -13,11 +13,10 @@ from gears import hex20_deck, pinion, stage, tetrahedra, without, write_matrices
 from scipy.spatial import cKDTree
 
 from gearfmu.body import Body, reduce_body
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.layout import value_of
 from gearfmu.femesh.quality import write_vtu
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.toothed import gear_full_order
+from gearfmu.reduction.toothed import gear_full_order, toothed_full_order
 from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
@@ -153,7 +152,7 @@ def test_the_same_full_model_whatever_the_road(tmp_path: Path, exact: FullOrder,
     if ready:
         write_matrices(tmp_path, pinion(whole))
     section = MATRICES + 'force_unit = "1e-3 N"\n' if ready else SECTION
-    body = imported_full_order(stage(tmp_path, section).by_file["pinion"])
+    body = toothed_full_order(stage(tmp_path, section).by_file["pinion"])
     assert [i.name for i in body.interfaces] == [i.name for i in exact.interfaces] and body.ground == ("bore",)
     assert body.length == exact.length and body.size == exact.size
     for own, other in zip(body.interfaces, exact.interfaces, strict=True):
