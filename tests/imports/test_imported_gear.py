@@ -16,7 +16,7 @@ from gearfmu.body import Body, reduce_body
 from gearfmu.body.layout import value_of
 from gearfmu.femesh.quality import write_vtu
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.toothed import gear_full_order, toothed_full_order
+from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.stored import expected_hash
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
@@ -139,7 +139,7 @@ def places(body: FullOrder) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def exact(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
-    return gear_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], 1.0)
+    return toothed_full_order(stage(tmp_path_factory.mktemp("native")).by_file["pinion"], scale=1.0)
 
 
 @pytest.mark.parametrize(
