@@ -24,7 +24,7 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stage.assembly.meshes import tooth_phases
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape

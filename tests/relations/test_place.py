@@ -18,7 +18,7 @@ from moved import each_vector, renamed, run, start_of, turned_vector
 
 from gearfmu.stage import Steady
 from gearfmu.stage.assembly.meshes import tooth_phases
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.tables.bodies import Eccentricity, Misalignment, Wobble
