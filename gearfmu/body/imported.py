@@ -25,8 +25,9 @@ from gearfmu.reduction.imported.gear import (
 )
 from gearfmu.reduction.imported.whole import imported_gear_order
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
-from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec
+from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.tables.bodies import MountsSpec
 from gearfmu.stagefile.tables.imported import ImportSpec, RingImportSpec
 
 

@@ -15,8 +15,8 @@ from gearfmu.geometry.mesh import mount_spaces
 from gearfmu.reduction.couplings import Coupling, Elements, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.stagefile.forms.general import GearBody, RingBody
-from gearfmu.stagefile.forms.planetary import MountsSpec
 from gearfmu.stagefile.forms.shapes import gear_geometry, ring_geometry
+from gearfmu.stagefile.tables.bodies import MountsSpec
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5

@@ -24,7 +24,7 @@ from gearfmu.rexs.gears import (
 )
 from gearfmu.rexs.reading import Component, RexsModel, read_rexs
 from gearfmu.stagefile.checks.gears import STRIP_PER_HERTZ, rounded_up
-from gearfmu.stagefile.forms.planetary import RingSpec, SetGearSpec, SetSpec
+from gearfmu.stagefile.forms.planetary import SetSpec
 from gearfmu.stagefile.forms.shapes import gear_geometry, gears_in_mesh, largest_half_width, ring_geometry
 from gearfmu.stagefile.proposals.draft import (
     BACKLASH_PER_MODULE,
@@ -38,7 +38,7 @@ from gearfmu.stagefile.proposals.draft import (
     usual_torque,
 )
 from gearfmu.stagefile.reading.base import validate
-from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, RingSpec, SetGearSpec
 
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed
 NAMES = ("pinion", "wheel")

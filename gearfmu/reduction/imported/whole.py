@@ -21,7 +21,7 @@ from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported.couplings import Matrices, elements_of, set_coupling
 from gearfmu.reduction.imported.flank import middle_node
 from gearfmu.reduction.imported.gear import BORE, CheckedGear, Wanted
-from gearfmu.stagefile.forms.planetary import MountsSpec
+from gearfmu.stagefile.tables.bodies import MountsSpec
 
 
 def imported_gear_order(
