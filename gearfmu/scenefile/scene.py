@@ -12,9 +12,19 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError, near_or_all
-from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
-from gearfmu.scenefile.parts import ClutchSpec, Drivetrain, drivetrain_problems
-from gearfmu.scenefile.shaft_loads import Found, ShaftLoad, Time, load_problems, time_problems
+from gearfmu.scenefile.drivetrain import (
+    ClutchSpec,
+    Drivetrain,
+    Found,
+    PassengerCar,
+    ShaftLoad,
+    Speed,
+    TestRig,
+    Time,
+    drivetrain_problems,
+    load_problems,
+    time_problems,
+)
 from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Spec, Switch, Text, entry, read_toml, validate
 from gearfmu.stagefile.reading.files import Changes, changed_tables, merged_tables, shipped_stages
 from gearfmu.stagefile.tables.connections import Slices
@@ -23,7 +33,6 @@ SHIPPED = Path(__file__).parent.parent / "scenes"
 TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}
 SPEED = "start.pinion_speed"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
-Speed = Annotated[float, Quantity("speed")]
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "em", "rk45", "central"]
 Contact = Literal["by_level", "line", "nodal"]
