@@ -26,7 +26,7 @@ VERBS = {
         "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
     ),
     "import": (
-        "gearfmu.commands.imports:import_",
+        "gearfmu.commands.stages:import_",
         "Check finite elements made elsewhere, fit the involutes; writes nothing.",
     ),
     "te": (
@@ -35,7 +35,7 @@ VERBS = {
     ),
     "efficiency": ("gearfmu.commands.te:efficiency", "Loss of every mesh to friction of its flanks."),
     "bearings": (
-        "gearfmu.commands.bearings:bearings",
+        "gearfmu.commands.te:bearings",
         "Rolling bearings under load: forces, contact pressure, stiffness, ball pass.",
     ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
