@@ -8,15 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.mesh import HANDS, MOUNTS, RingMesh, common_width, set_ratio
+from gearfmu.geometry.mesh import HANDS, MOUNTS, RingMesh, set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.quantities import to_si
 from gearfmu.rexs.gears import (
     RexsGear,
+    assumed_torque,
     gear_of,
     place_shifts,
     put_external,
     put_rack,
+    put_rack_data,
     put_teeth,
     section_diameters,
     shaft_diameters,
@@ -33,9 +35,7 @@ from gearfmu.stagefile.proposals.draft import (
     STRIP_PER_MODULE,
     Draft,
     Unread,
-    degrees,
     millimetres,
-    usual_torque,
 )
 from gearfmu.stagefile.reading.base import validate
 from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, RingSpec, SetGearSpec
@@ -113,7 +113,7 @@ def _draft_pair(model: RexsModel, stage: Component) -> Draft:
 def _put_pair(model: RexsModel, draft: Draft, stage: Component, gears: list[RexsGear]) -> None:
     origin = f"REXS {stage.type} {stage.id}"
     draft.put("pair.center_distance", model.quantity(stage, "center_distance", "m"), origin)
-    _put_rack_data(draft, "pair", gears)
+    put_rack_data(draft, "pair", gears)
     if abs(gears[0].helix_angle + gears[1].helix_angle) > 1e-9:
         shown = ", ".join(f"{math.degrees(gear.helix_angle):g} deg" for gear in gears)
         remedy = "the helix angles of an external pair are equal and opposite"
@@ -130,34 +130,12 @@ def _even_bearings(draft: Draft, gears: list[RexsGear]) -> None:
                 draft.drop(f"gears.{name}.bearing.{key}")
 
 
-def _put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
-    """Module, pressure and helix angle that the gears share; those of the first one."""
-    first = gears[0]
-    draft.put(f"{place}.normal_module", millimetres(first.module), first.origin)
-    draft.put(f"{place}.pressure_angle", degrees(first.pressure_angle), f"{first.origin}, its flanks")
-    draft.put(f"{place}.helix_angle", degrees(first.helix_angle), first.origin)
-    for gear in gears[1:]:
-        for name, value, own in (
-            ("normal module", gear.module, first.module),
-            ("normal pressure angle", gear.pressure_angle, first.pressure_angle),
-        ):
-            if abs(value - own) > 1e-9 * own:
-                draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
-        gear.module, gear.pressure_angle = first.module, first.pressure_angle
-
-
-def _assumed_torque(gears: list[RexsGear]) -> float:
-    """Torque (N·m) on the first gear at the usual load K."""
-    width = common_width(gears)
-    return usual_torque(2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth, width)
-
-
 def _put_pair_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
     ratio = gears[1].teeth / gears[0].teeth
     torques, speeds = zip(*(shaft_loads(model, gear.component) for gear in gears), strict=True)
     found = torques[0] or (torques[1] / ratio if torques[1] else None)
     known = (found and rounded_up(found, 3), "REXS external_load, the largest of all load cases")
-    torque = draft.put_limit("torque_max", known, (_assumed_torque(gears), LOAD_RULE))
+    torque = draft.put_limit("torque_max", known, (assumed_torque(gears), LOAD_RULE))
     draft.put_shafts(dict(zip(NAMES, (torque, torque * ratio), strict=True)))
     found = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
     known = (found and rounded_up(found, 4), "REXS shaft, the largest of all load cases")
@@ -208,7 +186,7 @@ def _draft_set(model: RexsModel, stage: Component) -> Draft:
     _check_planets(model, planets, gears[1])
     draft = Draft.after("helical_set" if gears[0].helix_angle else "planetary54")
     draft.put("set.center_distance", millimetres(abs(distance)), f"REXS cylindrical_stage {meshes[0].id}")
-    _put_rack_data(draft, "set", gears)
+    put_rack_data(draft, "set", gears)
     _put_planets(model, draft, planets, meshes, gears)
     _put_shifts(draft, gears, abs(distance))
     for name, gear in zip(HANDS, gears, strict=True):
@@ -379,7 +357,7 @@ def _put_set_loads(
     torque, speed = shaft_loads(model, sun.component)
     sharing = draft.at("set.load_sharing")
     known = (torque and rounded_up(torque * ratio, 3), "REXS external_load on the sun's shaft, times 1 + z_ring/z_sun")
-    assumed = _assumed_torque([sun, planet]) * len(planets) / sharing * ratio
+    assumed = assumed_torque([sun, planet]) * len(planets) / sharing * ratio
     draft.put_limit("torque_max", known, (assumed, "4 N/mm2 in the mesh of the sun (K of a pair)"))
     known = (speed and rounded_up(speed / ratio, 4), "REXS shaft of the sun, over 1 + z_ring/z_sun")
     assumed = PITCH_SPEED / sun.reference_radius / ratio
