@@ -26,7 +26,7 @@ VERBS = {
         "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
     ),
     "import": (
-        "gearfmu.commands.imports:import_",
+        "gearfmu.commands.stages:import_",
         "Check finite elements made elsewhere, fit the involutes; writes nothing.",
     ),
     "te": (
@@ -35,7 +35,7 @@ VERBS = {
     ),
     "efficiency": ("gearfmu.commands.te:efficiency", "Loss of every mesh to friction of its flanks."),
     "bearings": (
-        "gearfmu.commands.bearings:bearings",
+        "gearfmu.commands.te:bearings",
         "Rolling bearings under load: forces, contact pressure, stiffness, ball pass.",
     ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
@@ -54,7 +54,7 @@ VERBS = {
     "convert": ("gearfmu.commands.files:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
-    "study": ("gearfmu.commands.study:study", "Error against processor time of the fidelity levels."),
+    "study": ("gearfmu.commands.sweep:study", "Error against processor time of the fidelity levels."),
     "effects": ("gearfmu.commands.effects:effects", "Effects: price of each, how to switch it."),
     "inspect": ("gearfmu.commands.files:inspect", "Show the contents of a stage, scene, body, trace or FMU."),
     "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files."),

@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import get_args
 
-from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
-from gearfmu.scenefile.parts import ClutchPart, Drivetrain, InertiaPart, PortShaft, ShaftPart, TorquePart
+from gearfmu.scenefile.drivetrain import (
+    ClutchPart,
+    Drivetrain,
+    InertiaPart,
+    PassengerCar,
+    PortShaft,
+    ShaftLoad,
+    ShaftPart,
+    TestRig,
+    TorquePart,
+)
 from gearfmu.scenefile.scene import load_scene, shipped_scenes
-from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stagefile.reading.base import Quantity, Spec
 
 INTRODUCTION = """# Drivetrains and scenes

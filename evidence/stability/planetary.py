@@ -20,10 +20,9 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.forms.planetary import RingSpec
 from gearfmu.stagefile.forms.shapes import gear_shape
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import MeshSpec
+from gearfmu.stagefile.tables.bodies import MeshSpec, RingSpec
 from gearfmu.stagefile.tables.connections import PortSpec
 
 SET = "planetary54"

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.signals import Ramp
-from gearfmu.scenefile.drivetrain import PassengerCar, TestRig
+from gearfmu.scenefile.drivetrain import PassengerCar, ShaftLoad, TestRig
 from gearfmu.scenefile.scene import SceneSpec
-from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stagefile.forms.turning import Shafts
 from gearfmu.stagefile.tables.connections import ChainSpec, PortSpec
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
-from gearfmu.scenefile.deformation import DeformationChoice
-from gearfmu.scenefile.scene import SceneSpec
+from gearfmu.scenefile.scene import DeformationChoice, SceneSpec
 from gearfmu.stage.assembly.groups import MOTIONS
 from gearfmu.stage.assembly.observed import MODE, MOTION
 from gearfmu.stage.run.deformation import Deformation, GearMotion

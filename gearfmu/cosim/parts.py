@@ -22,7 +22,7 @@ from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spri
 from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.errors import Problem, SpecError
-from gearfmu.scenefile.parts import GROUND, Drivetrain
+from gearfmu.scenefile.drivetrain import GROUND, Drivetrain
 from gearfmu.scenefile.scene import SceneSpec
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import rolling, solved, undriven

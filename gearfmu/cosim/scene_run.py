@@ -273,10 +273,11 @@ def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, 
 
     errors : coupling error by channel, None when the run was not verified.
     """
-    return _what(scene, source) | _price(result) | _accuracy(source, result, errors) | _origin(scene, source)
+    return subject(scene, source) | _price(result) | _accuracy(source, result, errors) | _origin(scene, source)
 
 
-def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
+def subject(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    """Of a `summary`: scene and stage, how both are computed, and how often the meshes meet."""
     clutch = any(port.chain is not None for port in source.model.stage.ports.values())
     return {
         "scene": scene.name,

@@ -26,8 +26,8 @@ from gearfmu.cosim.kernel_unit import RowLog
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import Problem, SpecError
+from gearfmu.scenefile.drivetrain import ShaftLoad
 from gearfmu.scenefile.scene import SceneSpec
-from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.turning import turns, undriven
 from gearfmu.stagefile.tables.connections import PortSpec

@@ -22,7 +22,7 @@ from gearfmu.planning.trials import Trial
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly.blob import read_blob
 from gearfmu.stage.assembly.levels import LEVELS
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import loaded_te
 
 POSITIONS = 16

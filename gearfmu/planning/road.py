@@ -26,11 +26,6 @@ class Road:
     def __init__(self, scene: SceneSpec, model: StageModel, fmu: Path | None = None) -> None:
         self.scene, self.model, self.fmu = scene, model, fmu
 
-    @property
-    def unit(self) -> str:
-        """ "fmu" or "kernel"."""
-        return "kernel" if self.fmu is None else "fmu"
-
     def begin(self, choice: Choice) -> CoupledRun:
         """From the start of the scene."""
         run = coupled_run(choice.of(self.scene), Source(self.model, self.fmu))

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun, Saved
-from gearfmu.cosim.scene_run import Staged, origin, stage_model, stage_source
+from gearfmu.cosim.kernel_unit import Source
+from gearfmu.cosim.scene_run import Staged, origin, stage_model, stage_source, subject
 from gearfmu.errors import Problem, SimulationError, SpecError
 from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice
@@ -28,9 +29,9 @@ from gearfmu.report.results import strict
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage import Trace
 from gearfmu.stage.run.trace import Channel
-from gearfmu.stagefile.forms.turning import meshings
 
 LEG = 5e-3  # s
+OF_SCENE = ("scene", "description", "stage", "H", "settle", "unit", "meshes")  # of a run's `subject`
 UNITS = ("kernel", "fmu")
 MOST_TRIPS = 8  # in one leg
 MOST_REPLANS = 3  # in one segment
@@ -115,26 +116,19 @@ def run_planned(
 
 
 def _meta(road: Road, done: PlannedRun) -> dict[str, Any]:
-    scene, model = road.scene, road.model
-    end = float(done.legs[-1].trace.time[-1])
-    return {
-        "scene": scene.name,
-        "description": scene.description,
-        "stage": scene.stage.name,
-        "level": done.legs[-1].choice.level,
-        "slices": done.legs[-1].choice.slices,
-        "effects_off": list(done.legs[-1].choice.off),
-        "H": scene.coupling.step,
-        "h": done.legs[-1].choice.h,
-        "settle": scene.settle,
-        "unit": road.unit,
+    of_scene, last = subject(road.scene, Source(road.model, road.fmu)), done.legs[-1]
+    end = float(last.trace.time[-1])
+    return {name: of_scene[name] for name in OF_SCENE} | {
+        "level": last.choice.level,
+        "slices": last.choice.slices,
+        "effects_off": list(last.choice.off),
+        "h": last.choice.h,
         "outcome": done.outcome,
         "message": done.message,
         "simulated_s": end,
         "cpu_s": done.cpu,
         "realtime_factor": done.cpu / end if end else None,
-        "meshes": {mesh: known.plain for mesh, known in meshings(model.stage).items()},
-        "hashes": {"scene": scene.hash, "model": model.hash},
+        "hashes": {"scene": road.scene.hash, "model": road.model.hash},
     }
 
 

@@ -24,8 +24,8 @@ from gearfmu.reduction.imported.files import elements_of, naming, set_coupling
 from gearfmu.reduction.imported.flank import middle_node
 from gearfmu.reduction.imported.gear import BORE, CheckedGear, checked_gear
 from gearfmu.stagefile.forms.general import RingBody, ToothedBody
-from gearfmu.stagefile.forms.planetary import MountsSpec
 from gearfmu.stagefile.forms.shapes import gear_shape
+from gearfmu.stagefile.tables.bodies import MountsSpec
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5

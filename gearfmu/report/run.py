@@ -19,7 +19,7 @@ from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_
 from gearfmu.stage import assemble
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage

@@ -17,7 +17,7 @@ from gearfmu.report.campbell import loud
 from gearfmu.report.kinds import ACCELERATIONS, FORCES, SENSOR, Kind, averaging, loudest_sensors
 from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
 from gearfmu.stage import assemble
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
 from gearfmu.stagefile.forms.general import Stage

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from gearfmu.geometry.mesh import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.reading import Component, RexsModel
-from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, millimetres
+from gearfmu.stagefile.proposals.draft import STRIP_PER_MODULE, Draft, degrees, millimetres, usual_torque
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
@@ -102,6 +103,22 @@ def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> Non
     draft.put_proportions(place, gear.module, gear.face_width)
     draft.assume(f"{place}.body.strip_half_width", millimetres(STRIP_PER_MODULE * gear.module), "0.12 m_n")
     _put_material(model, draft, place, gear.component)
+
+
+def put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
+    """Module, pressure and helix angle that the gears share; those of the first one."""
+    first = gears[0]
+    draft.put(f"{place}.normal_module", millimetres(first.module), first.origin)
+    draft.put(f"{place}.pressure_angle", degrees(first.pressure_angle), f"{first.origin}, its flanks")
+    draft.put(f"{place}.helix_angle", degrees(first.helix_angle), first.origin)
+    for gear in gears[1:]:
+        for name, value, own in (
+            ("normal module", gear.module, first.module),
+            ("normal pressure angle", gear.pressure_angle, first.pressure_angle),
+        ):
+            if abs(value - own) > 1e-9 * own:
+                draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
+        gear.module, gear.pressure_angle = first.module, first.pressure_angle
 
 
 def place_shifts(draft: Draft, gears: dict[str, RexsGear], distance: float) -> None:
@@ -232,3 +249,9 @@ def shaft_loads(model: RexsModel, component: Component) -> tuple[float | None, f
     torques = [m for load in loads if (m := model.largest(load, "torque_around_u_axis", "N*m"))]
     speeds = [v for shaft in shafts if (v := model.largest(shaft, "rotational_speed", "rad/s"))]
     return max(torques, default=None), max(speeds, default=None)
+
+
+def assumed_torque(gears: list[RexsGear]) -> float:
+    """Torque (N·m) on the first gear at the usual load K."""
+    width = common_width(gears)
+    return usual_torque(2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth, width)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.stage.assembly.model import StageModel
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.reading.base import read_toml
 

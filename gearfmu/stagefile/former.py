@@ -8,9 +8,9 @@ from typing import Any
 
 from gearfmu.geometry.mesh import HANDS
 from gearfmu.stagefile.forms.general import RingBody, Stage
-from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec, RingSpec, SetGearSpec
+from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec
 from gearfmu.stagefile.stored import hash_of, shaping
-from gearfmu.stagefile.tables.bodies import TOOTHING
+from gearfmu.stagefile.tables.bodies import TOOTHING, RingSpec, SetGearSpec
 from gearfmu.stagefile.tables.housing import HousingBody
 
 ALGORITHM = 2

@@ -1,5 +1,8 @@
 """The study of a scene: error and price of every point of the ladder, kept in CSV files as they come, so that a study
-that was interrupted goes on where it stopped."""
+that was interrupted goes on where it stopped.
+
+Points are measured against a reference: all stored modes, the step halved until the halving moves it less than a fifth
+of the error of the finest point of the study."""
 
 from __future__ import annotations
 
@@ -18,17 +21,76 @@ from gearfmu.errors import GearfmuError, ModelError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
 from gearfmu.scenefile.scene import SceneSpec
-from gearfmu.stage import StageModel
+from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.assembly.levels import LEVELS
+from gearfmu.stage.run.refinement import twice
+from gearfmu.stage.run.trace import TraceError
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
-from gearfmu.study.ladder import base_point, points, window
-from gearfmu.study.norm import band_error, errors, lock_time
-from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
+from gearfmu.study.ladder import QUICK_STEPS, STEPS, base_point, fitting, points, window
+from gearfmu.study.norm import Errors, Signals, band_error, errors, kept_signals, lock_time
 from gearfmu.study.table import KeptTable, ReferenceRow, Row, TransientRow
 from gearfmu.sweeps.runners import Lost, Runner, in_this_process
 
 FORMAT = 2  # of what is kept: a study of another format is measured anew
 Progress = Callable[..., None]
+SHARE = 0.2  # of the error of the finest point: the most that a reference may move
+FINEST = 0.2e-6  # s: the smallest step of a reference; every shipped scene has one at 0.208 µs
+FIRST = 3  # first reference: the finest step of the study over this
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Signals at step h (s); moved: distance to the run with twice the step; finest: error of the finest point of
+    level full; reached: whether that moved by less than a fifth of it."""
+
+    signals: Signals
+    h: float
+    n_dyn: int
+    moved: Errors
+    finest: Errors
+
+    @property
+    def reached(self) -> bool:
+        return self.moved.below(SHARE, self.finest)
+
+
+def make_reference(scene: SceneSpec, model: StageModel, slices: int, quick: bool = False) -> Reference:
+    """Run the scene with ever smaller steps until `reached`, or at most to FINEST; a helical stage with twice the
+    slices."""
+    slices = twice(model.stage, slices)
+
+    def run(h: float) -> Run:
+        return measure(scene, model, Point("full", h=h, slices=slices))
+
+    h = fitting(scene.coupling.step, min(QUICK_STEPS if quick else STEPS))
+    finest, h = run(h).signals, h / FIRST
+    coarse = run(h).signals
+    while True:
+        h /= 2
+        made = run(h)
+        found = Reference(made.signals, h, made.n_dyn, errors(coarse, made.signals), errors(finest, made.signals))
+        if found.reached or h / 2 < FINEST:
+            return found
+        coarse = made.signals
+
+
+def kept_reference(path: Path, identity: str) -> Reference | None:
+    """The reference in a file, when it is there and of this identity."""
+    try:
+        trace = Trace.load(path)
+    except TraceError:
+        return None
+    meta = trace.meta
+    if meta.get("identity") != identity:
+        return None
+    parts = {name: Errors(**meta[name]) for name in ("moved", "finest")}
+    return Reference(kept_signals(trace), meta["h"], meta["n_dyn"], **parts)
+
+
+def keep_reference(reference: Reference, path: Path, identity: str) -> None:
+    """Write it, for a study that goes on later."""
+    parts = {name: vars(getattr(reference, name)) for name in ("moved", "finest")}
+    reference.signals.trace({"identity": identity, "h": reference.h, "n_dyn": reference.n_dyn, **parts}).save(path)
 
 
 @dataclass(frozen=True)

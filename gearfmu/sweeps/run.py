@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gearfmu.body import body_hashes, load_bodies
 from gearfmu.errors import BodyError, GearfmuError
+from gearfmu.report.results import strict
 from gearfmu.scenefile.scene import load_scene
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.sweeps.journal import Journal
 from gearfmu.sweeps.plan import RUN, Plan, split
 from gearfmu.sweeps.points import LOST, OK, Outcome, Task, Variant, compute, prepare, program
 from gearfmu.sweeps.runners import Lost, Runner
@@ -23,6 +25,49 @@ from gearfmu.sweeps.table import SweepTable, column, column_name
 FORMAT = 1  # of the stored points: those of another format are computed anew
 JOURNAL, TRACES, BODIES = "points.jsonl", "traces", "bodies"
 Progress = Callable[..., None]
+
+
+class Journal:
+    """Results of points in the file points.jsonl of a folder, JSON lines in order of arrival, so that an interrupted
+    sweep is continued. Lines that end in the middle, of a process that was killed, are left out."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._known = dict(_lines(path))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_file() and not path.read_bytes().endswith(b"\n"):
+            with path.open("a", encoding="utf-8") as file:
+                file.write("\n")
+
+    def get(self, identity: str) -> Outcome | None:
+        """Outcome of a point, None where it was not computed."""
+        return self._known.get(identity)
+
+    def add(self, identity: str, outcome: Outcome) -> None:
+        """One more point; its trace is not kept here."""
+        known = self._known[identity] = replace(outcome, trace=None)
+        plain = asdict(known)
+        del plain["trace"]
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"identity": identity, **strict(plain)}, ensure_ascii=False) + "\n")
+
+
+def _lines(path: Path) -> list[tuple[str, Outcome]]:
+    found = []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
+        try:
+            entry = json.loads(line)
+            found.append((entry.pop("identity"), Outcome(**_with_nan(entry))))
+        except (ValueError, KeyError, TypeError):
+            continue
+    return found
+
+
+def _with_nan(entry: dict[str, Any]) -> dict[str, Any]:
+    """The inverse for the numbers of a row and a curve."""
+    row = {key: math.nan if value is None else value for key, value in entry["row"].items()}
+    curve = {key: [math.nan if v is None else v for v in values] for key, values in entry["curve"].items()}
+    return entry | {"row": row, "curve": curve}
 
 
 def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress: Progress | None = None) -> SweepTable:

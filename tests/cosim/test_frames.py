@@ -12,8 +12,7 @@ from gearfmu.cosim.frames import frame_plan
 from gearfmu.cosim.kernel_unit import Source
 from gearfmu.cosim.scene_run import Staged, run_once, stage_model
 from gearfmu.errors import CouplingError, SpecError
-from gearfmu.scenefile.deformation import DeformationChoice
-from gearfmu.scenefile.scene import SceneSpec, load_scene
+from gearfmu.scenefile.scene import DeformationChoice, SceneSpec, load_scene
 from gearfmu.stage.run.deformation import Deformation
 
 

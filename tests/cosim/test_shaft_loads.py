@@ -16,8 +16,8 @@ from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.scene_run import in_drivetrain
 from gearfmu.cosim.shaft_loads import Law, ShaftLoads, start_speeds
 from gearfmu.cosim.units import Variable
+from gearfmu.scenefile.drivetrain import ShaftLoad
 from gearfmu.scenefile.scene import load_scene
-from gearfmu.scenefile.shaft_loads import ShaftLoad
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stagefile.stage import load_stage
 

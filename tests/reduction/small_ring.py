@@ -11,10 +11,9 @@ from gearfmu.reduction.cyclic.flank import tooth_flank
 from gearfmu.reduction.cyclic.sector import SectorBody
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.forms.planetary import MountsSpec, RingSpec
 from gearfmu.stagefile.forms.shapes import ring_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec
+from gearfmu.stagefile.tables.bodies import BodySpec, MeshSpec, MountsSpec, RingSpec
 
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 MOUNTS = MountsSpec(points=6, stiffness=5e7)

@@ -14,7 +14,7 @@ import pytest
 from kinds import Drawn, Kind, every, some
 
 from gearfmu.stage import StageModel
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 
 NOISE = 1e-10  # m: what rounding of the rows leaves of a transmission error

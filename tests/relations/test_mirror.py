@@ -24,12 +24,12 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 from gearfmu.stage.assembly.meshes import tooth_phases
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
 from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
-from gearfmu.stagefile.tables.bodies import DeviationClass, Eccentricity, LeadSpec, Misalignment, Wobble
-from gearfmu.stagefile.tables.connections import FrictionSpec
+from gearfmu.stagefile.tables.bodies import DeviationClass, Eccentricity, LeadSpec, Wobble
+from gearfmu.stagefile.tables.connections import FrictionSpec, Misalignment
 
 FEW = COARSE.model_copy(update={"modes": 40})
 SAME = 5e-3  # tables of coast flanks are read where they touch at the nominal distance: up to 2e-3 at this load

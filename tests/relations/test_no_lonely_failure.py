@@ -12,8 +12,7 @@ from kinds import Drawn, Kind, every, some
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel
-from gearfmu.stage.run.limits import largest_torque
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import largest_torque, place_of
 from gearfmu.stage.run.te import loaded_te, statics_of
 
 COUNTS = {"pair": 60, "helical": 50, "internal": 40, "train": 20, "set": 5, "helical_set": 2}

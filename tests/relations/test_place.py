@@ -18,11 +18,11 @@ from moved import each_vector, renamed, run, start_of, turned_vector
 
 from gearfmu.stage import Steady
 from gearfmu.stage.assembly.meshes import tooth_phases
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.general import Stage, ToothedBody
-from gearfmu.stagefile.tables.bodies import Eccentricity, Misalignment, Wobble
-from gearfmu.stagefile.tables.connections import FrictionSpec
+from gearfmu.stagefile.tables.bodies import Eccentricity, Wobble
+from gearfmu.stagefile.tables.connections import FrictionSpec, Misalignment
 
 ANGLES = (math.pi, -math.pi, 0.5 * math.pi, -2.0, 0.7)
 OFFSETS = ((4e-6, -7e-6), (-3e-6, 5e-6), (2e-6, 6e-6))  # m: of rotors, one after the other

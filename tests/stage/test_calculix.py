@@ -25,10 +25,9 @@ from gearfmu.reduction.cyclic.statics import static_tables
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
-from gearfmu.stagefile.forms.planetary import SetGearSpec
 from gearfmu.stagefile.forms.shapes import gear_geometry
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import GearSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, SetGearSpec
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 GOLDEN = json.loads((REFERENCE / "calculix_fzg_c.json").read_text(encoding="utf-8"))

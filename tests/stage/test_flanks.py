@@ -28,12 +28,12 @@ from gearfmu.stagefile.tables.bodies import (
     EndRelief,
     GearSpec,
     LeadSpec,
-    Misalignment,
     ProfileSpec,
     RootRelief,
     TipRelief,
     Wobble,
 )
+from gearfmu.stagefile.tables.connections import Misalignment
 
 NO_CORNERS = {"effect.tip_contact": 0.0}
 PROFILES: dict[str, dict[str, Any]] = {

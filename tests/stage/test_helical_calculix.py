@@ -12,7 +12,7 @@ from evidence.peers.calculix import helical
 from evidence.tables import read_rows
 from gearfmu.body import Body
 from gearfmu.stage import assemble
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import statics_of
 
 pytestmark = pytest.mark.full  # four reductions

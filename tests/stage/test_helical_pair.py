@@ -16,8 +16,8 @@ from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import LeadSpec, Misalignment
-from gearfmu.stagefile.tables.connections import PortSpec
+from gearfmu.stagefile.tables.bodies import LeadSpec
+from gearfmu.stagefile.tables.connections import Misalignment, PortSpec
 
 TORQUE = 150.0  # N·m on the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}

@@ -25,7 +25,7 @@ from gearfmu.quantities import Range, all_ranges, kernel_limits, range_of
 from gearfmu.stage.run.steady import CASE_RANGES, PARAMETER_RANGES
 from gearfmu.stagefile.reading.base import Quantity, Spec, Whole, metadata_of, validate
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import Misalignment
+from gearfmu.stagefile.tables.connections import Misalignment
 from gearfmu.stagefile.tables.profile import read_profile
 
 Annotation = Quantity | Whole

@@ -16,7 +16,7 @@ from gearfmu.body import load_bodies
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
 from gearfmu.stagefile.stage import load_stage
 

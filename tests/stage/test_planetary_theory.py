@@ -18,7 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from gearfmu.kernel import Kernel
 from gearfmu.modes.linear import linearised
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.te import TeResult, loaded_te
 
 KNOWN = lin_parker.published()["params"]

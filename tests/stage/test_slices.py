@@ -32,7 +32,7 @@ from gearfmu.stage.run.refinement import HEARD, ORDERS, POSITIONS, Change, left_
 from gearfmu.stage.run.te import mesh_harmonics, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import Misalignment
+from gearfmu.stagefile.tables.connections import Misalignment
 
 HELD = {"effect.bearings": 0.0}  # axes
 

@@ -17,11 +17,11 @@ from gearfmu.stagefile.tables.bodies import (
     Eccentricity,
     EndRelief,
     LeadSpec,
-    Misalignment,
     ProfileSpec,
     RootRelief,
     Wobble,
 )
+from gearfmu.stagefile.tables.connections import Misalignment
 
 STAGE = load_stage("fzg_c").written
 

@@ -15,10 +15,9 @@ import pytest
 from gearfmu.stage import Trace
 from gearfmu.stage.run.trace import Channel
 from gearfmu.sweeps import run
-from gearfmu.sweeps.journal import Journal
 from gearfmu.sweeps.plan import plan
 from gearfmu.sweeps.points import LOST, OK, Outcome, Task
-from gearfmu.sweeps.run import JOURNAL, TRACES, sweep
+from gearfmu.sweeps.run import JOURNAL, TRACES, Journal, sweep
 from gearfmu.sweeps.runners import Lost
 from gearfmu.sweeps.table import SweepTable
 

@@ -44,7 +44,8 @@ from gearfmu.stage.run.te import TANGENT, place_of, statics_of
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.stage import load_stage
-from gearfmu.stagefile.tables.bodies import GearSpec, MeshSpec, Misalignment
+from gearfmu.stagefile.tables.bodies import GearSpec, MeshSpec
+from gearfmu.stagefile.tables.connections import Misalignment
 
 WIDTH, LAYERS, SLICES = 12e-3, 5, 10
 POSITIONS = 4

@@ -15,7 +15,7 @@ import numpy as np
 
 from gearfmu.geometry.mesh import RingMesh
 from gearfmu.stage.assembly.model import StageModel
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.simulate import Steady, simulate
 from gearfmu.stagefile.forms.shapes import MeshShape, mesh_shape
 from gearfmu.stagefile.forms.turning import meshings, turns

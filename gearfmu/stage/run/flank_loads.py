@@ -10,8 +10,7 @@ import numpy as np
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.assembly.model import StageModel
-from gearfmu.stage.run.limits import limit_named
-from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.limits import limit_named, place_of
 from gearfmu.stage.run.te import statics_of
 from gearfmu.stagefile.forms.shapes import face_width, mesh_shape
 

@@ -19,8 +19,7 @@ from gearfmu.geometry.mesh import set_ratio
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.stage.assembly.model import StageModel
 from gearfmu.stage.assembly.shown import Card, Shown, plot_over
-from gearfmu.stage.run.limits import each_load
-from gearfmu.stage.run.place import MeshPlace, place_of
+from gearfmu.stage.run.limits import MeshPlace, each_load, place_of
 from gearfmu.stagefile.forms.general import GearBody, Stage
 from gearfmu.stagefile.forms.shapes import face_width, gear_shape, mesh_shape, toothed
 

@@ -21,10 +21,10 @@ from gearfmu.stagefile.forms.general import (
     Stage,
 )
 from gearfmu.stagefile.forms.pair import StageSpec
-from gearfmu.stagefile.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.stagefile.forms.planetary import PlanetarySpec, SetSpec
 from gearfmu.stagefile.forms.shapes import planet_angles, set_carrier, with_relief_rolls
 from gearfmu.stagefile.reading.base import Spec
-from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, RingSpec, SetGearSpec
 from gearfmu.stagefile.tables.connections import Bearing, ContactSpec, PortSpec, RollingMount, SupportSpec
 
 CARRIER = "carrier"

@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.stagefile.forms.planetary import CarrierBody, MountsSpec, PlanetarySpec, RingSpec
+from gearfmu.stagefile.forms.planetary import CarrierBody, PlanetarySpec
 from gearfmu.stagefile.reading.base import LaterFields, Name, Quantity, Spec, Text, entry, named_tables, refuse
 from gearfmu.stagefile.tables.bodies import (
     Backlash,
     GearSpec,
     HelixAngle,
-    Misalignment,
     Module,
+    MountsSpec,
     PressureAngle,
+    RingSpec,
     ShaftBody,
 )
 from gearfmu.stagefile.tables.connections import (
@@ -33,6 +34,7 @@ from gearfmu.stagefile.tables.connections import (
     FrictionSpec,
     LevelSpec,
     Limits,
+    Misalignment,
     NodalSpec,
     OperatingSpec,
     Place,

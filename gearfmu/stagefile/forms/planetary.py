@@ -1,4 +1,4 @@
-"""What a stage file says about a planetary set: sun, planets, ring, carrier (ISO 21771 terms; SI floats)."""
+"""What a stage file says about a planetary set as a whole, and its carrier (ISO 21771 terms; SI floats)."""
 
 from __future__ import annotations
 
@@ -11,25 +11,19 @@ from gearfmu.geometry.mesh import set_ratio
 from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Spec, Text, Whole, entry, named_tables
 from gearfmu.stagefile.tables.bodies import (
     Backlash,
-    BodySpec,
     CenterDistance,
     Counts,
     Eccentricity,
     Elements,
     ElementsTwo,
     FaceWidth,
-    Factor,
     HelixAngle,
     Material,
     ModalDamping,
     Module,
     PressureAngle,
-    ProfileShift,
-    RackSpec,
-    Teeth,
-    TipDiameter,
-    TipEdge,
-    Toothing,
+    RingSpec,
+    SetGearSpec,
 )
 from gearfmu.stagefile.tables.connections import (
     Bearing,
@@ -39,11 +33,10 @@ from gearfmu.stagefile.tables.connections import (
     LevelSpec,
     Limits,
     PortSpec,
-    Ratio,
     SupportSpec,
 )
 from gearfmu.stagefile.tables.housing import HousingBody, Method
-from gearfmu.stagefile.tables.imported import ELSEWHERE, CarrierImportSpec, ImportSpec, RingImportSpec
+from gearfmu.stagefile.tables.imported import ELSEWHERE, CarrierImportSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
@@ -76,61 +69,6 @@ class SetSpec(Spec):
     planet_eccentricity: dict[Pin, Eccentricity] = entry(
         "eccentric toothings of single planets: number of the bolt → amount, angle; before that of all", {}
     )
-
-
-class SetGearSpec(Toothing):
-    """Sun or planet: an external gear."""
-
-    name: Name
-    teeth: Teeth = entry("number of teeth z")
-    profile_shift: ProfileShift = entry("profile shift coefficient x", 0.0)
-    tip_diameter: TipDiameter = entry("tip diameter d_a")
-    face_width: FaceWidth = entry("face width b")
-    bore_diameter: Diameter = entry("diameter of the bore")
-    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
-    rack: RackSpec = entry("basic rack", default_factory=RackSpec)
-    material: Material = entry("material")
-    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
-    body: BodySpec = entry("mesh and reduction")
-    bearing: Bearing | None = entry(
-        "of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion", None
-    )
-    imported: ImportSpec | None = entry(ELSEWHERE, None, alias="import")
-
-
-class MountsSpec(LaterFields):
-    """Elastic mounting of the ring: springs between equal patches of its rim and the ground, or a housing."""
-
-    later = ("to", "node")
-
-    points: Annotated[Count, Whole("mounts")] = entry(
-        "number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
-    )
-    stiffness: Annotated[float, Quantity("mount_stiffness")] = entry(
-        "stiffness of one mount, the same in all three directions"
-    )
-    damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m), of all mounts together", 0.03)
-    to: Name | None = entry("housing that holds the ring along and about its axis; the ground when absent", None)
-    node: Name | None = entry("seat of that housing", None)
-
-
-class RingSpec(Toothing):
-    """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
-
-    name: Name = "ring"
-    teeth: Annotated[Count, Whole("ring_teeth")] = entry("number of teeth z")
-    profile_shift: ProfileShift = entry("profile shift coefficient x, positive outwards", 0.0)
-    tip_diameter: TipDiameter = entry("tip diameter, the smallest of the ring")
-    rim_diameter: Diameter = entry("outer diameter of the rim")
-    face_width: FaceWidth = entry("face width b")
-    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
-    dedendum: Factor = entry("root depth below the reference circle, factor of m", 1.25)
-    fillet_radius: Factor = entry("root fillet, an arc tangent to flank and root circle, factor of m", 0.3)
-    material: Material = entry("material")
-    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
-    mounts: MountsSpec | None = entry("elastic mounts; none when the table is absent", None)
-    body: BodySpec = entry("mesh and reduction")
-    imported: RingImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
 
 class CarrierMeshSpec(Counts):

@@ -19,8 +19,8 @@ from gearfmu.geometry.mesh import (
     half_width,
 )
 from gearfmu.stagefile.forms.general import EngagementSpec, GearBody, RingBody, Stage, ToothedBody
-from gearfmu.stagefile.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
-from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, Toothing
+from gearfmu.stagefile.forms.planetary import CarrierBody, CarrierSpec, PlanetarySpec, SetSpec
+from gearfmu.stagefile.tables.bodies import GearSpec, PairSpec, RingSpec, SetGearSpec, Toothing
 
 GearShape = GearGeometry | InternalGearGeometry
 MeshShape = PairGeometry | RingMesh

@@ -104,8 +104,7 @@ def new_from_numbers(name: str, wish: Wish, folder: str | os.PathLike[str] = "."
 
 def draft_of(wish: Wish) -> Draft:
     """The draft of a stage. SpecError lists everything that is wrong with the numbers."""
-    from gearfmu.stagefile.proposals.pair import draft_pair
-    from gearfmu.stagefile.proposals.planetary import draft_set
+    from gearfmu.stagefile.proposals.forms import draft_pair, draft_set
 
     wish = replace(wish, teeth=tuple(abs(z) for z in wish.teeth))
     if problems := [*_missing(wish), *_beyond(wish)]:

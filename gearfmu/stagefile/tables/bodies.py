@@ -1,4 +1,4 @@
-"""Gears and shafts of a stage file, and the pair as a whole (ISO 21771 and REXS terms; SI floats).
+"""Gears, rings and shafts of a stage file, and the pair as a whole (ISO 21771 and REXS terms; SI floats).
 
 Teeth need not be nominal: flanks may be modified, deviations measured or drawn, and the toothing may not run true. All
 of that belongs to the stage and shapes no body: the finite elements have nominal flanks on nominal axes. Amounts are
@@ -7,19 +7,16 @@ positive; a *deviation* is positive where there is more material than nominal (I
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from gearfmu.quantities import kernel_limits
-from gearfmu.stagefile.reading.base import Count, Name, Quantity, Spec, Switch, Text, Whole, entry, refuse
-from gearfmu.stagefile.tables.connections import Diameter, GearBearing, Length
-from gearfmu.stagefile.tables.imported import ELSEWHERE, ImportSpec, SurfaceCoupling
+from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Spec, Switch, Text, Whole, entry, refuse
+from gearfmu.stagefile.tables.connections import Bearing, Diameter, GearBearing, Length, Misalignment, Ratio
+from gearfmu.stagefile.tables.imported import ELSEWHERE, ImportSpec, RingImportSpec, SurfaceCoupling
 
 Depth = Annotated[float, Quantity("flank_depth")]
 Slope = Annotated[float, Quantity("flank_slope")]
-Parallelism = Annotated[float, Quantity("misalignment")]
 # "quadratic" is what files of before 0.2 call a parabola
 ReliefKind = Annotated[
     Literal["linear", "parabolic", "arc"], BeforeValidator(lambda kind: "parabolic" if kind == "quadratic" else kind)
@@ -44,31 +41,6 @@ class LeadSpec(Spec):
     )
     crowning: Depth = entry("lead crowning C_beta: depth at both ends of the face width, none at its middle", 0.0)
     end_relief: EndRelief | None = entry("end relief; none when the table is absent", None)
-
-
-class Misalignment(Spec):
-    """Parallelism errors of the axes of the unloaded pair (ISO/TR 10064-3), of the wheel's axis seen from the pinion's.
-
-    In the frame of the stage: pinion's axis z, wheel on +x; errors count from the end at −z to that at +z.
-    """
-
-    out_of_plane: Parallelism = entry(
-        "f_SigmaBeta, deviation out of the common plane of the axes over the span; positive: at its +z end "
-        "the wheel's axis lies further towards +y",
-        0.0,
-    )
-    in_plane: Parallelism = entry(
-        "f_SigmaDelta, deviation in the common plane over the span; positive: the centre distance grows towards +z", 0.0
-    )
-    span: Length = entry("length L along the axes over which both are measured (bearing span)")
-
-    @model_validator(mode="after")
-    def _nearly_parallel(self) -> Misalignment:
-        most = kernel_limits()["TILT"][1]
-        tilt = math.hypot(self.out_of_plane, self.in_plane) / self.span
-        if tilt > most:
-            raise refuse(f"the axes tilt by {tilt:.3g} rad, at most {most:g} rad: smaller deviations or a longer span")
-        return self
 
 
 Angle = Annotated[float, Quantity("angle")]
@@ -310,6 +282,61 @@ class GearSpec(Toothing):
     def rigid_bore(self) -> bool:
         """Whether the bore's surface moves as one rigid body."""
         return self.bore_coupling == "rigid"
+
+
+class SetGearSpec(Toothing):
+    """Sun or planet: an external gear."""
+
+    name: Name
+    teeth: Teeth = entry("number of teeth z")
+    profile_shift: ProfileShift = entry("profile shift coefficient x", 0.0)
+    tip_diameter: TipDiameter = entry("tip diameter d_a")
+    face_width: FaceWidth = entry("face width b")
+    bore_diameter: Diameter = entry("diameter of the bore")
+    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
+    rack: RackSpec = entry("basic rack", default_factory=RackSpec)
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    body: BodySpec = entry("mesh and reduction")
+    bearing: Bearing | None = entry(
+        "of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion", None
+    )
+    imported: ImportSpec | None = entry(ELSEWHERE, None, alias="import")
+
+
+class MountsSpec(LaterFields):
+    """Elastic mounting of the ring: springs between equal patches of its rim and the ground, or a housing."""
+
+    later = ("to", "node")
+
+    points: Annotated[Count, Whole("mounts")] = entry(
+        "number of mounts, equally spaced from tooth space 0; one by one they hold the nearest tooth spaces"
+    )
+    stiffness: Annotated[float, Quantity("mount_stiffness")] = entry(
+        "stiffness of one mount, the same in all three directions"
+    )
+    damping_ratio: Ratio = entry("damping ratio D: c = 2 D sqrt(k m), of all mounts together", 0.03)
+    to: Name | None = entry("housing that holds the ring along and about its axis; the ground when absent", None)
+    node: Name | None = entry("seat of that housing", None)
+
+
+class RingSpec(Toothing):
+    """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
+
+    name: Name = "ring"
+    teeth: Annotated[Count, Whole("ring_teeth")] = entry("number of teeth z")
+    profile_shift: ProfileShift = entry("profile shift coefficient x, positive outwards", 0.0)
+    tip_diameter: TipDiameter = entry("tip diameter, the smallest of the ring")
+    rim_diameter: Diameter = entry("outer diameter of the rim")
+    face_width: FaceWidth = entry("face width b")
+    tip_edge_radius: TipEdge = entry("radius of the tip edge rounding", 2e-4)
+    dedendum: Factor = entry("root depth below the reference circle, factor of m", 1.25)
+    fillet_radius: Factor = entry("root fillet, an arc tangent to flank and root circle, factor of m", 0.3)
+    material: Material = entry("material")
+    modal_damping: ModalDamping = entry("damping ratio of the elastic modes", 0.01)
+    mounts: MountsSpec | None = entry("elastic mounts; none when the table is absent", None)
+    body: BodySpec = entry("mesh and reduction")
+    imported: RingImportSpec | None = entry(ELSEWHERE, None, alias="import")
 
 
 class ShaftSection(Spec):

@@ -1,5 +1,5 @@
-"""Connections of the bodies of a stage with each other and with the outside: bearings, supports, tooth contact, ports;
-and the cut frequencies of its levels (SI floats).
+"""Connections of the bodies of a stage with each other and with the outside: bearings, supports, tooth contact,
+misalignment, ports; and the cut frequencies of its levels (SI floats).
 
 Bearings are springs under a gear, or rolling bearings by their catalogue numbers."""
 
@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Strict, Tag, model_validator
 
+from gearfmu.quantities import kernel_limits
 from gearfmu.stagefile.reading.base import Count, LaterFields, Name, Quantity, Spec, Whole, entry, refuse
 
 CatalogueName = Annotated[str, Strict(), Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,39}$")]
@@ -22,6 +23,7 @@ Diameter = Annotated[float, Quantity("diameter")]
 Length = Annotated[float, Quantity("length")]
 Ratio = Annotated[float, Quantity("damping_ratio")]
 Side = Literal["+z", "-z"]
+Parallelism = Annotated[float, Quantity("misalignment")]
 CARRIES = "axial force of the shaft that an angular contact bearing (of two the left) carries"
 SPRINGS = ("stiffness", "axial", "tilt")  # of a Bearing
 
@@ -304,4 +306,29 @@ class SupportSpec(LaterFields):
     def _holds(self) -> SupportSpec:
         if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion, self.bearing)):
             raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
+        return self
+
+
+class Misalignment(Spec):
+    """Parallelism errors of the axes of the unloaded pair (ISO/TR 10064-3), of the wheel's axis seen from the pinion's.
+
+    In the frame of the stage: pinion's axis z, wheel on +x; errors count from the end at −z to that at +z.
+    """
+
+    out_of_plane: Parallelism = entry(
+        "f_SigmaBeta, deviation out of the common plane of the axes over the span; positive: at its +z end "
+        "the wheel's axis lies further towards +y",
+        0.0,
+    )
+    in_plane: Parallelism = entry(
+        "f_SigmaDelta, deviation in the common plane over the span; positive: the centre distance grows towards +z", 0.0
+    )
+    span: Length = entry("length L along the axes over which both are measured (bearing span)")
+
+    @model_validator(mode="after")
+    def _nearly_parallel(self) -> Misalignment:
+        most = kernel_limits()["TILT"][1]
+        tilt = math.hypot(self.out_of_plane, self.in_plane) / self.span
+        if tilt > most:
+            raise refuse(f"the axes tilt by {tilt:.3g} rad, at most {most:g} rad: smaller deviations or a longer span")
         return self

@@ -1,4 +1,4 @@
-"""A planetary set from its numbers of teeth and planets, module and face width."""
+"""A pair and a planetary set from their numbers of teeth and planets, module and face width."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from collections.abc import Iterator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.mesh import MOUNTS, RingMesh, least_apart, set_ratio
-from gearfmu.geometry.shifts import DEDENDUM, RING_FILLET, OpenPair, ring_of, ring_shortcomings, sum_of_shifts
+from gearfmu.geometry.mesh import MOUNTS, PairGeometry, RingMesh, least_apart, set_ratio
+from gearfmu.geometry.shifts import (
+    DEDENDUM,
+    RING_FILLET,
+    OpenPair,
+    Rack,
+    distance_of_shifts,
+    reach,
+    ring_of,
+    ring_shortcomings,
+    sum_of_shifts,
+)
 from gearfmu.quantities import range_of
-from gearfmu.stagefile.checks.gears import rounded_up
+from gearfmu.stagefile.checks.gears import rounded_down, rounded_up
 from gearfmu.stagefile.proposals.draft import LOAD_RULE, PITCH_SPEED, Draft, millimetres, usual_torque
 from gearfmu.stagefile.proposals.numbers import (
     GIVEN,
@@ -22,11 +32,65 @@ from gearfmu.stagefile.proposals.numbers import (
     put_patch,
     put_slices,
 )
-from gearfmu.stagefile.proposals.pair import SHIFT_RULE, out_of_reach, reference_distance
 
-NAMES = ("sun", "planet", "ring")
+PAIR, SET = ("pinion", "wheel"), ("sun", "planet", "ring")
 _SHARING = {2: 1.1, 3: 1.1, 4: 1.25, 5: 1.35, 6: 1.44}  # mesh load factor of IEC 61400-4 by the number of planets
 _CARRIER_SCALE = 0.75
+SHIFT_RULE = "equal specific sliding at both ends of the path of contact"
+
+
+def draft_pair(wish: Wish) -> Draft:
+    """The draft of a pair; SpecError where the centre distance is out of reach."""
+    rack, teeth, width = wish.rack, (wish.teeth[0], wish.teeth[1]), wish.width or 0.0
+    distance = distance_of(wish, reference_distance(rack, sum(teeth)))
+    pair = OpenPair(rack, teeth, distance)
+    shift = None if math.isnan(pair.total) else wish.shifts[0] if wish.shifts else pair.balanced()
+    if shift is None:
+        raise SpecError.of("", "center", millimetres(distance), out_of_reach(pair))
+    geometry = pair.at(shift)
+    draft = begun("helical_demo" if rack.beta else "fzg_c", wish, "pair", tuple(f"gears.{name}" for name in PAIR))
+    why = "of the given profile shifts" if wish.shifts else "no sum of profile shifts"
+    put_center(draft, wish, "pair", distance, why)
+    rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
+    rules = (GIVEN, GIVEN) if wish.shifts else rules
+    for k, name in enumerate(PAIR):
+        put_gear(draft, wish, k, f"gears.{name}", geometry.gears[k], rules[k])
+    _put_pair_loads(draft, wish, geometry, width)
+    put_slices(draft, rack, width)
+    return draft
+
+
+def _put_pair_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -> None:
+    """Torque, speed, load patches and shafts."""
+    pinion, wheel = geometry.gears
+    ratio = wheel.z / pinion.z
+    torque = draft.put_limit("torque_max", (wish.torque, GIVEN), (usual_torque(2 * pinion.r, ratio, width), LOAD_RULE))
+    draft.put_limit("speed_max", (wish.speed, GIVEN), (PITCH_SPEED / pinion.r, "20 m/s at the reference circle"))
+    radius = geometry.largest_relative_radius()
+    for name, gear in zip(PAIR, geometry.gears, strict=True):
+        put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
+    draft.put_shafts(dict(zip(PAIR, (torque, torque * ratio), strict=True)))
+
+
+def reference_distance(rack: Rack, teeth: int) -> float:
+    """Centre distance (m) of teeth (z₁ + z₂, or z_ring − z_planet) without a sum of profile shifts."""
+    return distance_of_shifts(rack.m, rack.alpha, rack.beta, teeth, 0.0)
+
+
+def out_of_reach(pair: OpenPair) -> str:
+    """Why no pair of gears can be made at a centre distance, and at which it can."""
+    found = reach(pair.rack, pair.teeth)
+    gears = f"gears of {pair.teeth[0]} and {pair.teeth[1]} teeth"
+    if found is None:
+        return f"no centre distance suits {gears}: give more teeth"
+    if math.isnan(pair.total):
+        why = "it is within the base circles"
+    elif abs(pair.total) > 6:
+        why = f"the sum of profile shifts would be {pair.total:.2f}"
+    else:
+        why = ", ".join(pair.best_efforts())
+    low, high = (millimetres(limit) for limit in (rounded_up(found[0], 5), rounded_down(found[1], 5)))
+    return f"out of reach, {why}: {gears} can be made from {low} to {high}"
 
 
 def draft_set(wish: Wish) -> Draft:
@@ -46,7 +110,7 @@ def draft_set(wish: Wish) -> Draft:
     problems += _room(wish, distance, tip)
     if problems or mesh is None or shift is None:
         raise SpecError(problems)
-    draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
+    draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", SET)
     why = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
     put_center(draft, wish, "set", distance, why)
     _put_planets(draft, wish)
@@ -54,7 +118,7 @@ def draft_set(wish: Wish) -> Draft:
     put_gear(draft, wish, 1, "planet", mesh.planet, f"sum of sun and planet {pair.total:.6f} from the centre distance")
     _put_ring(draft, mesh)
     _put_carrier(draft, wish, mesh)
-    _put_loads(draft, wish, pair, shift, mesh)
+    _put_set_loads(draft, wish, pair, shift, mesh)
     put_slices(draft, rack, wish.width or 0.0)
     return draft
 
@@ -155,7 +219,7 @@ def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
     draft.assume("carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
 
 
-def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: RingMesh) -> None:
+def _put_set_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: RingMesh) -> None:
     """Torque and speed of the carrier, load patches of all gears."""
     geometry, width = pair.at(shift), wish.width or 0.0
     sun, planet = geometry.gears
