@@ -280,12 +280,7 @@ def draw(table: list[dict[str, str]]) -> None:
 def main() -> None:
     """Measure, print and write, or read; draw."""
     if sys.argv[1:] != ["chart"]:
-        table = []
-        for group, lines, steps in PLAN:
-            for line in rows(group, lines, steps):
-                told(line)
-                table.append(line)
-        write_rows(FILE, table)
+        write_rows(FILE, told(line for group in PLAN for line in rows(*group)))
     draw(read_rows(FILE))
 
 

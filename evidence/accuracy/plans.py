@@ -1,6 +1,6 @@
 """Plans judged on windows that they did not see: evidence/accuracy/plans.csv.
 
-    python -m evidence.accuracy.plans [--budget "1 dB"] [--only NAME] [--out evidence/accuracy/plans.csv]
+    python -m evidence.accuracy.plans
 
 Every scene is planned for a budget; then the chosen set and the full model run on from a state of the scene over a
 window behind that of the plan, three times as long where the scene is steady. The scenes are `pair_loaded` and
@@ -12,15 +12,13 @@ made with the same kernel (`made_from`: kernel.build.fingerprint) is not made ag
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from evidence.tables import tidy
+from evidence.tables import told
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.kernel.build import fingerprint
@@ -34,6 +32,7 @@ from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.study.table import read_rows, write_rows
 from gearfmu.sweeps.runners import in_this_process
 
+TABLE = Path(__file__).with_suffix(".csv")
 LONGER, LONGEST = 3, 0.3  # windows; s
 BUDGETS = ("1 dB", "5 %")
 BAND = ("500 Hz", "5 kHz")
@@ -148,24 +147,16 @@ def _true(scene: SceneSpec, asked: Request, part: Segment) -> float:
 
 def main() -> None:
     """Make what is missing."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--budget", action="append", default=None)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
-    given = parser.parse_args()
-    rows = read_rows(given.out, Row)
-    made_from = fingerprint()[:12]
-    for budget in given.budget or BUDGETS:
+    rows, made_from = read_rows(TABLE, Row), fingerprint()[:12]
+    for budget in BUDGETS:
         for case in cases():
             known = [row for row in rows if (row.scene, row.budget) == (case.scene.name, budget)]
-            done = any(row.made_from == made_from for row in known)
-            if done or given.only not in f"{case.kind} {case.scene.name}":
+            if any(row.made_from == made_from for row in known):
                 continue
-            started = time.time()
-            rows = [row for row in rows if row not in known] + list(rows_of(case, budget, made_from))
-            write_rows(given.out, Row, rows)
-            print(f"{case.scene.name}, {budget}: {time.time() - started:.0f} s", flush=True)
-    print(tidy(rows, ["kind", "scene", "budget", "choice", "bound", "true", "kept", "times_full", "times_default"]))
+            made = list(rows_of(case, budget, made_from))
+            rows = [row for row in rows if row not in known] + made
+            write_rows(TABLE, Row, rows)
+            told(map(asdict, made))
 
 
 if __name__ == "__main__":

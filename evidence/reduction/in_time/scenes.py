@@ -1,9 +1,10 @@
-"""The two intermediate models of the paper as assemblies: carrier + one planet, and carrier + planet + sun.
+"""The intermediate models of the paper as assemblies: carrier + one planet, carrier + planet + sun, planet + ring.
 
 Bodies, pin, bearings and backlash are those of the shipped planetary54; the planet of bolt 0 alone is there. Nothing is
 damped. `carrier_planet`: a quarter of the paper's 600 N·m acts on the carrier's bore, growing within 0.1 ms.
 `hammering`: carrier and planet turn at 25 rad/s about the axis besides, the sun is at rest, and the teeth are in the
-middle of their backlash: they meet, let go and meet again.
+middle of their backlash: they meet, let go and meet again. `ring_hammering`: the same of a planet that turns on a pin
+that stands, and the ring.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -97,6 +99,22 @@ def hammering(meshes: Meshes) -> Scene:
     return scene(spec, solids, start, points, roll * (mesh.length - roll) / mesh.length)
 
 
+def ring_hammering(meshes: Meshes) -> Scene:
+    """The planet's teeth meet those of the elastic ring on its mounts. The ring is reduced from 54 input nodes, one a
+    tooth, as in the paper; contact points are read from its motion."""
+    stage = load_stage("planetary54")
+    spec = stage.written
+    mesh, planet, ring = set_geometry(spec).ring_mesh, placed_planet(spec, meshes), placed_ring(spec, meshes)
+    points = points_in_the_middle(planet, ring, mesh)
+    inputs = toothed_full_order(stage.by_file["ring"], stage.mounts, meshes.ring)
+    solids = {
+        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
+        "ring": Solid(with_flank(inputs, points.rows[1]), inputs),
+    }
+    roll, start = mesh.path["C"], (SPEED * np.eye(6)[5], np.zeros(0))
+    return scene(spec, solids, start, points, roll * (mesh.length + roll) / mesh.length)
+
+
 def scene(
     spec: Any, solids: dict[str, Solid], start: tuple[np.ndarray, ...], points: Points | None = None, curve: float = 0.0
 ) -> Scene:
@@ -143,6 +161,11 @@ def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scal
     return Placed(sector, geometry, centre, angle)
 
 
+def placed_ring(spec: Any, meshes: Meshes) -> Placed:
+    """The ring of the set's file, space 0 on +x, where the planet of bolt 0 has its tooth 0."""
+    return placed_gear(spec.ring, set_geometry(spec).ring_mesh.ring, np.zeros(2), 0.0, meshes.ring)
+
+
 def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_array | None = None) -> Solid:
     """A gear with its bore as averaging node and, where it touches another, rows of its contact points."""
     mesh = placed.sector.full()
@@ -150,10 +173,13 @@ def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_arra
     elements = Elements(nodes, mesh.elements, *hex20.assemble(nodes, mesh.elements, material))
     bore = Coupling("bore", "averaging", mesh.sets["bore"], np.zeros(3))
     full = full_order(name, elements, [bore], ("bore",), placed.geometry.r)
-    if flank is not None:
-        labels = tuple(f"n{k}" for k in range(flank.shape[0]))
-        full = replace(full, interfaces=(*full.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
-    return Solid(full)
+    return Solid(full if flank is None else with_flank(full, flank))
+
+
+def with_flank(body: FullOrder, flank: sp.csr_array) -> FullOrder:
+    """The body with rows (c, 3N) of its contact points."""
+    labels = tuple(f"n{k}" for k in range(flank.shape[0]))
+    return replace(body, interfaces=(*body.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
 
 
 def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
