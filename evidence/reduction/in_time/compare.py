@@ -172,8 +172,8 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
     def speed(name: str, component: str) -> np.ndarray:
         return np.gradient(read(name, "bore", component), motion.time)
 
+    force = -motion.tension[:, scene.assembly.joints.unilateral].sum(axis=1)
     if "ring" in scene.solids:
-        force = -motion.tension[:, scene.kinds == "contact"].sum(axis=1)
         return {
             "mesh force, N": force,
             "planet speed, rad/s": speed("planet", "rz"),
@@ -189,9 +189,8 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
     }
     if "sun" not in scene.solids:
         return found | {"planet speed, m/s": speed("planet", "uy"), "carrier speed, rad/s": speed("carrier", "rz")}
-    force = -motion.tension[:, scene.kinds == "contact"]
     return {
-        "mesh force, N": force.sum(axis=1),
+        "mesh force, N": force,
         "planet speed, rad/s": speed("planet", "rz"),
         "sun speed, rad/s": speed("sun", "rz"),
         **found,

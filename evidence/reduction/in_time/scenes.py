@@ -52,14 +52,11 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """solids by name in the order of the assembly's members; kinds (j,) tells pin, bearings and contacts apart; radius
-    (m) on which the bolts stand."""
+    """solids by name in the order of the assembly's members; radius (m) on which the bolts stand."""
 
     solids: dict[str, Solid]
     assembly: Assembly
-    kinds: np.ndarray
     radius: float
-    points: Points | None = None
 
 
 @dataclass(frozen=True)
@@ -120,15 +117,15 @@ def scene(
 ) -> Scene:
     """All bodies unreduced on their supports, TORQUE on the bore of a carrier. curve: relative radius of curvature (m)
     of the teeth that touch at the points."""
-    joints, kinds = _supports(spec, solids)
+    joints = _supports(spec, solids)
     if points:
-        joints, kinds = touching(joints, kinds, solids, points, foundation(spec, curve))
+        joints = touching(joints, solids, points, foundation(spec, curve))
     patterns = {name: np.zeros(solid.full.rows().shape[0]) for name, solid in solids.items()}
     if "carrier" in solids:
         patterns["carrier"][solids["carrier"].index("bore", "rz")] = TORQUE
     members = tuple(Member.whole(solid.full) for solid in solids.values())
     assembly = Assembly(members, joints, tuple(patterns.values()), _ramp, start)
-    return Scene(solids, assembly, kinds, spec.set.center_distance, points)
+    return Scene(solids, assembly, spec.set.center_distance)
 
 
 def _ramp(time: float) -> float:
@@ -182,25 +179,24 @@ def with_flank(body: FullOrder, flank: sp.csr_array) -> FullOrder:
     return replace(body, interfaces=(*body.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
 
 
-def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
+def _supports(spec: Any, solids: dict[str, Solid]) -> Joints:
     """Pin of the planet on bolt 0, which stands where there is no carrier, bearings of carrier and sun on the ground:
     stiffness as in the stage file."""
-    ends = {
-        "pin": (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
-        "carrier bearing": (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
-        "sun bearing": (spec.sun.bearing, (("sun", "bore", 1.0),)),
-    }
-    stiffness, kinds, entries = [], [], []
-    for kind, (bearing, sides) in ends.items():
+    ends = (
+        (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
+        (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
+        (spec.sun.bearing, (("sun", "bore", 1.0),)),
+    )
+    stiffness: list[float] = []
+    entries = []
+    for bearing, sides in ends:
         there = [side for side in sides if side[0] in solids]
         five = (bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt)
         for component, k in zip(FIVE, five if there else (), strict=bool(there)):
-            entries += [(len(kinds), name, solids[name].index(at, component), sign) for name, at, sign in there]
+            entries += [(len(stiffness), name, solids[name].index(at, component), sign) for name, at, sign in there]
             stiffness.append(k)
-            kinds.append(kind)
-    count = len(kinds)
-    joints = Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
-    return joints, np.array(kinds)
+    count = len(stiffness)
+    return Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
 
 
 def joint_rows(
@@ -215,9 +211,7 @@ def joint_rows(
     return tuple(result)
 
 
-def touching(
-    joints: Joints, kinds: np.ndarray, solids: dict[str, Solid], points: Points, penalty: float
-) -> tuple[Joints, np.ndarray]:
+def touching(joints: Joints, solids: dict[str, Solid], points: Points, penalty: float) -> Joints:
     """The joints and, after them, a contact at every point, penalty (N/m³) times its area stiff."""
     count = len(points.gap)
     touching_ones = [(name, solid) for name, solid in solids.items() if solid.full.interfaces[-1].name == "flank"]
@@ -225,14 +219,11 @@ def touching(
     entries = [(k, name, first + k, 1.0) for name, first in at.items() for k in range(count)]
     contacts = joint_rows(solids, entries, count)
     rows = tuple(sp.csr_array(sp.vstack(both)) for both in zip(joints.rows, contacts, strict=True))
-    return (
-        Joints(
-            rows,
-            np.concatenate([joints.stiffness, penalty * points.area]),
-            np.concatenate([joints.gap, points.gap]),
-            np.concatenate([joints.unilateral, np.ones(count, bool)]),
-        ),
-        np.concatenate([kinds, np.full(count, "contact")]),
+    return Joints(
+        rows,
+        np.concatenate([joints.stiffness, penalty * points.area]),
+        np.concatenate([joints.gap, points.gap]),
+        np.concatenate([joints.unilateral, np.ones(count, bool)]),
     )
 
 
