@@ -44,9 +44,7 @@ def made(entry: Mapping[str, Any]) -> str:
     """When a target was made, and of which commit; "not made" before that."""
     if not entry["made"]:
         return "not made"
-    words = f"{entry['made']}, commit {entry['commit']}" if entry.get("commit") else f"{entry['made']}"
-    carried = entry.get("carried")
-    return words + (f" (carried to {carried['commit']}: {carried['reason']})" if carried else "")
+    return f"{entry['made']}, commit {entry['commit']}" if entry.get("commit") else str(entry["made"])
 
 
 def of_tier(entries: Mapping[str, Mapping[str, Any]], tier: int) -> str:

@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
+import gearfmu
 from evidence.pages_made import MARK
 from gearfmu.cli import VERBS
 from gearfmu.stage.assembly.blob import read_blob
@@ -64,12 +65,7 @@ def short(content: bytes) -> str:
 @cache
 def stage_hash(name: str) -> str:
     """Hash of the assembled model of a shipped stage, the same on every machine."""
-    from gearfmu.body import load_bodies
-    from gearfmu.stage import assemble
-    from gearfmu.stagefile.stage import load_stage
-
-    spec = load_stage(name)
-    return rounded_hash(assemble(spec, load_bodies(spec)).blob)
+    return rounded_hash(gearfmu.assemble(name).blob)
 
 
 def python_code(text: str) -> str:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -35,25 +33,13 @@ def shown(value: object, digits: int = 4) -> object:
     return f"{value:.{digits}g}" if isinstance(value, float) else value
 
 
-def told(row: Mapping[str, object]) -> None:
-    """Print a row as soon as it is there."""
-    print("  ".join(f"{name} {shown(value)}" for name, value in row.items()), flush=True)
-
-
-def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
-    """A table for the terminal: one row a line, numbers with three digits, columns aligned."""
-    if not rows:
-        return "(no rows)"
-    names = list(columns or asdict(rows[0]))
-    cells = [names] + [[_cell(getattr(row, name)) for name in names] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells)
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+def told(rows: Iterable[Mapping[str, object]]) -> list[Mapping[str, object]]:
+    """The rows, each printed as soon as it is there."""
+    found = []
+    for row in rows:
+        print("  ".join(f"{name} {shown(value)}" for name, value in row.items()), flush=True)
+        found.append(row)
+    return found
 
 
 def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> None:

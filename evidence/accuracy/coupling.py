@@ -20,7 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +30,6 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelUnit, RowLog, Source
 from gearfmu.cosim.masters import KEYS, RATE
 from gearfmu.cosim.scene_run import run_once, stage_model
-from gearfmu.errors import CouplingError
 from gearfmu.files import written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.scenefile.scene import SceneSpec, load_scene
@@ -42,27 +41,17 @@ STEPS = (25e-6, 50e-6, 100e-6, 200e-6, 250e-6, 500e-6, 1e-3)
 WHOLE = Window(0.0, steady=False)
 
 
-class Distance(NamedTuple):
-    """rms of a difference in the channel's unit, over the rms of the reference's AC part, over its standard
-    deviation."""
-
-    rms: float
-    over_ac: float
-    over_std: float
-
-
-def distance(trace: Trace, reference: Trace, name: str, window: Window) -> Distance:
+def distance(trace: Trace, reference: Trace, name: str) -> tuple[float, float, float]:
     """How far a channel of `trace` is from `reference`, a run of the same scene at a whole multiple of times as many
-    points, at the times of `trace`. AC part and standard deviation are those of the reference at all its points."""
+    points, at the times of `trace`: rms of the difference in the channel's unit, over the rms of the reference's AC
+    part, over its standard deviation, both at all its points."""
     step, fine = float(trace.time[1] - trace.time[0]), float(reference.time[1] - reference.time[0])
     ratio = round(step / fine)
-    if ratio < 1 or abs(ratio * fine - step) > 1e-6 * fine:
-        raise CouplingError(f"steps of {step:g} s are no whole multiple of the reference's, {fine:g} s")
-    index = np.flatnonzero(trace.time >= window.start)
+    assert ratio >= 1 and abs(ratio * fine - step) <= 1e-6 * fine, "steps are whole multiples of the reference's"
+    index = np.arange(trace.time.size)
     index = index[ratio * index < reference.time.size]
-    whole = reference[name][reference.time >= window.start]
-    error = rms(trace[name][index] - reference[name][ratio * index])
-    return Distance(error, error / rms(alternating(whole, fine, window.steady)), error / float(np.std(whole)))
+    error, whole = rms(trace[name][index] - reference[name][ratio * index]), reference[name]
+    return error, error / rms(alternating(whole, fine, WHOLE.steady)), error / float(np.std(whole))
 
 
 @dataclass(frozen=True)
@@ -223,15 +212,15 @@ def row(group: Group, line: Line, results: dict[float, Result], step: float, ref
     }
     if result.outcome != OK:
         return found | dict.fromkeys(NUMBERS)
-    true = distance(result.trace, reference, name, WHOLE)
+    true, over_ac, over_std = distance(result.trace, reference, name)
     half = next((r for h, r in results.items() if abs(2 * h - step) < 1e-12 and r.outcome == OK), None)
     order = line.wiring.order(line.master)
     estimate = coupling_errors(result.trace, half.trace, order, WHOLE)[name].rms if half else None
     return found | {
-        "error_over_ac": true.over_ac,
-        "error_over_std": true.over_std,
-        "error_Nm": true.rms,
-        "predicted_over_true": estimate / true.rms if estimate else None,
+        "error_over_ac": over_ac,
+        "error_over_std": over_std,
+        "error_Nm": true,
+        "predicted_over_true": estimate / true if estimate else None,
         "lock_shift_s": round(lock(result.trace) - lock(reference), 9),
         "energy_residual": result.energy_residual,
     }
@@ -280,12 +269,7 @@ def draw(table: list[dict[str, str]]) -> None:
 def main() -> None:
     """Measure, print and write, or read; draw."""
     if sys.argv[1:] != ["chart"]:
-        table = []
-        for group, lines, steps in PLAN:
-            for line in rows(group, lines, steps):
-                told(line)
-                table.append(line)
-        write_rows(FILE, table)
+        write_rows(FILE, told(line for group in PLAN for line in rows(*group)))
     draw(read_rows(FILE))
 
 

@@ -1,6 +1,6 @@
 """Plans judged on windows that they did not see: evidence/accuracy/plans.csv.
 
-    python -m evidence.accuracy.plans [--budget "1 dB"] [--only NAME] [--out evidence/accuracy/plans.csv]
+    python -m evidence.accuracy.plans
 
 Every scene is planned for a budget; then the chosen set and the full model run on from a state of the scene over a
 window behind that of the plan, three times as long where the scene is steady. The scenes are `pair_loaded` and
@@ -12,15 +12,12 @@ made with the same kernel (`made_from`: kernel.build.fingerprint) is not made ag
 
 from __future__ import annotations
 
-import argparse
 import tempfile
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-from evidence.tables import tidy
+from evidence.tables import told
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.kernel.build import fingerprint
@@ -34,27 +31,28 @@ from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.study.table import read_rows, write_rows
 from gearfmu.sweeps.runners import in_this_process
 
+TABLE = Path(__file__).with_suffix(".csv")
 LONGER, LONGEST = 3, 0.3  # windows; s
 BUDGETS = ("1 dB", "5 %")
 BAND = ("500 Hz", "5 kHz")
 
-LOADS = """
-name = "{name}"
+RATTLE = """
+name = "rattle_8_12"
 description = "Torques on both shafts of a pair"
 duration = "0.2 s"
 settle = "0.05 s"
 [stage]
-name = "{stage}"
+name = "fzg_c/stage_relief"
 level = "standard"
 [coupling]
 step = "20 us"
 [start]
-input_speed = "{speed} rad/s"
+input_speed = "190 rad/s"
 [shaft_loads.pinion]
-constant = "{mean} N*m"
-alternating = {{ amplitude = "{swing} N*m", frequency = "{frequency} Hz" }}
+constant = "8 N*m"
+alternating = { amplitude = "12 N*m", frequency = "83.7 Hz" }
 [shaft_loads.wheel]
-proportional = {{ torque = "{brake} N*m", speed = "{wheel} rad/s" }}
+proportional = { torque = "12 N*m", speed = "-126.66666666666667 rad/s" }
 """
 
 
@@ -96,7 +94,7 @@ def cases() -> Iterator[Case]:
     """The scenes: loaded, helical, rattling and with a clutch."""
     yield Case("loaded", _rig("loaded_150_1200", 150, 1200))
     yield Case("helical", _rig("helical_100_1500", 100, 1500, "helical_demo"))
-    yield Case("rattle", _loads("rattle_8_12", 8, 12, 83.7, 190.0))
+    yield Case("rattle", _rattle())
     closing = {"start.slip": "40 rad/s", "coupling.step": "50 us", "duration": "0.2 s"}
     yield Case("clutch", load_scene("clutch_closure", closing))
 
@@ -106,12 +104,10 @@ def _rig(name: str, torque: float, rpm: float, stage: str = "fzg_c/stage_relief"
     return load_scene("pair_loaded", changes)
 
 
-def _loads(name: str, mean: float, swing: float, hertz: float, speed: float) -> SceneSpec:
-    numbers: dict[str, Any] = {"mean": mean, "swing": swing, "frequency": hertz, "speed": speed, "wheel": -speed / 1.5}
-    text = LOADS.format(name=name, stage="fzg_c/stage_relief", brake=1.5 * mean, **numbers)
+def _rattle() -> SceneSpec:
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{name}.toml"
-        path.write_text(text, encoding="utf-8")
+        path = Path(folder) / "rattle_8_12.toml"
+        path.write_text(RATTLE, encoding="utf-8")
         return load_scene(path)
 
 
@@ -148,24 +144,16 @@ def _true(scene: SceneSpec, asked: Request, part: Segment) -> float:
 
 def main() -> None:
     """Make what is missing."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--budget", action="append", default=None)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
-    given = parser.parse_args()
-    rows = read_rows(given.out, Row)
-    made_from = fingerprint()[:12]
-    for budget in given.budget or BUDGETS:
+    rows, made_from = read_rows(TABLE, Row), fingerprint()[:12]
+    for budget in BUDGETS:
         for case in cases():
             known = [row for row in rows if (row.scene, row.budget) == (case.scene.name, budget)]
-            done = any(row.made_from == made_from for row in known)
-            if done or given.only not in f"{case.kind} {case.scene.name}":
+            if any(row.made_from == made_from for row in known):
                 continue
-            started = time.time()
-            rows = [row for row in rows if row not in known] + list(rows_of(case, budget, made_from))
-            write_rows(given.out, Row, rows)
-            print(f"{case.scene.name}, {budget}: {time.time() - started:.0f} s", flush=True)
-    print(tidy(rows, ["kind", "scene", "budget", "choice", "bound", "true", "kept", "times_full", "times_default"]))
+            made = list(rows_of(case, budget, made_from))
+            rows = [row for row in rows if row not in known] + made
+            write_rows(TABLE, Row, rows)
+            told(map(asdict, made))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Error of the time step: every level against itself at 0.625 µs, from a common state.
 
-    python -m evidence.accuracy.step_error [SCENE …] [--levels fast standard] [--h 5 7.5 10] [--effects friction film]
+    python -m evidence.accuracy.step_error
 
 A run makes 1.2 ms with the step of the reference, then goes on with the step under test; samples at the end of every
 step over the next 8.4 ms. Error: rms of the difference over rms of the ripple, of the lines up to 10 kHz under a Hann
@@ -8,12 +8,11 @@ window, in per cent: transmission error, mesh forces, forces of bearings and pin
 of all its samples. Samples of it at the instants of the steps alone fold what lies above 1/2h into the band (aliases):
 `aliases` is what these err by in the mesh forces, `sampled` the error of the run against them.
 
-Without arguments the rows of TABLE, written to step_error.csv beside this file.
+Prints the rows of TABLE and writes them to step_error.csv beside this file.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,12 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
+import gearfmu
 from evidence.tables import told, write_rows
-from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.instance import Recording
-from gearfmu.stage import StageModel, Steady, assemble
-from gearfmu.stagefile.stage import load_stage
+from gearfmu.stage import StageModel, Steady
 
 REFERENCE, SETTLED, WINDOW = 0.625e-6, 1.2e-3, 8.4e-3  # s
 HIGHEST = 10e3  # Hz
@@ -52,8 +50,7 @@ class Scene:
     pulse: float = 0.0
 
     def model(self) -> StageModel:
-        spec = load_stage(self.stage)
-        model = assemble(spec, load_bodies(spec))
+        model = gearfmu.assemble(self.stage)
         return model if self.by_torques else model.driven_by_springs()
 
     def inputs(self, model: StageModel, parameters: dict[str, float]) -> Callable[[float], dict[str, float]]:
@@ -174,22 +171,5 @@ def rows(name: str, level: str, effects: Sequence[str], steps: Sequence[float]) 
         }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", choices=[[], *SCENES])
-    parser.add_argument("--levels", nargs="+", default=["fast"], choices=LEVELS)
-    parser.add_argument("--h", nargs="+", type=float, default=[5.0, 7.5, 10.0, 12.5, 15.0], help="µs, of 0.625 µs")
-    parser.add_argument("--effects", nargs="+", default=[], choices=EFFECTS)
-    chosen = parser.parse_args()
-    own = [(name, level, chosen.effects, chosen.h) for name in chosen.scenes for level in chosen.levels]
-    found = []
-    for name, level, effects, steps in own or TABLE:
-        for row in rows(name, level, effects, steps):
-            told(row)
-            found.append(row)
-    if not own:
-        write_rows(Path(__file__).with_suffix(".csv"), found)
-
-
 if __name__ == "__main__":
-    main()
+    write_rows(Path(__file__).with_suffix(".csv"), told(row for line in TABLE for row in rows(*line)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,8 +50,7 @@ class Energies:
     """Of one run, sampled at every internal step from the first one on.
 
     total (n,): stored energy minus work of the ports, J; dissipated (n,), J; kinetic: at the start, J;
-    changes: number of samples at which another set of tooth pairs carried load; retried_steps: steps left
-    unsolved; gamma_lowered: whether the step was above the accuracy limit.
+    changes: number of samples at which another set of tooth pairs carried load; retried_steps: steps left unsolved.
     """
 
     total: np.ndarray
@@ -59,7 +58,6 @@ class Energies:
     kinetic: float
     changes: int
     retried_steps: int
-    gamma_lowered: bool
     stored: np.ndarray = field(repr=False)
 
     @property
@@ -85,7 +83,8 @@ class FreePair:
         """Sections of the model on the bearings of `start`."""
         key = start.bearing, start.bearing_damping
         if key not in self._mounted:
-            gears = tuple(_on_bearing(gear, body.total_mass, *key) for gear, body in self._pairs())
+            both = zip(self.spec.written.gears, self.bodies, strict=True)
+            gears = tuple(_on_bearing(gear, body.total_mass, *key) for gear, body in both)
             model = assemble(rewritten(self.spec, gears=gears), self.bodies)
             self._mounted[key] = dict(read_blob(model.blob))
         return self._mounted[key]
@@ -97,12 +96,9 @@ class FreePair:
         free = start.load == 0.0 and start.play > 0
         back = (0.5 * start.play - start.offset) / shapes[0].r_b if free else 0.0
         for name, angle in (("gear0", turn / shapes[0].z - back), ("gear1", -turn / shapes[1].z)):
-            numbers = _numbers(sections[name])
+            numbers = dict(zip(GEAR_NUMBERS, sections[name], strict=True))
             sections[name] = gear_numbers(numbers | {"phase": numbers["phase"] + angle})
         return write_blob(sections)
-
-    def _pairs(self) -> Iterator[tuple[GearSpec, Any]]:
-        return zip(self.spec.written.gears, self.bodies, strict=True)
 
 
 def free_pair(spec: Stage, bodies: Sequence[Any]) -> FreePair:
@@ -116,10 +112,6 @@ def _on_bearing(gear: GearSpec, mass: float, stiffness: float | None, damping: f
     k = gear.bearing.stiffness if stiffness is None else stiffness
     bearing = gear.bearing.model_copy(update={"stiffness": k, "damping_ratio": damping / (2 * math.sqrt(k * mass))})
     return gear.model_copy(update={"bearing": bearing})
-
-
-def _numbers(section: np.ndarray) -> dict[str, float]:
-    return dict(zip(GEAR_NUMBERS, section, strict=True))
 
 
 def started(
@@ -153,12 +145,4 @@ def energies(kernel: Kernel, h: float, duration: float) -> Energies:
         kernel.get_many(references, first + i * samples.strides[0])
     stored, work, dissipated, pairs, contact = samples.T
     changes = int(np.count_nonzero((np.diff(pairs) != 0) | (np.diff(contact) != 0)))
-    return Energies(
-        stored - work,
-        dissipated,
-        kinetic,
-        changes,
-        int(kernel.get("solver.retried_steps")),
-        bool(int(kernel.get("solver.status")) & 8),
-        stored,
-    )
+    return Energies(stored - work, dissipated, kinetic, changes, int(kernel.get("solver.retried_steps")), stored)

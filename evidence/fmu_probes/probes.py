@@ -17,8 +17,13 @@ from fmpy.fmi2 import (
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
 )
+from fmpy.model_description import ScalarVariable
 
-from evidence.fmu_probes.agreement import compare
+from evidence.fmu_probes.symbols import exported_symbols
+from gearfmu.fmu.description import value_text
+from gearfmu.fmu.units import unit_of
+from gearfmu.kernel import Kernel, Variable
+from gearfmu.kernel.build import SUFFIX, host_platform
 
 OK, DISCARD, ERROR, FATAL = 0, 2, 3, 4
 STIMULUS = {"rad": 1e-4, "rad/s": 1.0, "rad/s2": 10.0, "N.m": 1.0}
@@ -271,8 +276,38 @@ def wrong_guid(folder: str) -> Findings:
 
 
 def kernel_table(folder: str) -> Findings:
-    """modelDescription.xml says what the binary's own table of variables says."""
-    yield from compare(Path(folder))
+    """modelDescription.xml says what the binary's own table of variables says, which is the truth; nothing for an FMU
+    whose binary has no table of ours."""
+    library, blob = kernel_library(Path(folder)), Path(folder, "resources", "model.gkb")
+    if library is None or not blob.is_file():
+        return
+    kernel = Kernel(blob.read_bytes(), library=library)
+    description = read_model_description(folder, validate=False)
+    listed = {v.name: v for v in description.modelVariables}
+    table = kernel.variables
+    for name in sorted(table.keys() ^ listed.keys()):
+        yield name, "only in " + ("the binary" if name in table else "modelDescription.xml"), "export again"
+    for name in table.keys() & listed.keys():
+        for field, ours, theirs in _fields(table[name], listed[name]):
+            if ours != theirs:
+                yield f"{name}: {field}", str(theirs), f"the binary says {ours}: export again"
+
+
+def kernel_library(folder: Path) -> Path | None:
+    """The host's kernel library inside an unpacked FMU: its binary, or with runtime python a file in resources."""
+    suffix = SUFFIX[host_platform()]
+    places = [folder / "binaries" / host_platform(), folder / "resources"]
+    files = [file for place in places for file in sorted(place.glob(f"*{suffix}"))]
+    return next((file for file in files if "gk_variable" in exported_symbols(file)), None)
+
+
+def _fields(ours: Variable, theirs: ScalarVariable) -> Iterator[tuple[str, object, object]]:
+    yield "valueReference", ours.reference, theirs.valueReference
+    yield "type", ours.type, theirs.type
+    yield "causality", ours.causality, theirs.causality
+    yield "unit", unit_of(ours), theirs.unit
+    if ours.causality != "output":
+        yield "start", value_text(ours, ours.start), theirs.start
 
 
 def _plain_run(folder: str, steps: int = STEPS) -> bytes:

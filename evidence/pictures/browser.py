@@ -21,7 +21,7 @@ FLAGS = (
 class Browser:
     """A browser with one page. Use as a context manager; `profile` is an empty folder of its own."""
 
-    def __init__(self, profile: Path, width: int = 1280, height: int = 900, dark: bool = False):
+    def __init__(self, profile: Path, width: int = 1280, height: int = 900):
         self.errors: list[str] = []
         self._number, self._rest = 0, b""
         out, self._write = os.pipe()
@@ -36,9 +36,9 @@ class Browser:
         self._session = self._call("Target.attachToTarget", targetId=page["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
-        self.resize(width, height)
-        scheme = "dark" if dark else "light"
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        mobile = width < 600  # CSS pixels: a telephone's window
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "light"}])
 
     def __enter__(self) -> Browser:
         return self
@@ -49,17 +49,10 @@ class Browser:
         os.close(self._write)
         os.close(self._read)
 
-    def resize(self, width: int, height: int) -> None:
-        """The size of the window, CSS pixels; below 600 it is a telephone's."""
-        mobile = width < 600
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
-
-    def open(self, path: Path, limit: float = 60) -> float:
-        """Open a report and wait until all that is in the window is drawn; seconds that took by the wall clock."""
-        begin = time.monotonic()
+    def open(self, path: Path, limit: float = 60) -> None:
+        """Open a report and wait until all that is in the window is drawn."""
         self.call("Page.navigate", url=path.resolve().as_uri())
         self.wait("ready", limit)
-        return time.monotonic() - begin
 
     def wait(self, state: str, limit: float = 60) -> None:
         """Wait until the report is `ready` (all that is in the window is drawn) or `complete` (every figure that comes
@@ -77,22 +70,15 @@ class Browser:
         while self.value("document.querySelectorAll('.plot').length > gearfmuPage.drawn") and time.monotonic() < end:
             time.sleep(0.05)
 
-    def processor_time(self) -> float:
-        """Processor time (s) of the browser's processes so far."""
-        found = self._call("SystemInfo.getProcessInfo")["processInfo"]
-        return float(sum(process["cpuTime"] for process in found))
-
     def value(self, expression: str) -> Any:
         """What an expression gives, as JSON."""
         found = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
-    def picture(self, path: Path, clip: tuple[float, float, float, float] | None = None, whole: bool = False) -> None:
-        """A PNG of the window, the whole page or a clip x, y, width, height of the page."""
-        how: dict[str, Any] = {"captureBeyondViewport": whole or clip is not None}
-        if whole:
-            clip = (0, 0, *self.value("[document.documentElement.clientWidth, document.documentElement.scrollHeight]"))
+    def picture(self, path: Path, clip: tuple[float, float, float, float] | None = None) -> None:
+        """A PNG of the window, or of a clip x, y, width, height of the page."""
+        how: dict[str, Any] = {"captureBeyondViewport": clip is not None}
         if clip is not None:
             how["clip"] = dict(zip(("x", "y", "width", "height"), clip, strict=True)) | {"scale": 1}
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", **how)["data"]))

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import gearfmu
 from evidence.price.counted import ROOT, SET, SET_START, SET_TORQUES, Count, Period, count, make_host, words
 from gearfmu.body import load_bodies
 from gearfmu.files import write_text
@@ -55,11 +56,7 @@ WATCHED = [f"{mesh}.{what}" for mesh in ("mesh", "stage2", "sun_planet1") for wh
 WATCHED += ["energy.stored", "energy.dissipated"]  # as there are
 
 
-@lru_cache
-def shipped(stage: str) -> StageModel:
-    """The model of a stage: a planetary set takes some seconds to assemble."""
-    spec = load_stage(stage)
-    return assemble(spec, load_bodies(spec))
+shipped = lru_cache(gearfmu.assemble)  # a planetary set takes some seconds
 
 
 class Bench:
@@ -131,12 +128,9 @@ class Bench:
 
 def table(rows: Mapping[str, Cost]) -> str:
     """The CSV, in the order of the effects."""
-    lines = [f"{row.effect},{row.on:.1f},{row.off:.1f},{row.without:.1f}" for row in ordered(rows)]
+    ordered = [rows[effect.name] for effect in EFFECTS if effect.name in rows]
+    lines = [f"{row.effect},{row.on:.1f},{row.off:.1f},{row.without:.1f}" for row in ordered]
     return "\n".join(["effect,on,off,without", *lines, ""])
-
-
-def ordered(rows: Mapping[str, Cost]) -> list[Cost]:
-    return [rows[effect.name] for effect in EFFECTS if effect.name in rows]
 
 
 def main(names: list[str]) -> int:
@@ -150,12 +144,9 @@ def main(names: list[str]) -> int:
             row, same = bench.measure(effect)
             rows[effect.name] = row
             wrong += not same or abs(row.price_of_off) > MOST
-            print(
-                f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a "
-                "step: "
-                f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}",
-                flush=True,
-            )
+            counts = f"on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a step"
+            shares = f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}"
+            print(f"{effect.name:16s} {counts}: {shares}, same bits: {same}", flush=True)
     write_text(TABLE, table(rows))
     return wrong
 

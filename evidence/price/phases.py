@@ -1,35 +1,31 @@
 """Phase profile of the internal step: share and processor cycles of each phase. On the loaded pair at every level (302
 N·m, 2000 rpm, 5 slices); at level fast on a train, a planetary set, a helical pair without and with friction.
 
-    python -m evidence.price.phases [SCENE …]
+    python -m evidence.price.phases
 
 Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. `pass`: what
-engagements of an island do to each other. Prints a table and writes evidence/price/phases.csv; with SCENE only the rows
-of these are made again.
+engagements of an island do to each other. Prints a table and writes evidence/price/phases.csv.
 """
 
 from __future__ import annotations
 
 import math
 import statistics
-import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
+import gearfmu
 from evidence.price.counted import SET_START, SET_TORQUES
-from evidence.tables import read_rows, told, write_rows
-from gearfmu.body import load_bodies
+from evidence.tables import told, write_rows
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
-from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage import StageModel, Steady
 from gearfmu.stage.assembly.levels import LEVELS
-from gearfmu.stagefile.stage import load_stage
 
 STEP, BLOCK, BLOCKS = 1e-4, 10, 50
-TABLE = Path(__file__).with_suffix(".csv")
 
 
 @dataclass(frozen=True)
@@ -80,16 +76,15 @@ def run(kernel: Kernel, scene: Scene, model: StageModel) -> dict[str, float]:
     return quiet(blocks)
 
 
-def profile(name: str, library: Path) -> list[dict[str, object]]:
+def profile(name: str, library: Path) -> Iterator[dict[str, object]]:
     """One row a level and phase of a scene."""
     scene = SCENES[name]
-    spec = load_stage(scene.stage)
-    model, rows = assemble(spec, load_bodies(spec)), []
+    model = gearfmu.assemble(scene.stage)
     for level in scene.levels:
         kernel = Kernel(model.blob, {"level": LEVELS.index(level), **scene.parameters}, library)
         cycles = run(kernel, scene, model)
-        rows += [
-            {
+        for phase, value in cycles.items():
+            yield {
                 "scene": name,
                 "level": level,
                 "phase": phase,
@@ -99,24 +94,15 @@ def profile(name: str, library: Path) -> list[dict[str, object]]:
                 "h_s": kernel.get("solver.h"),
                 "iterations": round(kernel.get("solver.iterations") / kernel.get("solver.steps"), 3),
             }
-            for phase, value in cycles.items()
-        ]
-    return rows
 
 
-def main(scenes: list[str]) -> None:
+def main() -> None:
     """Measure, print, write the table."""
-    known = read_rows(TABLE)
     with tempfile.TemporaryDirectory() as folder:
         library = build_library(out=Path(folder) / "profiled.so", compiler=("cc", "-DGK_PROFILE"))
-        table: list[Mapping[str, object]] = []
-        for name in SCENES:
-            found = profile(name, library) if name in (scenes or SCENES) else []
-            table += found or [row for row in known if row["scene"] == name]
-            for row in found:
-                told(row)
-    write_rows(TABLE, table, digits=6)
+        rows = told(row for name in SCENES for row in profile(name, library))
+    write_rows(Path(__file__).with_suffix(".csv"), rows, digits=6)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,30 +1,27 @@
 """Instructions of an internal step by level and step size, counted by callgrind: steps.csv beside it.
 
-    python -m evidence.price.steps [STAGE …]
+    python -m evidence.price.steps
 
 Pair with relief: 302 N·m at 2000 rpm, one mesh period after half a millisecond. Planetary set planetary54: 600 N·m on
 the carrier at 85 rad/s, constant torques, 1.4 ms after 2 ms. Five slices; the first row of a level is its default
-step. With STAGE only its rows are made again. Needs valgrind and cc; a minute for the pair, most of a minute a row of
-the set, nearly all of it the model's preparation under valgrind.
+step. Needs valgrind and cc; a minute for the pair, most of a minute a row of the set, nearly all of it the model's
+preparation under valgrind.
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import gearfmu
 from evidence.price.counted import SET, SET_START, SET_TORQUES, Period, count, make_host, words
-from evidence.tables import read_rows, told, write_rows
-from gearfmu.body import load_bodies
+from evidence.tables import told, write_rows
 from gearfmu.kernel.build import library_path
-from gearfmu.stage import Steady, assemble
+from gearfmu.stage import Steady
 from gearfmu.stage.assembly.levels import LEVELS
-from gearfmu.stagefile.stage import load_stage
 
-TABLE = Path(__file__).with_suffix(".csv")
 DEFAULT, SLICES = 20e-6 / 3, 5.0  # s
 
 
@@ -58,8 +55,7 @@ BENCHES = (
 
 def rows_of(bench: Bench, folder: Path) -> Iterator[dict[str, str]]:
     """The rows of a stage."""
-    spec = load_stage(bench.stage)
-    model = assemble(spec, load_bodies(spec))
+    model = gearfmu.assemble(bench.stage)
     host, blob = make_host(folder), folder / "blob"
     blob.write_bytes(model.blob)
     of_set = bench.stage == SET
@@ -71,16 +67,12 @@ def rows_of(bench: Bench, folder: Path) -> Iterator[dict[str, str]]:
             yield {"stage": bench.stage, "level": level, "h_s": f"{h:g}", "instructions_per_step": f"{found:.0f}"}
 
 
-def main(stages: list[str]) -> None:
+def main() -> None:
     """Measure, print, write the table."""
-    rows = [row for row in read_rows(TABLE) if stages and row["stage"] not in stages]
     with tempfile.TemporaryDirectory() as folder:
-        for bench in BENCHES:
-            for row in rows_of(bench, Path(folder)) if bench.stage in (stages or [bench.stage]) else ():
-                rows.append(row)
-                told(row)
-    write_rows(TABLE, rows)
+        rows = told(row for bench in BENCHES for row in rows_of(bench, Path(folder)))
+    write_rows(Path(__file__).with_suffix(".csv"), rows)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -4,7 +4,7 @@ and how deep its flanks may lie in each other. One bench a kind: pair.py, train.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -44,7 +44,28 @@ class Bench:
         raise NotImplementedError
 
     def turning(self, motion: Turn, loads: Sequence[Step]) -> Inputs:
-        """The input turns as `motion` says under torques (N·m) that change by `loads`, one step after the other."""
+        """The input turns as `motion` says under torques (N·m) that change by `loads`, one step after the other: ends
+        of springs turn with it, wound up against each other."""
+        ends = {torque: self.wound(torque) for load in loads for torque in (load.before, load.after)}
+
+        def inputs(time: float) -> Mapping[str, float]:
+            load, turn, values = at(loads, time), motion(time), dict[str, float]()
+            both = zip(self.watched.ports, self.ratios, ends[load.before], ends[load.after], strict=True)
+            for port, ratio, before, after in both:
+                more = replace(load, before=before, after=after)(time)
+                for name, own, of_load in zip(("phi", "w", "a"), turn, more, strict=True):
+                    values[f"{port}.{name}"] = ratio * own + of_load
+            return values
+
+        return inputs
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Speeds of both ports over that of the input."""
+        raise NotImplementedError
+
+    def wound(self, torque: float) -> tuple[float, float]:
+        """Angles (rad) of the outer ends of both ports that carry a torque (N·m) at rest."""
         raise NotImplementedError
 
     def dragged(self, motion: Turn, drag: float) -> tuple[Bench, Inputs]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from evidence.stability.bench import Bench, at
+from evidence.stability.bench import Bench
 from evidence.stability.checks import CLEARANCE, SOFTEST
-from evidence.stability.motion import Step, Turn
+from evidence.stability.motion import Turn
 from evidence.stability.record import Inputs, Record, Watched
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
@@ -69,18 +69,14 @@ class Pair(Bench):
         gears = self.model.stage.written.gears
         return -float(gears[0].teeth / gears[1].teeth)
 
-    def turning(self, motion: Turn, loads: Sequence[Step]) -> Inputs:
-        """The pinion's end turns and is wound up against the wheel's, torque 0: the teeth in mid-backlash."""
-        wound = [replace(step, before=_wound(self, step.before), after=_wound(self, step.after)) for step in loads]
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Of pinion and wheel."""
+        return 1.0, self.ratio
 
-        def inputs(time: float) -> Mapping[str, float]:
-            turn, load = motion(time), at(wound, time)(time)
-            values: dict[str, float] = {}
-            for name, own, more in zip(("phi", "w", "a"), turn, load, strict=True):
-                values |= {f"pinion.{name}": own + more, f"wheel.{name}": self.ratio * own}
-            return values
-
-        return inputs
+    def wound(self, torque: float) -> tuple[float, float]:
+        """The pinion's end against the wheel's; torque 0: the teeth in mid-backlash."""
+        return _wound(self, torque), 0.0
 
     def dragged(self, motion: Turn, drag: float) -> tuple[Pair, Inputs]:
         """A loose wheel."""

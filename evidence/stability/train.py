@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from evidence.stability.bench import Bench, at
+import gearfmu
+from evidence.stability.bench import Bench
 from evidence.stability.checks import beyond_touch, play_of
-from evidence.stability.motion import Step, Turn
-from evidence.stability.record import Inputs, Record, Watched
-from gearfmu.body import load_bodies
-from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from evidence.stability.record import Record, Watched
+from gearfmu.stage import StageModel, Steady, loaded_te
 from gearfmu.stagefile.forms.shapes import mesh_shape
-from gearfmu.stagefile.stage import load_stage
 
 TRAIN = "two_stage"
 PORT_OF = {"stage1": ("input", 0), "stage2": ("output", 1)}  # port that shares a shaft with gear A (0) or B (1)
@@ -36,21 +34,15 @@ class Train(Bench):
         """Its three shafts, assembled."""
         return _train()
 
-    def turning(self, motion: Turn, loads: Sequence[Step]) -> Inputs:
-        """Both ends turn, wound up against each other."""
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Of input and output."""
+        return 1.0, 1.0 / _train().shafts.ratio
 
-        def inputs(time: float) -> Mapping[str, float]:
-            load, turn = at(loads, time), motion(time)
-            part = replace(load, before=0.0, after=1.0)(time)
-            values: dict[str, float] = {}
-            turns, ends = (1.0, 1.0 / _train().shafts.ratio), (_wound(load.before), _wound(load.after))
-            for port, ratio, a, b in zip(self.watched.ports, turns, *ends, strict=True):
-                values[f"{port}.phi"] = a + (b - a) * part.phi + ratio * turn.phi
-                values[f"{port}.w"] = (b - a) * part.w + ratio * turn.w
-                values[f"{port}.a"] = (b - a) * part.a + ratio * turn.a
-            return values
-
-        return inputs
+    def wound(self, torque: float) -> tuple[float, float]:
+        """By the kernel's own statics."""
+        at_rest = Steady(_train(), 0.0, torque)(0.0)
+        return at_rest["input.phi"], at_rest["output.phi"]
 
     def carried(self, record: Record, since: float, until: float) -> dict[str, float]:
         """Torques of both ports, that of the output by the ratio; their sign is that of the first mesh's force."""
@@ -71,15 +63,7 @@ class Train(Bench):
 
 @lru_cache(maxsize=1)
 def _train() -> StageModel:
-    spec = load_stage(TRAIN)
-    return assemble(spec, load_bodies(spec))
-
-
-@lru_cache(maxsize=8)
-def _wound(torque: float) -> tuple[float, float]:
-    """Angles of the outer ends (rad) that carry a torque at rest."""
-    at_rest = Steady(_train(), 0.0, torque)(0.0)
-    return at_rest["input.phi"], at_rest["output.phi"]
+    return gearfmu.assemble(TRAIN)
 
 
 @lru_cache(maxsize=2)

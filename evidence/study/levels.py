@@ -1,19 +1,19 @@
 """The price list of the fidelity levels, which every report shows: error and processor time of each at its default
 step, from a study (gearfmu/study) of the loaded and the lightly loaded pair.
 
-    python -m evidence.study.levels [--study DIR] [pair_loaded pair_light]
+    python -m evidence.study.levels
 
-DIR: folder of `gearfmu study`, evidence/study when not given; rows that are not there yet, or not of this kernel and
-these bodies, are measured and added. Writes levels_<stage>.csv beside the stage file, where the report looks for it.
+Rows that are not in evidence/study yet, or not of this kernel and these bodies, are measured and added. Writes
+levels_<stage>.csv beside the stage file, where the report looks for it.
 """
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
+from evidence.tables import told
 from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
 from gearfmu.scenefile.scene import load_scene
@@ -45,21 +45,15 @@ def price(row: Row, reference: Signals, bodies: str) -> dict[str, object]:
 
 def main() -> None:
     """Measure what is missing and write one list a stage."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=["pair_loaded", "pair_light"])
-    parser.add_argument("--study", type=Path, default=Path(__file__).parent)
-    chosen = parser.parse_args()
-    for name in chosen.scenes:
-        found = study(Job(load_scene(name), chosen.study, defaults=True))
+    for name in ("pair_loaded", "pair_light"):
+        found = study(Job(load_scene(name), Path(__file__).parent, defaults=True))
         bodies, reference = fingerprint(found.model.body_hashes), found.references[found.scene.stage.slices]
         levels = sorted(found.rows, key=lambda row: LEVELS.index(row.level))
         rows = [price(row, reference.signals, bodies) for row in levels]
         path = levels_path(load_stage(found.scene.stage.name))
         table = [old for old in read_levels(path) if old["scene"] != name] + rows
         write_columns(path, {column: np.array([line[column] for line in table]) for column in COLUMNS})
-        for line in rows:
-            shown = (f"{value:.3g}" if isinstance(value, float) else str(value) for value in line.values())
-            print("  ".join(shown), flush=True)
+        told(rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The price list of a planetary set: error and processor time over level, step, slices, number of planets and effects.
 
-    python -m evidence.study.sets SCENE … [--out evidence/study] [--quick]
+    python -m evidence.study.sets SCENE …
 
 What is judged and how it is timed is as in the study of a pair (norm.py, bench.py), on the first milliseconds of the
 scene: a set's step costs some 200 µs. Levels and steps are measured against level full with a step that is halved once
@@ -10,16 +10,16 @@ five slices and all effects, so that their error is what they change and not tha
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
+import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from evidence.tables import tidy
+from evidence.tables import told
 from gearfmu.body import load_bodies, reduce_body
 from gearfmu.commands.models import bodies_for_motion
 from gearfmu.commands.shared import progress_bar
@@ -47,7 +47,7 @@ COARSE = 0.5  # of the element counts of a carrier made for another number of pl
 EFFECTS = ("hertz", "contact_damping", "tip_relief", "tip_contact", "elastic")
 TURNING = ("coriolis", "centrifugal")
 FAST_SPEED = 300.0  # rad/s of the input: the effects of turning axes are shown there too
-QUICK_STEPS = (10e-6, 5e-6)
+HERE = Path(__file__).parent
 
 Tell = Callable[..., None]
 
@@ -84,23 +84,6 @@ class SetRow:
     def bearing_error(self) -> float:
         """The pins', by the name that rows of a pair have."""
         return self.pin_error
-
-
-@dataclass(frozen=True)
-class SetStudy:
-    """Rows of a scene; sentences about them: what the kernel refused or said, and what the references still move."""
-
-    rows: tuple[SetRow, ...]
-    notes: tuple[str, ...]
-
-
-def set_study(scene: SceneSpec, out: Path, quick: bool = False, progress: Tell | None = None) -> SetStudy:
-    """Measure what is not yet in the folder `out` and return all of it; quick: few points on a short window.
-
-    Writes sets.csv after every point and sets.json, which says what the rows belong to: those of another kernel, stage
-    or scene are dropped. Raises what a run raises, but a point that the kernel refuses is told.
-    """
-    return _SetStudy(scene, out, quick, progress or (lambda fraction, text="": None)).go()
 
 
 def at_speed(scene: SceneSpec, speed: float) -> SceneSpec:
@@ -147,16 +130,22 @@ class _Case:
     wanted: Callable[[], Signals]
 
 
-class _SetStudy:
-    """A price list that is being made."""
+class SetStudy:
+    """A price list that is being made: what sets.csv does not have yet is measured. Sets.csv is written after every
+    point; sets.json says what the rows belong to: those of another kernel, stage or scene are dropped. Raises what a
+    run raises, but a point that the kernel refuses is said.
 
-    def __init__(self, scene: SceneSpec, out: Path, quick: bool, tell: Tell) -> None:
-        self.scene, self.out, self.quick, self.tell = window(scene, quick), out, quick, tell
+    said: what the kernel refused or said, and what the references still move.
+    """
+
+    def __init__(self, scene: SceneSpec, tell: Tell) -> None:
+        self.scene, self.tell = window(scene), tell
         spec = load_stage(scene.stage.name)
         self.spec, self.bodies, self.slices = spec, load_bodies(spec), scene.stage.slices
+        self.planets = spec.written.set.planets
         self.model = self._model_of(spec, self.bodies)
         self.base = Point("fast", h=self._fitting(BASE_STEP), slices=self.slices)
-        self.table = KeptTable(out / "sets.csv", SetRow)
+        self.table = KeptTable(HERE / "sets.csv", SetRow)
         self.identity = identity(self.scene, self.model, fingerprint())
         kept = self._facts().get(scene.name, {})
         fits = kept.get("identity") == self.identity
@@ -164,27 +153,23 @@ class _SetStudy:
         if not fits:
             self.table.drop(scene.name)
 
-    def go(self) -> SetStudy:
+    def rows(self) -> list[SetRow]:
         """Levels and steps, slices and effects of the shipped set, then other numbers of planets."""
         self._say()
-        own, planets = (lambda: self.model), self.spec.written.set.planets
+        own, planets = (lambda: self.model), self.planets
         plain = f"fast, {1e6 * self.base.h:.3g} µs, {self.slices} slices"
         here = _Case(self.scene, own, planets, plain, lambda: self._base_run.signals)
-        slices = [n for n in (SLICES[:1] if self.quick else SLICES) if n != self.slices]
-        effects = TURNING if self.quick else EFFECTS + TURNING
-        steps = [self._fitting(h) for h in (QUICK_STEPS if self.quick else STEPS)]
-        levels = ("rigid", "fast") if self.quick else LEVELS
-        points = [Point(level, h=h, slices=self.slices) for level in levels for h in steps]
+        steps = [self._fitting(h) for h in STEPS]
+        points = [Point(level, h=h, slices=self.slices) for level in LEVELS for h in steps]
         self._add(self._against_full(own, planets), points)
-        self._add(here, [replace(self.base, slices=n) for n in slices])
-        self._add(here, [replace(self.base, off=(effect,)) for effect in effects])
-        if not self.quick:
-            fast = at_speed(self.scene, FAST_SPEED)
-            there = _Case(fast, own, planets, plain, cache(lambda: measure(fast, self.model, self.base).signals))
-            self._add(there, [replace(self.base, off=(effect,)) for effect in TURNING])
-        for count in () if self.quick else (n for n in PLANETS if n != planets):
+        self._add(here, [replace(self.base, slices=n) for n in SLICES if n != self.slices])
+        self._add(here, [replace(self.base, off=(effect,)) for effect in EFFECTS + TURNING])
+        fast = at_speed(self.scene, FAST_SPEED)
+        there = _Case(fast, own, planets, plain, cache(lambda: measure(fast, self.model, self.base).signals))
+        self._add(there, [replace(self.base, off=(effect,)) for effect in TURNING])
+        for count in (n for n in PLANETS if n != planets):
             self._add(self._against_full(cache(partial(self._with_planets, count)), count), [self.base])
-        return SetStudy(tuple(self.table.of(self.scene.name)), tuple(self.said))
+        return self.table.of(self.scene.name)
 
     def _model_of(self, spec: Stage, bodies: Sequence[Any]) -> StageModel:
         return models_for(self.scene, bodies, **{name: getattr(spec.written, name) for name in ("set", "carrier")})
@@ -209,7 +194,7 @@ class _SetStudy:
 
     def _against_full(self, model: Callable[[], StageModel], planets: int) -> _Case:
         """Points against level full at the finest step."""
-        h = self._fitting(4 * FINEST if self.quick else FINEST)
+        h = self._fitting(FINEST)
 
         def wanted() -> Signals:
             self.tell(0.0, "reference")
@@ -248,16 +233,15 @@ class _SetStudy:
 
     def _facts(self) -> dict[str, Any]:
         try:
-            found: dict[str, Any] = json.loads((self.out / "sets.json").read_text(encoding="utf-8"))
+            return dict(json.loads((HERE / "sets.json").read_text(encoding="utf-8")))
         except (OSError, ValueError):
             return {}
-        return found
 
     def _say(self, *texts: str) -> None:
         """Kept beside the table: a study that goes on says it again."""
         self.said = list(dict.fromkeys([*self.said, *texts]))
         facts = self._facts() | {self.scene.name: {"identity": self.identity, "said": self.said}}
-        write_text(self.out / "sets.json", json.dumps(facts, indent=1, sort_keys=True) + "\n")
+        write_text(HERE / "sets.json", json.dumps(facts, indent=1, sort_keys=True) + "\n")
 
 
 def _is_at(row: SetRow, case: _Case, point: Point) -> bool:
@@ -271,21 +255,18 @@ def _percent(e: Errors) -> str:
     return f"te {100 * e.te:.2g} %, mesh forces {100 * e.force:.2g} %, pins {100 * e.bearing:.2g} %"
 
 
-def main(given: Sequence[str] | None = None) -> None:
+def main(scenes: Sequence[str]) -> None:
     """Price lists of the scenes' sets, and their charts."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="+")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent)
-    parser.add_argument("--quick", action="store_true", help="few points on a short window")
-    chosen = parser.parse_args(given)
-    for spec in map(load_scene, chosen.scenes):
+    for spec in map(load_scene, scenes):
         bodies_for_motion(spec.stage.name)
         with progress_bar(spec.name) as progress:
-            found = set_study(spec, chosen.out, chosen.quick, progress)
-        print(tidy(found.rows), *(f"- {note}" for note in found.notes), sep="\n")
-        levels = ladder(found.rows, load_stage(spec.stage.name).written.set.planets)
-        write_chart(levels, spec.stage.slices, chosen.out / spec.name, f"{spec.name}: {spec.description}")
+            study = SetStudy(spec, progress)
+            rows = study.rows()
+        told(map(asdict, rows))
+        print(*(f"- {note}" for note in study.said), sep="\n")
+        title = f"{spec.name}: {spec.description}"
+        write_chart(ladder(rows, study.planets), spec.stage.slices, HERE / spec.name, title)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

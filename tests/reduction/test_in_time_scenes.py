@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evidence.energy.free import Rattle, free_pair, started
-from evidence.reduction.in_time import ring_scene, scenes
+from evidence.reduction.in_time import scenes
 from evidence.reduction.in_time.contact_points import Grid, contact_points
 from gearfmu.body import reduce_bodies
 from gearfmu.fem.coupling import rigid_modes
@@ -51,7 +51,7 @@ def placed(other: str) -> tuple[Any, Any]:
     centre = np.array([spec.set.center_distance, 0.0])
     planet = scenes.placed_gear(spec.planet, geometry.sun_mesh.gears[1], centre, 0.0, meshes.gear)
     if other == "ring":
-        return planet, ring_scene.placed_ring(spec, meshes)
+        return planet, scenes.placed_ring(spec, meshes)
     angle = 0.0 if spec.planet.teeth % 2 else np.pi / spec.sun.teeth
     return planet, scenes.placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), angle, meshes.gear)
 

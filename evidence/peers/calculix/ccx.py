@@ -8,10 +8,7 @@ import re
 import shutil
 import subprocess
 import time
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -19,15 +16,21 @@ FORCES = re.compile(r" forces \(fx,fy,fz\) for set (\S+) and time")
 PRESSURES = re.compile(r"pressure ratio \(smallest/largest pressure over all contact areas\) =\s*(\S+)")
 TENSION = 1e-3  # largest tensile contact pressure, parts of the largest pressure
 MOST_ITERATIONS = 40  # an increment; what converges took 7 to 26
-NUDGES = (1.0, 1.01, 0.99, 1.02, 0.98, 1.005, 0.995, 1.015, 0.985)  # of te, in turn, until no teeth stick
 END_OF_LOG = 1500  # characters shown of a failed run
-T = TypeVar("T")
+WORK = Path("out/calculix")
 
 
 def require_ccx() -> None:
     """SystemExit with the remedy where CalculiX is not installed."""
     if shutil.which("ccx") is None:
         raise SystemExit("needs CalculiX's solver ccx: apt-get install calculix-ccx")
+
+
+def deck_path(name: str) -> Path:
+    """Where the deck, log and results of a case lie, a folder below out/calculix."""
+    folder = WORK / name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / "deck.inp"
 
 
 def run(path: Path) -> float:
@@ -76,14 +79,6 @@ def reactions(path: Path) -> dict[str, dict[int, np.ndarray]]:
         elif len(fields := line.split()) == 4:
             current[int(fields[0])] = np.array([float(number) for number in fields[1:]])
     return sets
-
-
-def first_solved(attempt: Callable[[float], T]) -> T:
-    """What `attempt` returns for the first of NUDGES that ccx solves. RuntimeError of the last when it solves none."""
-    for nudge in NUDGES[:-1]:
-        with suppress(RuntimeError):
-            return attempt(nudge)
-    return attempt(NUDGES[-1])
 
 
 def digest(deck: Path) -> str:

@@ -1,25 +1,24 @@
 """Elastic frequencies of free bodies by CalculiX: our meshes, 20-node hexahedra (C3D20), all teeth or, where these are
 too many, one sector with CalculiX's own cyclic symmetry and every nodal diameter.
 
-    python -m evidence.peers.calculix.frequencies [CASE …] [--work DIR] [--out frequencies.csv] [--compare]
+    python -m evidence.peers.calculix.frequencies
 
-A case whose deck is that of the table is not run again unless it is named. `--compare` runs nothing of CalculiX: it
-prints ours, from one sector of the same mesh and its cyclic symmetry, and from the mesh that the stage file asks for.
-Needs CalculiX's ccx (Debian: calculix-ccx); seconds to some minutes a case.
+A case whose deck is that of the table is not run again. Ours, from one sector of the same mesh and its cyclic symmetry,
+are compared in tests/modes/test_calculix_frequencies.py. Needs CalculiX's ccx (Debian: calculix-ccx); seconds to some
+minutes a case.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evidence.peers.calculix.ccx import digest, require_ccx, run
+from evidence.peers.calculix.ccx import deck_path, digest, require_ccx, run
 from evidence.peers.calculix.deck import element_lines, node_lines
 from evidence.tables import read_rows, write_rows
 from gearfmu.body.sector import body_sector
@@ -31,7 +30,7 @@ from gearfmu.stagefile.stage import load_stage
 from gearfmu.stagefile.tables.bodies import Material
 
 COUNT, RIGID = 20, 6
-HERE = Path(__file__).parent
+TABLE = Path(__file__).with_suffix(".csv")
 
 
 @dataclass(frozen=True)
@@ -78,25 +77,12 @@ def ours(case: Case) -> np.ndarray:
     return np.concatenate([[mode.frequency] * len(mode.numbers) for mode in found.modes])[:COUNT]
 
 
-def compare(rows: list[dict[str, Any]]) -> None:
-    """Print our frequencies against those of the table."""
-    for name, case in CASES.items():
-        theirs = np.array([float(row["frequency_Hz"]) for row in rows if row["case"] == name])
-        if len(theirs):
-            same = np.abs(ours(case) / theirs - 1)
-            shipped = 100 * (ours(replace(case, scale=1.0)) / theirs - 1)
-            print(f"{name}: same mesh {same.max():.1e}, the file's mesh {shipped.min():+.3f} … {shipped.max():+.3f} %")
-
-
 def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
     """Free vibration of a body, whole or (`mesh.teeth` > 1) by one sector, in mm, N, tonnes and s."""
     lines = ["*NODE, NSET=ALL", *node_lines(mesh.nodes, digits=14)]
     lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY", *element_lines(mesh.elements + 1)]
-    lines += [
-        "*MATERIAL, NAME=STEEL",
-        "*ELASTIC",
-        f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}",
-    ]
+    elastic = f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"
+    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", elastic]
     lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
     symmetry, choice = _symmetry(mesh) if mesh.teeth > 1 else ([], [])
     lines += [*symmetry, "*STEP", "*FREQUENCY", f"{COUNT + RIGID}", *choice, "*END STEP"]
@@ -116,10 +102,8 @@ def _symmetry(sector: FeMesh) -> tuple[list[str], list[str]]:
 def frequencies(path: Path) -> np.ndarray:
     """Elastic frequencies (Hz) of a .dat file: the table of eigenvalues without the six rigid modes."""
     text = path.read_text(encoding="ascii")
-    rows = re.findall(
-        r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE
-    )
-    values = np.array([float(row[1]) for row in rows[: COUNT + RIGID]])
+    rows = re.findall(r"^\s+\d+\s+(\S+)(?:\s+\S+){3}\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE)
+    values = np.array([float(row) for row in rows[: COUNT + RIGID]])
     assert len(values) == COUNT + RIGID and np.all(np.abs(values[:RIGID]) < 1e-4 * values[RIGID])
     return np.sqrt(values[RIGID:]) / (2 * np.pi)
 
@@ -138,13 +122,11 @@ def sector_frequencies(path: Path, teeth: int) -> np.ndarray:
     return np.sqrt(np.sort(np.concatenate(found))[:COUNT]) / (2 * np.pi)
 
 
-def solved(case: Case, work: Path, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def solved(case: Case, known: list[dict[str, str]]) -> list[dict[str, Any]]:
     """The table's rows of a case, made by running it; `known` ones that come from the same deck stay."""
     material, sector = body_of(case)
     mesh = sector if case.by_sector else sector.full()
-    folder = work / f"frequencies_{case.name}"
-    folder.mkdir(parents=True, exist_ok=True)
-    deck = folder / "free.inp"
+    deck = deck_path(f"frequencies_{case.name}")
     write_deck(mesh, material, deck)
     made = digest(deck)
     if known and all(row["deck_sha256"] == made for row in known):
@@ -152,32 +134,19 @@ def solved(case: Case, work: Path, known: list[dict[str, Any]]) -> list[dict[str
     seconds = run(deck)
     result = deck.with_suffix(".dat")
     found = sector_frequencies(result, sector.teeth) if case.by_sector else frequencies(result)
-    size = {
-        "nodes": len(mesh.nodes),
-        "elements": len(mesh.elements),
-        "seconds": f"{seconds:.0f}",
-        "deck_sha256": made,
-    }
-    return [{"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size} for k, f in enumerate(found, start=1)]
+    size = {"nodes": len(mesh.nodes), "elements": len(mesh.elements)}
+    head, tail = {"case": case.name}, size | {"seconds": f"{seconds:.0f}", "deck_sha256": made}
+    return [head | {"mode": k, "frequency_Hz": f"{f:.4f}"} | tail for k, f in enumerate(found, start=1)]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
-    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
-    parser.add_argument("--out", type=Path, default=HERE / "frequencies.csv")
-    parser.add_argument("--compare", action="store_true")
-    chosen = parser.parse_args()
-    if unknown := [name for name in chosen.cases if name not in CASES]:
-        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
-    if chosen.compare:
-        return compare(read_rows(chosen.out))
     require_ccx()
-    for name in chosen.cases or CASES:
-        known = [row for row in read_rows(chosen.out) if row["case"] == name]
-        fresh = solved(CASES[name], chosen.work, [] if chosen.cases else known)
-        rows = [row for row in read_rows(chosen.out) if row["case"] != name] + fresh
-        write_rows(chosen.out, [row for case in CASES for row in rows if row["case"] == case])
+    table: dict[str, list[dict[str, Any]]] = {name: [] for name in CASES}
+    for row in read_rows(TABLE):
+        table[row["case"]].append(row)
+    for name, known in table.items():
+        table[name] = fresh = solved(CASES[name], known)
+        write_rows(TABLE, [row for rows in table.values() for row in rows])
         kept = " (of the same deck)" if fresh is known else ""
         print(f"{name}: {fresh[0]['nodes']} nodes, {fresh[0]['seconds']} s{kept}", file=sys.stderr, flush=True)
 

@@ -1,6 +1,6 @@
 """Helical gears against CalculiX: loaded transmission error, load over the width, one pair with a tilted axis.
 
-    python -m evidence.peers.calculix.helical [CASE …] [--work DIR] [--out helical.csv] [--compare]
+    python -m evidence.peers.calculix.helical [--compare]
 
 The pair is `helical_demo` with 12 mm of width, without modifications (overlap ratio 0.58), and the same teeth with a
 helix angle of 30° (0.85). CASES are helix angle, axes (`tilted`: the wheel's axis turned by 1 µm over 1 mm across the
@@ -9,13 +9,12 @@ layers across the width; fine zones follow the slanting lines of contact, and la
 have elements of 0.6 mm. Both codes have rigid bores that are held. The pinion is turned to where gearfmu expects the
 torque; from the torque that comes out te is moved to the one asked by gearfmu's tangent stiffness. Table: helical.csv
 beside this file, one row a solution with the load share of every layer in both codes. A row of the same mesh at nearly
-its torque is not solved again: its error is computed anew. The bodies are reduced into the work folder first (some
+its torque is not solved again: its error is computed anew. The bodies are reduced into out/calculix first (some
 minutes). `--compare` runs nothing. Needs CalculiX's ccx; four to nine minutes a solution.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from dataclasses import dataclass, replace
@@ -24,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from evidence.peers.calculix.ccx import digest, first_solved, require_ccx, run_deck
+from evidence.peers.calculix.ccx import WORK, deck_path, digest, require_ccx, run_deck
 from evidence.peers.calculix.deck import Placed, Problem, layer_forces, pinion_load, write_deck
 from evidence.peers.calculix.section import Fineness
 from evidence.peers.calculix.solid import twisted
@@ -54,6 +53,7 @@ MARGIN = 0.4e-3  # m beyond the ends of the path where tooth pairs are still in 
 PATCH = 1.5  # half length of the fine zones in Hertz half-widths
 MESH = MeshSpec(flank=14, thickness=4, root=5, rim=3, width=6)
 ROLLS, FUNCTIONS, MODES = 20, 6, 12
+NUDGES = (1.0, 1.01, 0.99, 1.02, 0.98, 1.005, 0.995, 1.015, 0.985)  # of te, in turn, until no teeth stick
 NEAR = 0.05  # parts of the torque asked, up to which a solution's torque is carried to it
 HERE = Path(__file__).parent
 WHOLE = (1,) * LAYERS
@@ -206,13 +206,11 @@ def problem_at(case: Case, te: float) -> Problem:
     return Problem((pinion, wheel), list(contacts))
 
 
-def row(case: Case, gears: list[Body], work: Path, known: dict[str, Any] | None) -> dict[str, Any]:
+def row(case: Case, gears: list[Body], known: dict[str, Any] | None) -> dict[str, Any]:
     """The table's row of a case, solved unless `known` is of the same mesh and near the torque; te is moved by up to
     2 % where ccx does not settle. RuntimeError when ccx gives up."""
     mine, r_b = ours(case, gears), stage(case.helix, case.axes).written.geometry.gears[0].r_b
-    folder = work / f"helical_{case.name}"
-    folder.mkdir(parents=True, exist_ok=True)
-    deck = folder / "load_0.inp"
+    deck = deck_path(f"helical_{case.name}")
     write_deck(problem_at(case, 0.0), deck)
     mesh = digest(deck)
     theirs = known if known and known["mesh_sha256"] == mesh and _near(known) else solution(case, mine.te, deck)
@@ -236,16 +234,19 @@ def _near(row: dict[str, Any]) -> bool:
 def solution(case: Case, te: float, deck: Path) -> dict[str, Any]:
     """What ccx says at te (m) or, where it does not settle, near it."""
 
-    def attempt(nudge: float) -> tuple[float, Problem, float]:
+    for nudge in NUDGES:
         problem = problem_at(case, nudge * te)
         write_deck(problem, deck)
-        return nudge * te, problem, run_deck(deck)
-
-    te, problem, seconds = first_solved(attempt)
+        try:
+            seconds = run_deck(deck)
+            break
+        except RuntimeError:
+            if nudge == NUDGES[-1]:
+                raise
     load, layers = pinion_load(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
     share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *case.divisions[:-1]))) / layers.sum()
     return {f"share_{k + 1}": f"{value:.5f}" for k, value in enumerate(share)} | {
-        "solved_te_um": f"{1e6 * te:.4f}",
+        "solved_te_um": f"{1e6 * nudge * te:.4f}",
         "solved_torque_Nm": f"{abs(load[5]):.3f}",
         "axial_N": f"{load[2]:.2f}",
         "pairs": len(problem.pairs),
@@ -284,27 +285,19 @@ def compare(rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
-    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="bodies, decks, logs and results")
-    parser.add_argument("--out", type=Path, default=HERE / "helical.csv")
-    parser.add_argument("--compare", action="store_true")
-    chosen = parser.parse_args()
-    if unknown := [name for name in chosen.cases if name not in CASES]:
-        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
-    rows, failed = {case_of(row).name: row for row in read_rows(chosen.out)}, []
-    if chosen.compare:
+    table = HERE / "helical.csv"
+    rows, failed = {case_of(row).name: row for row in read_rows(table)}, []
+    if sys.argv[1:] == ["--compare"]:
         return compare(list(rows.values()))
     require_ccx()
-    for name in chosen.cases or CASES:
-        case = CASES[name]
+    for name, case in CASES.items():
         try:
-            rows[name] = row(case, bodies(chosen.work, case.helix), chosen.work, rows.get(name))
+            rows[name] = row(case, bodies(WORK, case.helix), rows.get(name))
         except RuntimeError as failure:
             failed.append(f"{name}: {failure}")
             continue
         done = [name for name in CASES if name in rows]
-        write_rows(chosen.out, [rows[k] for k in sorted(done, key=lambda k: (CASES[k].torque, CASES[k].position))])
+        write_rows(table, [rows[k] for k in sorted(done, key=lambda k: (CASES[k].torque, CASES[k].position))])
         print(", ".join(f"{key} {value}" for key, value in rows[name].items()), file=sys.stderr, flush=True)
     if failed:
         raise SystemExit("\n".join(failed))

@@ -1,45 +1,46 @@
 """The paper's reductions in the time domain against the unreduced finite elements (its Figs. 3 and 4).
 
-    python -m evidence.reduction.in_time.compare [SCENE …] [--work DIR] [--chart]
+    python -m evidence.reduction.in_time.compare
 
 carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method and to several sizes.
 hammering      : carrier + planet + sun through their backlash, 0.5 ms; the carrier by each method, gears by eigenmodes.
-ring_hammering : planet and ring on its mounts through their backlash, 0.5 ms; the ring by each method (ring_scene.py).
+ring_hammering : planet and ring on its mounts through their backlash, 0.5 ms; the ring by each method.
 
 A line that reduces one kind of body has the others unreduced, or reduced so that a line of their own shows them to be
 without influence (planet: Rubin 60; carrier: Krylov 120).
 Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
 reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
 Writes errors.csv (rms of the difference, in the whole run and in its last fifth, over that of the reference) and
-curves_<scene>.csv beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in
-DIR and not made again. Ten minutes of one core, a third of it the modes of the gears.
+curves_<scene>.csv beside this file, and draws docs/pictures/in_time_<scene>.svg. Ten minutes of one core, a
+third of it the modes of the gears.
 """
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.ticker import FuncFormatter
 
-from evidence.reduction.in_time.channels import channels, errors
-from evidence.reduction.in_time.chart import RUNS, draw
-from evidence.reduction.in_time.ring_scene import ring_hammering
-from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering
-from evidence.reduction.in_time.transient import Assembly, Member, Scheme, integrate
-from evidence.tables import read_rows, told, write_columns, write_rows
+from evidence.reduction.in_time.scenes import Meshes, Scene, carrier_planet, hammering, ring_hammering
+from evidence.reduction.in_time.transient import Assembly, Member, Motion, Scheme, integrate
+from evidence.tables import read_columns, told, write_columns, write_rows
 from gearfmu.files import written_whole
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import Size
 from gearfmu.reduction.oscillators import oscillators
+from gearfmu.report.style import INK, panels, styled
 
 HERE = Path(__file__).parent
-TABLE = HERE / "errors.csv"
+PICTURES = HERE.parents[2] / "docs" / "pictures"
 FOUR = ("modal", "craig_bampton", "rubin", "krylov")
 EVERY = 2  # steps of a curve's points
+QUARTER = "tooth13"  # of 54
+LATE = 0.2  # the last part of a run whose error stands apart
 
 
 @dataclass(frozen=True)
@@ -111,49 +112,99 @@ STUDIES = {
 }
 
 
-@dataclass(frozen=True)
-class Line:
-    """A channel of a run. error, late: over the reference's rms, of the whole run and of its last fifth; seconds:
-    processor time of the integration."""
+# curves of the pictures
+RUNS = {
+    "carrier_planet": {
+        "modal 120 | rubin 60": "modal truncation",
+        "craig_bampton 120 | rubin 60": "Craig–Bampton",
+        "rubin 120 | rubin 60": "Rubin / MacNeal",
+        "krylov 120 | rubin 60": "block Krylov",
+    },
+    "hammering": {
+        "krylov 120 | modal 400": "reduced as in the paper",
+        "krylov 120 | modal 400 + residual": "with static residual",
+    },
+    "ring_hammering": {
+        "modal 400 | whole": "modal truncation",
+        "craig_bampton 400 | whole": "Craig–Bampton",
+        "rubin 400 | whole": "Rubin / MacNeal",
+        "modal 400 + residual | whole": "modes with static residual",
+    },
+}
+SHOWN = {
+    "carrier_planet": ("bolt deflection, µm", "bolt tilt, mrad", "pin elongation, µm"),
+    "hammering": ("mesh force, N", "planet speed, rad/s", "sun speed, rad/s"),
+    "ring_hammering": ("mesh force, N", "planet speed, rad/s", "tooth of the ring, µm"),
+}
+FLOOR = 1e-8  # of the differences shown
+DIFFERENCE = {
+    "carrier_planet": "bolt deflection, µm",
+    "hammering": "planet speed, rad/s",
+    "ring_hammering": "tooth of the ring, µm",
+}
 
-    scene: str
-    carrier: str
-    gears: str
-    half_step: bool
-    channel: str
-    error: float
-    late: float
-    seconds: float
 
-
-def measure(name: str, study: Study, work: Path) -> Iterator[Line]:
-    """All lines of a study; its curves are written when it ends."""
+def measure(name: str, study: Study) -> Iterator[dict[str, object]]:
+    """A line for every channel of every run of a study; its curves are written when it ends. error, late: over the
+    reference's rms, of the whole run and of its last fifth; seconds: processor time of the integration."""
     scene = study.make(study.meshes)
     made: dict[tuple[str, str], Member] = {}
     curves: dict[str, dict[str, np.ndarray]] = {}
     for run in study.runs:
-        kept = work / name / f"{run.name.replace(' ', '_').replace('|', '-')}.npz"
-        if not kept.exists():
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            with written_whole(kept) as temporary, temporary.open("wb") as file:
-                np.savez(file, **integrated(scene, study.scheme, run, made))
-        with np.load(kept) as file:
-            found = dict(file)
-        seconds = float(found.pop("seconds"))
-        curves[run.name] = {key: values[:: 2 if run.half_step else 1] for key, values in found.items()}
+        parts, assembly, started = 2 if run.half_step else 1, reduced(scene, run, made), time.process_time()
+        motion = integrate(assembly, replace(study.scheme, step=study.scheme.step / parts))
+        seconds = time.process_time() - started
+        curves[run.name] = {key: values[::parts] for key, values in channels(scene, motion).items()}
         reference = curves[study.runs[0].name]
         for channel, values in curves[run.name].items():
             error, late = errors(reference[channel], values)
-            yield Line(name, run.carrier, run.gears, run.half_step, channel, error, late, seconds)
+            head = {"scene": name, "carrier": run.carrier, "gears": run.gears, "half_step": run.half_step}
+            yield head | {"channel": channel, "error": error, "late": late, "seconds": seconds}
     write_curves(name, study.scheme, curves)
 
 
-def integrated(scene: Scene, scheme: Scheme, run: Run, made: dict[tuple[str, str], Member]) -> dict[str, np.ndarray]:
-    """Channels of a run, and its "seconds"."""
-    assembly = reduced(scene, run, made)
-    started = time.process_time()
-    motion = integrate(assembly, replace(scheme, step=scheme.step / (2 if run.half_step else 1)))
-    return channels(scene, motion) | {"seconds": np.array(time.process_time() - started)}
+def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
+    """Name with unit → (T,). Speeds are central differences of displacements."""
+
+    def read(name: str, interface: str, component: str) -> np.ndarray:
+        return motion.interfaces[name][:, scene.solids[name].index(interface, component)]
+
+    def speed(name: str, component: str) -> np.ndarray:
+        return np.gradient(read(name, "bore", component), motion.time)
+
+    force = -motion.tension[:, scene.assembly.joints.unilateral].sum(axis=1)
+    if "ring" in scene.solids:
+        return {
+            "mesh force, N": force,
+            "planet speed, rad/s": speed("planet", "rz"),
+            "pin deflection, µm": 1e6 * read("planet", "bore", "uy"),
+            "tooth of the ring, µm": 1e6 * read("ring", "tooth0", "uy"),
+            "ring a quarter away, µm": 1e6 * read("ring", QUARTER, "uy"),
+        }
+    bolt = read("carrier", "bolt0", "uy")
+    found = {
+        "bolt deflection, µm": 1e6 * (bolt - scene.radius * read("carrier", "bore", "rz")),
+        "bolt tilt, mrad": 1e3 * read("carrier", "bolt0", "rx"),
+        "pin elongation, µm": 1e6 * (read("planet", "bore", "uy") - bolt),
+    }
+    if "sun" not in scene.solids:
+        return found | {"planet speed, m/s": speed("planet", "uy"), "carrier speed, rad/s": speed("carrier", "rz")}
+    return {
+        "mesh force, N": force,
+        "planet speed, rad/s": speed("planet", "rz"),
+        "sun speed, rad/s": speed("sun", "rz"),
+        **found,
+    }
+
+
+def errors(reference: np.ndarray, other: np.ndarray) -> tuple[float, float]:
+    """rms of the difference, of the whole run and of its last part, over the rms of the whole reference."""
+    off, last = other - reference, slice(-round(LATE * len(reference)), None)
+    return _rms(off) / _rms(reference), _rms(off[last]) / _rms(reference)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Assembly:
@@ -181,23 +232,30 @@ def write_curves(name: str, scheme: Scheme, curves: dict[str, dict[str, np.ndarr
     write_columns(HERE / f"curves_{name}.csv", {key: values[::EVERY] for key, values in columns.items()})
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(STUDIES))
-    parser.add_argument("--work", type=Path, default=Path("out/in_time"), help="where runs are kept")
-    parser.add_argument("--chart", action="store_true", help="draw from the tables that are there")
-    chosen = parser.parse_args()
-    if unknown := [name for name in chosen.scenes if name not in STUDIES]:
-        parser.error(f"no scene {', '.join(unknown)}; there are {', '.join(STUDIES)}")
-    for name in chosen.scenes or STUDIES:
-        if not chosen.chart:
-            found = []
-            for line in measure(name, STUDIES[name], chosen.work):
-                found.append(asdict(line))
-                told(found[-1])
-            write_rows(TABLE, [*(row for row in read_rows(TABLE) if row["scene"] != name), *found])
-        draw(name)
+def draw(name: str) -> None:
+    """docs/pictures/in_time_<name>.svg: curves of the unreduced bodies and of the reduced ones, and the difference."""
+    columns = read_columns(HERE / f"curves_{name}.csv")
+    at = 1e3 * columns["time_s"]
+    with styled(), rc_context({"svg.hashsalt": name}):
+        figure, axes = panels((1.7,) * len(SHOWN[name]) + (2.0,))
+        for panel, channel in zip(axes, SHOWN[name], strict=False):
+            panel.plot(at, columns[f"{channel} | whole | whole"], color=INK, linewidth=2.4, label="finite elements")
+            for run, label in RUNS[name].items():
+                panel.plot(at, columns[f"{channel} | {run}"], linewidth=1.0, label=label)
+            panel.set_ylabel(channel)
+        channel = DIFFERENCE[name]
+        whole = columns[f"{channel} | whole | whole"]
+        for index, (run, label) in enumerate(RUNS[name].items()):
+            off = np.abs(columns[f"{channel} | {run}"] - whole) / np.sqrt(np.mean(whole**2))
+            axes[-1].semilogy(at[1:], np.maximum(off[1:], FLOOR), color=f"C{index}", label=label)
+        axes[-1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes[-1].set(xlabel="time, ms", ylabel=f"difference in {channel.split(',')[0]}\nover its rms")
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        with written_whole(PICTURES / f"in_time_{name}.svg") as temporary:
+            figure.savefig(temporary, format="svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":
-    main()
+    write_rows(HERE / "errors.csv", told(line for name, study in STUDIES.items() for line in measure(name, study)))
+    for name in STUDIES:
+        draw(name)

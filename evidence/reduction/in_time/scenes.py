@@ -1,9 +1,10 @@
-"""The two intermediate models of the paper as assemblies: carrier + one planet, and carrier + planet + sun.
+"""The intermediate models of the paper as assemblies: carrier + one planet, carrier + planet + sun, planet + ring.
 
 Bodies, pin, bearings and backlash are those of the shipped planetary54; the planet of bolt 0 alone is there. Nothing is
 damped. `carrier_planet`: a quarter of the paper's 600 N·m acts on the carrier's bore, growing within 0.1 ms.
 `hammering`: carrier and planet turn at 25 rad/s about the axis besides, the sun is at rest, and the teeth are in the
-middle of their backlash: they meet, let go and meet again.
+middle of their backlash: they meet, let go and meet again. `ring_hammering`: the same of a planet that turns on a pin
+that stands, and the ring.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from gearfmu.geometry.mesh import contact_modulus, half_width
 from gearfmu.reduction.carrier import carrier_elements, scaled_sector
 from gearfmu.reduction.couplings import Coupling, Elements, full_order
 from gearfmu.reduction.full_order import FullOrder, Interface
+from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import set_geometry
 from gearfmu.stagefile.stage import load_stage
@@ -50,14 +52,11 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """solids by name in the order of the assembly's members; kinds (j,) tells pin, bearings and contacts apart; radius
-    (m) on which the bolts stand."""
+    """solids by name in the order of the assembly's members; radius (m) on which the bolts stand."""
 
     solids: dict[str, Solid]
     assembly: Assembly
-    kinds: np.ndarray
     radius: float
-    points: Points | None = None
 
 
 @dataclass(frozen=True)
@@ -97,20 +96,36 @@ def hammering(meshes: Meshes) -> Scene:
     return scene(spec, solids, start, points, roll * (mesh.length - roll) / mesh.length)
 
 
+def ring_hammering(meshes: Meshes) -> Scene:
+    """The planet's teeth meet those of the elastic ring on its mounts. The ring is reduced from 54 input nodes, one a
+    tooth, as in the paper; contact points are read from its motion."""
+    stage = load_stage("planetary54")
+    spec = stage.written
+    mesh, planet, ring = set_geometry(spec).ring_mesh, placed_planet(spec, meshes), placed_ring(spec, meshes)
+    points = points_in_the_middle(planet, ring, mesh)
+    inputs = toothed_full_order(stage.by_file["ring"], stage.mounts, meshes.ring)
+    solids = {
+        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
+        "ring": Solid(with_flank(inputs, points.rows[1]), inputs),
+    }
+    roll, start = mesh.path["C"], (SPEED * np.eye(6)[5], np.zeros(0))
+    return scene(spec, solids, start, points, roll * (mesh.length + roll) / mesh.length)
+
+
 def scene(
     spec: Any, solids: dict[str, Solid], start: tuple[np.ndarray, ...], points: Points | None = None, curve: float = 0.0
 ) -> Scene:
     """All bodies unreduced on their supports, TORQUE on the bore of a carrier. curve: relative radius of curvature (m)
     of the teeth that touch at the points."""
-    joints, kinds = _supports(spec, solids)
+    joints = _supports(spec, solids)
     if points:
-        joints, kinds = touching(joints, kinds, solids, points, foundation(spec, curve))
+        joints = touching(joints, solids, points, foundation(spec, curve))
     patterns = {name: np.zeros(solid.full.rows().shape[0]) for name, solid in solids.items()}
     if "carrier" in solids:
         patterns["carrier"][solids["carrier"].index("bore", "rz")] = TORQUE
     members = tuple(Member.whole(solid.full) for solid in solids.values())
     assembly = Assembly(members, joints, tuple(patterns.values()), _ramp, start)
-    return Scene(solids, assembly, kinds, spec.set.center_distance, points)
+    return Scene(solids, assembly, spec.set.center_distance)
 
 
 def _ramp(time: float) -> float:
@@ -143,6 +158,11 @@ def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scal
     return Placed(sector, geometry, centre, angle)
 
 
+def placed_ring(spec: Any, meshes: Meshes) -> Placed:
+    """The ring of the set's file, space 0 on +x, where the planet of bolt 0 has its tooth 0."""
+    return placed_gear(spec.ring, set_geometry(spec).ring_mesh.ring, np.zeros(2), 0.0, meshes.ring)
+
+
 def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_array | None = None) -> Solid:
     """A gear with its bore as averaging node and, where it touches another, rows of its contact points."""
     mesh = placed.sector.full()
@@ -150,31 +170,33 @@ def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_arra
     elements = Elements(nodes, mesh.elements, *hex20.assemble(nodes, mesh.elements, material))
     bore = Coupling("bore", "averaging", mesh.sets["bore"], np.zeros(3))
     full = full_order(name, elements, [bore], ("bore",), placed.geometry.r)
-    if flank is not None:
-        labels = tuple(f"n{k}" for k in range(flank.shape[0]))
-        full = replace(full, interfaces=(*full.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
-    return Solid(full)
+    return Solid(full if flank is None else with_flank(full, flank))
 
 
-def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
+def with_flank(body: FullOrder, flank: sp.csr_array) -> FullOrder:
+    """The body with rows (c, 3N) of its contact points."""
+    labels = tuple(f"n{k}" for k in range(flank.shape[0]))
+    return replace(body, interfaces=(*body.interfaces, Interface("flank", flank, labels, np.zeros(3), "strip")))
+
+
+def _supports(spec: Any, solids: dict[str, Solid]) -> Joints:
     """Pin of the planet on bolt 0, which stands where there is no carrier, bearings of carrier and sun on the ground:
     stiffness as in the stage file."""
-    ends = {
-        "pin": (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
-        "carrier bearing": (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
-        "sun bearing": (spec.sun.bearing, (("sun", "bore", 1.0),)),
-    }
-    stiffness, kinds, entries = [], [], []
-    for kind, (bearing, sides) in ends.items():
+    ends = (
+        (spec.planet.bearing, (("planet", "bore", 1.0), ("carrier", "bolt0", -1.0))),
+        (spec.carrier.bearing, (("carrier", "bore", 1.0),)),
+        (spec.sun.bearing, (("sun", "bore", 1.0),)),
+    )
+    stiffness: list[float] = []
+    entries = []
+    for bearing, sides in ends:
         there = [side for side in sides if side[0] in solids]
         five = (bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt)
         for component, k in zip(FIVE, five if there else (), strict=bool(there)):
-            entries += [(len(kinds), name, solids[name].index(at, component), sign) for name, at, sign in there]
+            entries += [(len(stiffness), name, solids[name].index(at, component), sign) for name, at, sign in there]
             stiffness.append(k)
-            kinds.append(kind)
-    count = len(kinds)
-    joints = Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
-    return joints, np.array(kinds)
+    count = len(stiffness)
+    return Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
 
 
 def joint_rows(
@@ -189,9 +211,7 @@ def joint_rows(
     return tuple(result)
 
 
-def touching(
-    joints: Joints, kinds: np.ndarray, solids: dict[str, Solid], points: Points, penalty: float
-) -> tuple[Joints, np.ndarray]:
+def touching(joints: Joints, solids: dict[str, Solid], points: Points, penalty: float) -> Joints:
     """The joints and, after them, a contact at every point, penalty (N/m³) times its area stiff."""
     count = len(points.gap)
     touching_ones = [(name, solid) for name, solid in solids.items() if solid.full.interfaces[-1].name == "flank"]
@@ -199,14 +219,11 @@ def touching(
     entries = [(k, name, first + k, 1.0) for name, first in at.items() for k in range(count)]
     contacts = joint_rows(solids, entries, count)
     rows = tuple(sp.csr_array(sp.vstack(both)) for both in zip(joints.rows, contacts, strict=True))
-    return (
-        Joints(
-            rows,
-            np.concatenate([joints.stiffness, penalty * points.area]),
-            np.concatenate([joints.gap, points.gap]),
-            np.concatenate([joints.unilateral, np.ones(count, bool)]),
-        ),
-        np.concatenate([kinds, np.full(count, "contact")]),
+    return Joints(
+        rows,
+        np.concatenate([joints.stiffness, penalty * points.area]),
+        np.concatenate([joints.gap, points.gap]),
+        np.concatenate([joints.unilateral, np.ones(count, bool)]),
     )
 
 

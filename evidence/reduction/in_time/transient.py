@@ -65,7 +65,8 @@ class Member:
         squared = np.concatenate([np.zeros(rigid), model.omega**2])
         start = np.vstack([lower.T, np.zeros((model.size, rigid))])
         extra = model.residual() if residual else np.zeros_like(model.static)
-        return cls(model.name, _diagonal(np.ones_like(squared)), _diagonal(squared), rows, start, extra)
+        mass, stiffness = (sp.csr_array(sp.diags_array(values)) for values in (np.ones_like(squared), squared))
+        return cls(model.name, mass, stiffness, rows, start, extra)
 
     def solver(self, factor: float) -> Callable[[np.ndarray], np.ndarray]:
         """(M + factor K)⁻¹ of columns (N, k)."""
@@ -74,10 +75,6 @@ class Member:
             inverse = 1 / matrix.diagonal()
             return lambda loads: inverse[:, None] * loads
         return definite_factor(matrix, self.body.cells, self.body.node_of_dof).solve
-
-
-def _diagonal(values: np.ndarray) -> sp.csr_array:
-    return sp.csr_array(sp.diags_array(values))
 
 
 @dataclass(frozen=True)
@@ -123,13 +120,12 @@ class Assembly:
 @dataclass(frozen=True)
 class Motion:
     """time (T,) s; interfaces: name of member → (T, p) displacements of its rows; tension (T, j) N of the joints;
-    energy (T,) J: kinetic, elastic and that of the joints (without residuals). iterations: active sets of all steps."""
+    energy (T,) J: kinetic, elastic and that of the joints (without residuals)."""
 
     time: np.ndarray
     interfaces: dict[str, np.ndarray]
     tension: np.ndarray
     energy: np.ndarray
-    iterations: int
 
 
 @dataclass(frozen=True)
@@ -158,7 +154,6 @@ def integrate(assembly: Assembly, scheme: Scheme) -> Motion:
         {state.member.name: np.zeros((steps + 1, state.member.rows.shape[0])) for state in states},
         np.zeros((steps + 1, joints.count)),
         np.zeros(steps + 1),
-        0,
     )
     motion.energy[0] = sum(state.energy() for state in states)
     for n in range(1, steps + 1):
@@ -171,7 +166,7 @@ def integrate(assembly: Assembly, scheme: Scheme) -> Motion:
             motion.interfaces[state.member.name][n] = state.correct(rows.T @ tension)
         motion.tension[n] = tension
         motion.energy[n] = sum(state.energy() for state in states) + 0.5 * np.sum(tension**2 / joints.stiffness)
-    return replace(motion, iterations=solver.iterations)
+    return motion
 
 
 def _check(assembly: Assembly, scheme: Scheme) -> None:
@@ -234,12 +229,10 @@ class _JointSolver:
         self.matrix = 0.5 * (compliance + compliance.T) + np.diag(1 / joints.stiffness)
         self.unilateral = joints.unilateral
         self.active = ~joints.unilateral
-        self.iterations = 0
 
     def solve(self, free: np.ndarray) -> np.ndarray:
         """Tensions (j,) for the elongations `free` (j,) that the joints would have without."""
         for _ in range(_ROUNDS):
-            self.iterations += 1
             tension = self._with(self.active, free)
             left = free - self.matrix @ tension
             active = ~self.unilateral | np.where(self.active, tension < 0, left < 0)
