@@ -5,13 +5,16 @@
     python -m evidence.ledger make [--again] TARGET …  makes those; --again: current ones too, stored rows forgotten
     python -m evidence.ledger make --again --tier 1    makes all of a tier from nothing
     python -m evidence.ledger forget TARGET …          files made without a record are taken as they are, and are stale
+    python -m evidence.ledger carry TARGET --reason "…" [--made ROWS.csv] [--but COLUMN …]
+                                                       keeps a table whose inputs moved without moving it: names three
+                                                       rows, drawn by chance; with those rows made again, compares them
     python -m evidence.ledger pages                    writes date and commit of tables into the pages that show them
 
 ledger.json has one entry a target: `tier` (1: README and study, always current; 2: validation, made for a release);
 `command`; `alone`, where nothing else may run beside it (prices, own processes); `rows`, the target under whose key its
 rows are stored; `needs`, input → hash when the target was made, "" where unknown (sources.py says what an input is);
 `makes`, file → hash; `made` (date), `commit`, `minutes`, `ended` (last line that the command printed), `key` (of stored
-rows). A target is stale while its command runs, and when it fails.
+rows), `carried` (reason, date, rows made again). A target is stale while its command runs, and when it fails.
 """
 
 from __future__ import annotations
@@ -31,6 +34,7 @@ from pathlib import Path
 from typing import Any
 
 from evidence.pages_made import write_pages
+from evidence.rows_again import agree, drawn
 from evidence.sources import Sources, short
 from gearfmu.files import write_text
 from gearfmu.kernel.build import BEHAVIOUR, library_path
@@ -97,14 +101,14 @@ class Ledger:
         key = own if home == name else entries[home].get("key", own)
         self.record(name, {}, ended="exit: interrupted")
         code, last = run(entry["command"], self.root, os.environ | {BEHAVIOUR: key}, tell)
+        ended, minutes = f"exit {code}: {last}" if code else last, round((time.monotonic() - started) / 60, 1)
         facts = {
             "made": f"{datetime.date.today()}",
             "commit": commit(self.root, entries),
-            "minutes": round((time.monotonic() - started) / 60, 1),
-            "ended": f"exit {code}: {last}" if code else last,
-            "key": key,
+            "minutes": minutes,
+            "ended": ended,
         }
-        self.record(name, {} if code else needs, **facts)
+        self.record(name, {} if code else needs, **facts, key=key, carried=None)
         return not code
 
     def record(self, name: str, needs: Mapping[str, str], **more: Any) -> None:
@@ -112,9 +116,10 @@ class Ledger:
         with self.lock:
             entries = self.read()  # again: others may have recorded theirs
             known = {need: needs.get(need, "") for need in entries[name]["needs"]}
-            entry, sources = entries[name], self.sources()
-            makes = {file: sources.digest(file) for file in entry["makes"]}
-            entries[name] = entry | more | {"needs": known, "makes": makes}
+            entry = entries[name] | more | {"needs": known}
+            entries[name] = {key: value for key, value in entry.items() if value is not None or key == "minutes"}
+            sources = self.sources()
+            entries[name]["makes"] = {file: sources.digest(file) for file in entry["makes"]}
             write_pages(self.root, entries)
             write_text(self.file, json.dumps(entries, indent=1, ensure_ascii=False) + "\n")
 
@@ -129,6 +134,11 @@ def commit(root: Path, entries: Mapping[str, Entry]) -> str:
     )
     made = {file for entry in entries.values() for file in entry["makes"]} | {"evidence/ledger.json"}
     return number[0] + "+" * any(file not in made and not file.endswith(".md") for file in changed)
+
+
+def dated(root: Path, entries: Mapping[str, Entry]) -> dict[str, str]:
+    """Date and commit of what is made now."""
+    return {"made": f"{datetime.date.today()}", "commit": commit(root, entries)}
 
 
 def run(command: str, folder: Path, setting: Mapping[str, str], tell: Tell = print) -> tuple[int, str]:
@@ -239,16 +249,44 @@ class Crew:
                 self.changed.notify()
 
 
+def carry(ledger: Ledger, name: str, reason: str, made: Path | None, but: list[str], tell: Tell = print) -> int:
+    """Keep a table whose inputs moved: three rows, drawn by the hash of the inputs, made again in `made` and equal but
+    for the columns `but`. Without `made`: name the rows. 1 where a row differs or is not there."""
+    entry, needs = ledger.read()[name], ledger.inputs(name)
+    table = next((ledger.root / file for file in entry["makes"] if file.endswith(".csv")), None)
+    if table is None or ledger.touched(entry):
+        sys.exit(f"{name} has no table as recorded: make it")
+    rows = drawn(table, short(f"{needs}".encode()))
+    for row in rows:
+        tell(f"row: {row}")
+    if made is None:
+        return 0
+    wrong = agree(rows, made, but)
+    for text in wrong:
+        tell(text)
+    if not wrong:
+        facts = {"reason": reason, **dated(ledger.root, ledger.read()), "rows": rows}
+        ledger.record(name, needs, carried=facts)
+    return int(bool(wrong))
+
+
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("verb", choices=("check", "make", "forget", "pages"))
+    parser.add_argument("verb", choices=("check", "make", "forget", "carry", "pages"))
     parser.add_argument("targets", nargs="*", metavar="TARGET")
     parser.add_argument("--tier", type=int, choices=(1, 2), default=1)
     parser.add_argument("--again", action="store_true", help="current targets too")
+    parser.add_argument("--reason", help="why inputs moved without moving the table")
+    parser.add_argument("--made", type=Path, help="CSV with the drawn rows, made again")
+    parser.add_argument("--but", action="append", default=[], metavar="COLUMN", help="column of times")
     chosen, ledger = parser.parse_intermixed_args(), Ledger()
     if chosen.verb == "check":
         return check(ledger)
+    if chosen.verb == "carry":
+        if len(chosen.targets) != 1 or not chosen.reason:
+            parser.error("carry takes one target and --reason")
+        return carry(ledger, chosen.targets[0], chosen.reason, chosen.made, chosen.but)
     if chosen.verb == "forget":
         for name in chosen.targets:
             ledger.record(name, {})

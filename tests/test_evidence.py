@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from evidence import sources
-from evidence.ledger import Ledger, check, make
+from evidence.ledger import Ledger, carry, check, make
 from evidence.pages_made import filled, made
 from evidence.sources import Sources, c_code, python_code
 
@@ -204,6 +204,25 @@ def test_pages_say_when_their_tables_were_made(small: Ledger) -> None:
 def test_a_page_shows_ledger_and_tables_as_they_are(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert text == filled(text, Ledger().read(), ROOT / "evidence"), "python -m evidence.ledger pages"
+
+
+def test_carried_is_what_three_rows_made_again_show(small: Ledger, tmp_path: Path) -> None:
+    make(small, ["table"], tell=str)
+    (small.root / "gearfmu/kernel/src/gk_law.c").write_text("half = 1.0 / 2.0;")
+    said: list[str] = []
+    assert carry(small, "table", "rewritten", None, [], said.append) == 0 and len(said) == 3
+    assert small.stale()["table"] == ["kernel moved"]
+    names = [word for line in said for word in re.findall(r"a\d", line)]
+    again = tmp_path / "again.csv"
+    again.write_text("name,z,s\n" + "".join(f"{n},{n[1]}.5000000001,9\n" for n in names))
+    assert carry(small, "table", "rewritten", again, [], said.append) == 1
+    assert carry(small, "table", "rewritten", again, ["s"], said.append) == 0 and "table" not in small.stale()
+    entry = small.read()["table"]
+    assert entry["carried"]["reason"] == "rewritten" and len(entry["carried"]["rows"]) == 3
+    again.write_text("name,z,s\n" + "".join(f"{n},{n[1]}.51,9\n" for n in names))
+    assert carry(small, "table", "rewritten", again, ["s"], said.append) == 1
+    make(small, ["table"], again=True, tell=str)
+    assert "carried" not in small.read()["table"]
 
 
 def test_two_at_a_time_unless_alone_and_after_their_inputs(small: Ledger) -> None:
