@@ -11,7 +11,7 @@ import pytest
 from kinds import KINDS, Kind, bodies_of, drawn, listed
 from said import Said
 
-from gearfmu import report
+from gearfmu.report import html as report
 from gearfmu.stage.run.trace import Trace
 
 SLOW = [pytest.param(name, marks=pytest.mark.full) for name in ("helical", "train", "helical_set")]

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu import report
 from gearfmu.body import load_bodies
+from gearfmu.report import html as report
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.runup import Turning, resonances, run_up_of_meshes, run_up_of_set
