@@ -68,7 +68,7 @@ class ReferenceGear:
         return math.tan(self.beta) / self.r
 
     def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of a face width b (m)."""
+        """ε_β = b sin |β| / (π m_n) of a face width b (m), in a mesh of the common one."""
         return face_width * math.sin(abs(self.beta)) / (math.pi * self.m)
 
     @property

@@ -91,10 +91,6 @@ class GearMesh:
         path = self.path
         return (path["E"] - path["A"]) / self.base_pitch
 
-    def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
-        return self.gears[0].overlap_ratio(face_width)
-
     @property
     def normal_backlash(self) -> float:
         """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
@@ -114,11 +110,6 @@ class PairGeometry(GearMesh):
     def __post_init__(self) -> None:
         if not self.a > self.base:
             raise ValueError("the centre distance is smaller than the sum of the base radii")
-
-    @property
-    def tip_circle_contact_ratio(self) -> float:
-        """Transverse contact ratio of the tip circles, edge roundings left away (the number that catalogues state)."""
-        return (self.gears[0].s_a + self.gears[1].s_a - self.length) / self.base_pitch
 
     def outer_single_contact(self, gear: int) -> float:
         """Roll (m) on `gear` (0 or 1) of its outer point of single contact."""

@@ -24,6 +24,11 @@ WHEEL = gear(24, 0.1715, 118.36e-3, 40e-3)
 PAIR = PairGeometry((PINION, WHEEL), 91.5e-3, 1e-4)
 
 
+def tip_circle_contact_ratio(pair: PairGeometry) -> float:
+    """Transverse contact ratio of the tip circles, edge roundings left away (the number that catalogues state)."""
+    return (pair.gears[0].s_a + pair.gears[1].s_a - pair.length) / pair.base_pitch
+
+
 def without_backlash(pair: PairGeometry) -> float:
     """Centre distance (m) at which the nominal teeth would have no backlash."""
     a, b = pair.gears
