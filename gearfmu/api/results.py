@@ -20,7 +20,7 @@ from gearfmu.body import Body, load_bodies
 from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.fmu.package import Extras
-from gearfmu.report import write
+from gearfmu.report.html import write
 from gearfmu.report.run import Run
 from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.run.deformation import Deformation

@@ -134,13 +134,13 @@ def _type_definitions(variables: Sequence[Variable]) -> list[ET.Element]:
 
 
 def _variable(variable: Variable, nominals: Mapping[str, float]) -> ET.Element:
-    output = variable.causality == "output"
+    output, changes = variable.causality == "output", "continuous" if variable.type == "Real" else "discrete"
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.description,
         "causality": variable.causality,
-        "variability": _variability(variable),
+        "variability": "fixed" if variable.causality == "parameter" else changes,
     }
     if variable.causality != "input":
         attributes["initial"] = "calculated" if output else "exact"
@@ -156,12 +156,6 @@ def _variable(variable: Variable, nominals: Mapping[str, float]) -> ET.Element:
     if not output:
         detail["start"] = value_text(variable, variable.start)
     return element("ScalarVariable", element(variable.type, **detail), **attributes)
-
-
-def _variability(variable: Variable) -> str:
-    if variable.causality == "parameter":
-        return "fixed"
-    return "continuous" if variable.type == "Real" else "discrete"
 
 
 def value_text(variable: Variable, value: float) -> str:

@@ -137,8 +137,12 @@ def _native_files(model: StageModel, libraries: Mapping[str, Path], extras: Extr
 
 def _python_files(model: StageModel, libraries: Mapping[str, Path], extras: Extras) -> dict[str, bytes]:
     """pythonfmu's binary loads resources/<slavemodule>.py; the module's name carries the content hash, else two FMUs in
-    one process would share the first one's module."""
-    frame = _pythonfmu_folder()
+    one process would share the first one's module. pythonfmu is found by its metadata: where an FMU of it has run, the
+    import system knows only the copy inside that FMU."""
+    try:
+        frame = Path(str(metadata.distribution("pythonfmu").locate_file("pythonfmu")))
+    except metadata.PackageNotFoundError:
+        raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu") from None
     slave = Path(__file__).with_name("slave.py").read_text(encoding="utf-8")
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
     identifier = content_identifier(model.name, [model.blob, slave.encode(), *binaries.values()])
@@ -192,15 +196,6 @@ def nominals(stage: Stage) -> dict[str, float]:
     radius = 0.5 * gear.teeth * gear.normal_module / math.cos(gear.helix_angle) * math.cos(gear.pressure_angle)
     sizes = {"N.m": mesh.torque_max, "N": mesh.torque_max / radius, "rad/s": mesh.speed_max}
     return {unit: float(f"{size:.0e}") for unit, size in sizes.items()} | {"m": 1e-5}
-
-
-def _pythonfmu_folder() -> Path:
-    """The installed package, found by its metadata: in a process that has run a pythonfmu FMU, the import system knows
-    only the copy inside that FMU."""
-    try:
-        return Path(str(metadata.distribution("pythonfmu").locate_file("pythonfmu")))
-    except metadata.PackageNotFoundError:
-        raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu") from None
 
 
 def source_files() -> dict[str, bytes]:

@@ -90,7 +90,6 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
 
 def _stage(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
     """An FMU of ours says which stage it is, and means the model beside it."""
-
     if not (folder / MODEL_FILE).is_file():
         return
     if not (folder / STAGE_FILE).is_file():

@@ -34,13 +34,16 @@ from gearfmu.geometry import involute
 
 @dataclass(frozen=True)
 class ReferenceGear:
-    """Teeth z, normal module m (m), normal pressure angle alpha (rad), profile-shift coefficient x, helix angle beta
-    (rad, at the reference circle, positive for a right-handed gear), and what follows from them."""
+    """Teeth z, normal module m (m), normal pressure angle alpha (rad), profile-shift coefficient x, tip radius r_a (m),
+    radius tip_edge (m) of the tip edge rounding in the transverse section, helix angle beta (rad, at the reference
+    circle, positive for a right-handed gear), and what follows from them."""
 
     z: int
     m: float
     alpha: float
     x: float
+    r_a: float
+    tip_edge: float
     beta: float = field(default=0.0, kw_only=True)
     solid: ClassVar[int] = 1  # -1 of a ring, whose flanks bound a space
 
@@ -65,7 +68,7 @@ class ReferenceGear:
         return math.tan(self.beta) / self.r
 
     def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of a face width b (m)."""
+        """ε_β = b sin |β| / (π m_n) of a face width b (m), in a mesh of the common one."""
         return face_width * math.sin(abs(self.beta)) / (math.pi * self.m)
 
     @property
@@ -105,6 +108,38 @@ class ReferenceGear:
     def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
         """Half angle (rad) of the tooth, of a ring's space, on a circle of `radius` (m) between form and tip circle."""
         return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
+
+    @property
+    def s_a(self) -> float:
+        """Roll of the involute's intersection with the tip circle; negative where that lies inside the base circle."""
+        return _signed_root(self.r_a, self.r_b)
+
+    @property
+    def s_tip(self) -> float:
+        """Roll of the tip form point, where the tip edge rounding (tangent to flank and tip circle) begins."""
+        edge = self.solid * self.tip_edge
+        return _signed_root(self.r_a - edge, self.r_b) + edge
+
+    @property
+    def tip_half_angle(self) -> float:
+        """Half tooth-thickness angle at the tip circle, edge rounding left away; negative for a pointed tooth."""
+        return self._of_tooth(float(involute.flank_angle(self.s_a, self.r_b, self.psi_b)))
+
+    @property
+    def tip_land_half_angle(self) -> float:
+        """Half angle of the tip land between the two edge roundings; negative when they do not fit."""
+        roll = self.s_tip - self.solid * self.tip_edge
+        return self._of_tooth(self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
+
+    def _of_tooth(self, half_angle: float) -> float:
+        """Half angle of the tooth, from that of the tooth of an external gear or of the space of a ring."""
+        return half_angle if self.solid > 0 else self.half_pitch - half_angle
+
+
+def _signed_root(radius: float, r_b: float) -> float:
+    """√(r² − r_b²), negative √(r_b² − r²) inside the base circle, so that checks can go on."""
+    square = (radius - r_b) * (radius + r_b)
+    return math.copysign(math.sqrt(abs(square)), square)
 
 
 @dataclass(frozen=True)
@@ -165,14 +200,11 @@ _CLOSE = 3e-4  # of the base radius
 class GearGeometry(ReferenceGear):
     """An external gear in its body frame: tooth 0 centred on +x at z = 0 (ISO 21771 symbols; lengths m, angles rad).
 
-    r_a: tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the transverse section. h_fp,
-    rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those of the transverse section
-    at mid-width.
+    r_bore: bore radius. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those
+    of the transverse section at mid-width.
     """
 
-    r_a: float
     r_bore: float
-    tip_edge: float
     h_fp: float
     rho_fp: float
 
@@ -220,27 +252,6 @@ class GearGeometry(ReferenceGear):
         """Decrease of the least profile shift per tooth, sin² α_t/(2 cos β)."""
         return math.sin(self.alpha_t) ** 2 / (2 * math.cos(self.beta))
 
-    @property
-    def s_a(self) -> float:
-        """Roll of the involute's intersection with the tip circle."""
-        return float(involute.roll_at_radius(self.r_a, self.r_b))
-
-    @property
-    def s_tip(self) -> float:
-        """Roll of the tip form point, where the tip edge rounding (tangent to flank and tip circle) begins."""
-        return self.tip_edge + float(involute.roll_at_radius(self.r_a - self.tip_edge, self.r_b))
-
-    @property
-    def tip_half_angle(self) -> float:
-        """Half tooth-thickness angle at the tip circle, edge rounding left away; negative for a pointed tooth."""
-        return float(involute.flank_angle(self.s_a, self.r_b, self.psi_b))
-
-    @property
-    def tip_land_half_angle(self) -> float:
-        """Half angle of the tip land between the two edge roundings; negative when they do not fit."""
-        roll = self.s_tip - self.tip_edge
-        return self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b)
-
 
 @lru_cache(maxsize=64)
 def _crossing(gear: GearGeometry) -> float:
@@ -270,28 +281,15 @@ def _crossing(gear: GearGeometry) -> float:
 class InternalGearGeometry(ReferenceGear):
     """An internal gear in its body frame: tooth space 0 centred on +x at z = 0 (lengths m, angles rad).
 
-    x is positive outwards. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of
-    the tip edge rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping
-    cutter with that tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the
-    transverse section.
+    x is positive outwards. r_a, the tip radius, is the smallest; r_f: root radius; r_rim: outer radius. fillet: radius
+    of the root fillet in the transverse section, an arc tangent to flank and root circle (as a shaping cutter with that
+    tip rounding leaves it, up to its motion along the trochoid).
     """
 
-    r_a: float
     r_f: float
     r_rim: float
-    tip_edge: float
     fillet: float
     solid = -1
-
-    @property
-    def s_a(self) -> float:
-        """Roll of the involute's intersection with the tip circle; negative where that lies inside the base circle."""
-        return _signed_root(self.r_a, self.r_b)
-
-    @property
-    def s_tip(self) -> float:
-        """Roll of the tip form point, where the tip edge rounding (tangent to flank and tip circle) begins."""
-        return _signed_root(self.r_a + self.tip_edge, self.r_b) - self.tip_edge
 
     @property
     def s_form(self) -> float:
@@ -304,17 +302,6 @@ class InternalGearGeometry(ReferenceGear):
         space overlap."""
         roll = self.s_form - self.fillet
         return self.r_f - self.fillet, self.psi_b - self.s_form / self.r_b + math.atan2(roll, self.r_b)
-
-    @property
-    def tip_half_angle(self) -> float:
-        """Half tooth-thickness angle at the tip circle, edge rounding left away; negative for a pointed tooth."""
-        return self.half_pitch - float(involute.flank_angle(self.s_a, self.r_b, self.psi_b))
-
-    @property
-    def tip_land_half_angle(self) -> float:
-        """Half angle of the tip land between the two edge roundings; negative when they do not fit."""
-        roll = self.s_tip + self.tip_edge
-        return self.half_pitch - (self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
 
     def fillet_point(self, share: ArrayLike) -> np.ndarray:
         """Points (..., 2) in m of the fillet of flank sg = +1 at shares 0 (form point) … 1 (root circle) of its arc."""
@@ -334,9 +321,3 @@ class InternalGearGeometry(ReferenceGear):
     def fillet_length(self) -> float:
         """Length of one fillet, m."""
         return abs(self.fillet_centre[1] - self._fillet_begin) * self.fillet
-
-
-def _signed_root(radius: float, r_b: float) -> float:
-    """√(r² − r_b²), negative √(r_b² − r²) inside the base circle, so that checks can go on."""
-    square = (radius - r_b) * (radius + r_b)
-    return math.copysign(math.sqrt(abs(square)), square)

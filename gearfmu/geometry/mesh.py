@@ -91,10 +91,6 @@ class GearMesh:
         path = self.path
         return (path["E"] - path["A"]) / self.base_pitch
 
-    def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
-        return self.gears[0].overlap_ratio(face_width)
-
     @property
     def normal_backlash(self) -> float:
         """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""

@@ -136,6 +136,7 @@ class OpenPair:
 
 
 def _steps(low: float, high: float, step: float) -> list[float]:
+    """From `low` to `high`; none where `low` is larger or `high` is nan."""
     count = max(math.floor((high - low) / step + 1e-9), 0) if high >= low else -1
     return [low + k * step for k in range(count + 1)]
 
@@ -172,15 +173,10 @@ def reach(rack: Rack, teeth: tuple[int, int]) -> tuple[float, float] | None:
     found = []
     for step in range(-40, 61):
         distance = distance_of_shifts(rack.m, rack.alpha, rack.beta, sum(teeth), 0.1 * step)
-        if distance > 0 and _can_be_made(OpenPair(rack, teeth, distance)):
+        pair = OpenPair(rack, teeth, distance)
+        if distance > 0 and any(not list(shortcomings(pair.at(x))) for x in _steps(*pair.range_of_shifts(), 0.1)):
             found.append(distance)
     return (min(found), max(found)) if found else None
-
-
-def _can_be_made(pair: OpenPair) -> bool:
-    if math.isnan(pair.total):
-        return False
-    return any(not list(shortcomings(pair.at(x))) for x in _steps(*pair.range_of_shifts(), 0.1))
 
 
 def flank_length(gear: GearGeometry | InternalGearGeometry) -> float:

@@ -27,7 +27,6 @@ OUTCOMES = (
     "penetration",
     "energy",
 )
-REFUSALS = tuple(map(OUTCOMES.index, ("bad_variable", "bad_value", "bad_call")))
 TYPES = ("Real", "Integer", "Boolean", "Enumeration")
 CAUSALITIES = ("input", "output", "parameter")
 

@@ -11,21 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from gearfmu.errors import ModelError, SimulationError
-from gearfmu.kernel.binding import (
-    CAUSALITIES,
-    MESSAGE,
-    OUTCOMES,
-    REFUSALS,
-    TYPES,
-    RecordingInfo,
-    VariableInfo,
-    aligned,
-    load,
-)
+from gearfmu.kernel.binding import CAUSALITIES, MESSAGE, OUTCOMES, TYPES, RecordingInfo, VariableInfo, aligned, load
 from gearfmu.kernel.linear import LinearInfo, LinearModel, linear_model, room_for
 
 PLACES = 8
 SLICES = 20
+REFUSALS = ("bad_variable", "bad_value", "bad_call")
 INSTANCES = 256  # value references: 256 × number of the variable + number of its instance
 
 
@@ -301,7 +292,7 @@ class Recording:
         info.input, info.output = inputs.ctypes.data, address
         outcome = self.kernel.record(info)
         self.done += info.done
-        if outcome in REFUSALS:  # one by one, which raises with the reason
+        if OUTCOMES[outcome] in REFUSALS:  # one by one, which raises with the reason
             for name, value in zip(given, inputs[info.done].tolist(), strict=True):
                 self.kernel.set(name, value)
         self.kernel.check(outcome)

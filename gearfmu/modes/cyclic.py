@@ -11,6 +11,7 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.mesh import FeMesh
+from gearfmu.geometry.plane import about_z
 from gearfmu.modes.shapes import BodyModes, Mode, cylindrical, energy_shares, main_harmonic
 
 Progress = Callable[[str, float], None]
@@ -20,7 +21,7 @@ Progress = Callable[[str, float], None]
 class _Family:
     """Lowest modes of one parity and cyclic index: ω² (k,), shapes (size, k), and whether there are no more."""
 
-    parity: int
+    space: SectorSpace
     index: int
     pair: bool
     squared: np.ndarray
@@ -57,9 +58,8 @@ def cyclic_modes(
     nodes, scalar_mass = mesh.full().nodes, mass[::3, ::3]
     modes, number = [], 1
     for family, k in _lowest(_families(spaces, mesh.teeth, count, progress), count):
-        space = next(space for space in spaces if space.parity == family.parity)
-        harmonic = space.harmonic(family.index)
-        shape = space.to_nodes @ harmonic.expand(family.shapes[:, [k]])[:, 0] / np.sqrt(mesh.teeth)
+        harmonic = family.space.harmonic(family.index)
+        shape = family.space.to_nodes @ harmonic.expand(family.shapes[:, [k]])[:, 0] / np.sqrt(mesh.teeth)
         energy = energy_shares(mesh.nodes, scalar_mass, shape.reshape(-1, 3))
         shape = _turned(mesh.nodes, shape, int(np.argmax(energy)))
         whole = unfolded(shape * np.sqrt(2.0 if family.pair else 1.0), family.index, index)[:, used]
@@ -71,7 +71,7 @@ def cyclic_modes(
                 numbers=numbers,
                 frequency=float(np.sqrt(family.squared[k]) / (2 * np.pi)),
                 damping_ratio=float("nan"),
-                parity=family.parity,
+                parity=family.space.parity,
                 nodal_diameter=diameter,
                 harmonic_share=share,
                 energy=energy,
@@ -95,9 +95,8 @@ def unfolded(shape: np.ndarray, cyclic_index: int, index: list[np.ndarray]) -> n
     total = np.empty((parts, max(numbers.max() for numbers in index) + 1, 3))
     for sector, numbers in enumerate(index):
         angle = 2 * np.pi * sector / sectors
-        c, s = np.cos(angle), np.sin(angle)
         here = shape.reshape(-1, 3) * np.exp(1j * cyclic_index * angle)
-        here = here @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        here = here @ about_z(-angle)
         total[:, numbers] = np.stack([here.real, here.imag][:parts])
     return total
 
@@ -112,19 +111,17 @@ def _families(spaces: list[SectorSpace], sectors: int, count: int, progress: Pro
         for done, key in enumerate(todo):
             if progress:
                 progress(f"nodal diameter {key[1]}", done / len(todo))
-            found[key] = _solve(spaces[key[0]], key[1], wanted[key])
+            space, index = spaces[key[0]], key[1]
+            harmonic = space.harmonic(index)
+            squared, shapes = lowest_modes(harmonic, wanted[key])
+            complete = len(squared) >= harmonic.elastic
+            found[key] = _Family(space, index, not harmonic.is_real, squared, shapes, complete)
         squared = np.sort(np.concatenate([np.repeat(f.squared, 2 if f.pair else 1) for f in found.values()]))
         limit = squared[min(count, len(squared)) - 1]
         todo = [key for key in keys if found[key].squared[-1] < limit and not found[key].complete]
         for key in todo:
             wanted[key] = 2 * wanted[key]
     return list(found.values())
-
-
-def _solve(space: SectorSpace, index: int, count: int) -> _Family:
-    harmonic = space.harmonic(index)
-    squared, shapes = lowest_modes(harmonic, count)
-    return _Family(space.parity, index, not harmonic.is_real, squared, shapes, len(squared) >= harmonic.elastic)
 
 
 def _lowest(families: list[_Family], count: int) -> list[tuple[_Family, int]]:

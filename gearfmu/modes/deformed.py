@@ -10,6 +10,7 @@ import numpy as np
 
 from gearfmu.body import Body
 from gearfmu.body.body import Shapes, turn_sectors, whole_surface
+from gearfmu.geometry.plane import about_z
 from gearfmu.stage.run.deformation import DeformationError, GearMotion
 
 
@@ -23,11 +24,6 @@ class DeformedGear:
     body: Body
     motion: GearMotion
     angle: float = 0.0
-
-    @property
-    def frames(self) -> int:
-        """Number F of frames."""
-        return len(self.motion.amplitude)
 
     @cached_property
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
@@ -47,8 +43,7 @@ class DeformedGear:
         return shift + np.cross(tilt, self.surface[0])
 
     def _turned(self, vectors: np.ndarray) -> np.ndarray:
-        c, s = math.cos(self.angle), math.sin(self.angle)
-        return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        return vectors @ about_z(-self.angle)
 
     @property
     def _shapes(self) -> Shapes:

@@ -63,23 +63,17 @@ def stage_modes(
     SimulationError(no_equilibrium) where the stage finds none.
     """
     position, kernel, shafts = np.arange(positions) / positions, full_kernel(model), shaft_rows(model, bodies)
-    shapes, values, turning = [], [], []
-    for part in position:
-        system = linearised(model, torque, part, kernel, shafts)
-        squared, of_modes, rigid = system.shapes(count + SPARE)
-        shapes.append(of_modes)
-        values.append(system.values(squared, of_modes))
-        turning.append(np.sqrt(np.maximum(rigid, 0.0)) / (2 * np.pi))
-    orders = followed(system.linear.mass, shapes)
-    frequency = np.stack([own[0][order] for own, order in zip(values, orders, strict=True)])
-    lowest = np.argsort(frequency.mean(axis=0), kind="stable")[:count]
-    frequency, damping_ratio, shares, mesh_force = (
-        np.stack([own[k][order[lowest]] for own, order in zip(values, orders, strict=True)]) for k in range(4)
-    )
+    systems = [linearised(model, torque, part, kernel, shafts) for part in position]
+    squared, shapes, rigid = zip(*(system.shapes(count + SPARE) for system in systems), strict=True)
+    values = [system.values(*own) for system, *own in zip(systems, squared, shapes, strict=True)]
+    orders = followed(systems[0].linear.mass, shapes)
+    of_modes = [np.stack([own[k][order] for own, order in zip(values, orders, strict=True)]) for k in range(4)]
+    lowest = np.argsort(of_modes[0].mean(axis=0), kind="stable")[:count]
+    frequency, damping_ratio, shares, mesh_force = (np.take(own, lowest, axis=1) for own in of_modes)
     meshes = tuple(mesh.name for mesh in model.stage.engagements)
-    most = max(own.size for own in turning)
-    free = np.stack([np.pad(own, (most - own.size, 0)) for own in turning])
-    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, free)
+    most = max(own.size for own in rigid)
+    turning = np.stack([np.pad(np.sqrt(np.maximum(own, 0.0)), (most - own.size, 0)) for own in rigid]) / (2 * np.pi)
+    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes, turning)
 
 
 def linearised(

@@ -61,7 +61,7 @@ def stage_rings(model: StageModel, torque: float, speeds: Mapping[str, float] = 
     linear, sections = found.linear, read_blob(model.blob)
     names = str(sections["support_names"]).split("|")
     on_ground = np.array([name.startswith("bearing.") for name in names])
-    kappa = _square(sections["kappa0"])
+    kappa = np.asarray(sections["kappa0"], dtype=float).reshape(len(names), -1)
     springs = np.diag(linear.support_compliance)
     springs = springs if found.coupling is None else springs + found.coupling
     coupling = np.linalg.inv(found.compliance)
@@ -115,11 +115,6 @@ def rings_of(names: Sequence[str], stiffness: np.ndarray, loss: np.ndarray, mass
         stiffness=_even(stiffness[n:, n:]) - static,
         loss=_even(loss[n:, n:]),
     )
-
-
-def _square(values: object) -> np.ndarray:
-    array = np.asarray(values, dtype=float).ravel()
-    return array.reshape(-1, math.isqrt(array.size))
 
 
 def _even(matrix: np.ndarray) -> np.ndarray:

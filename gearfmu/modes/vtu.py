@@ -36,7 +36,7 @@ def write_series(gear: DeformedGear, time: Sequence[float] | np.ndarray, folder:
     Point data, float32, m, in axes fixed to the gear: `displacement`, and `elastic`, the same without rigid motion.
     """
     home, (points, quads) = Path(folder), gear.surface
-    names = [f"{gear.name}_{frame:04d}.vtu" for frame in range(gear.frames)]
+    names = [f"{gear.name}_{frame:04d}.vtu" for frame in range(len(gear.motion.amplitude))]
     for frame, name in enumerate(names):
         elastic = gear.elastic(frame)
         fields = {"displacement": elastic + gear.rigid(frame), "elastic": elastic}

@@ -38,7 +38,11 @@ def write_comparison(runs: Runs, path: Path) -> Path:
     plots = _plots(runs)
     for plot in plots:
         size = max(len(values) for values in plot.columns.values())
-        write_columns(folder / f"{plot.name}.csv", {key: _padded(own, size) for key, own in plot.columns.items()})
+        columns = {
+            key: np.pad(own.astype(float), (0, size - len(own)), constant_values=np.nan)  # as long as the longest
+            for key, own in plot.columns.items()
+        }
+        write_columns(folder / f"{plot.name}.csv", columns)
     described = " · ".join(
         f"{name}: {run.title}, {run.stage_name}, {run.summary.get('outcome', 'outcome not given')}"
         for name, run in runs.items()
@@ -54,11 +58,6 @@ def write_comparison(runs: Runs, path: Path) -> Path:
     ]
     write_text(path, page.page(f"Comparison: {', '.join(names)}", body, plots))
     return path
-
-
-def _padded(values: np.ndarray, size: int) -> np.ndarray:
-    """(size,): NaN behind the end."""
-    return np.concatenate([np.asarray(values, dtype=float), np.full(size - len(values), np.nan)])
 
 
 def _first(runs: Runs) -> tuple[str, Run]:

@@ -178,18 +178,13 @@ def _columns(deformation: Deformation, gear: DeformedGear, frames: Sequence[int]
     return table | {f"rigid_{name}": own.motion[chosen, k] for k, name in enumerate(names)}
 
 
-def _palette() -> Image.Image:
-    """The colours of the scale, and greys of lines and text."""
+def _animated(images: Sequence[Image.Image]) -> str:
+    """An <img> element that holds an animated PNG of one palette, the colours of the scale and greys of lines and text;
+    it needs no script."""
     scale = STEEL(np.linspace(0, 1, FILM_COLOURS))[:, :3]
     greys = np.linspace(0.13, 1, 16)[:, None] * np.ones(3)
-    image = Image.new("P", (1, 1))
-    image.putpalette((255 * np.concatenate([scale, greys])).round().astype(int).ravel().tolist())
-    return image
-
-
-def _animated(images: Sequence[Image.Image]) -> str:
-    """An <img> element that holds an animated PNG of one palette; it needs no script."""
-    palette = _palette()
+    palette = Image.new("P", (1, 1))
+    palette.putpalette((255 * np.concatenate([scale, greys])).round().astype(int).ravel().tolist())
     packed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     buffer = io.BytesIO()
     packed[0].save(buffer, "PNG", save_all=True, append_images=packed[1:], duration=FRAME_MS, loop=0, optimize=True)

@@ -35,7 +35,7 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
             axes[-1].loglog(frequency, np.maximum(error, 1e-16), color=colour, label=label)
         for panel in axes:
             plain_ticks(panel)
-            panel.yaxis.set_major_formatter(_power)
+            panel.yaxis.set_major_formatter(lambda value, _: f"1e{round(np.log10(value))}")
         axes[0].set_title(title, loc="left")
         axes[-1].set_ylabel("relative error (Frobenius)")
         axes[-1].set_xlabel("frequency, Hz")
@@ -60,7 +60,3 @@ def label_of(method: str) -> str:
     """A method's name for a legend; text behind a blank in `method` stays as it is."""
     name, _, rest = method.partition(" ")
     return f"{LABELS.get(name, name)} {rest}".strip()
-
-
-def _power(value: float, _: float) -> str:
-    return f"1e{round(np.log10(value))}"

@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from gearfmu.body import Body
 from gearfmu.body.body import Picture
 from gearfmu.geometry.gear import ReferenceGear
+from gearfmu.geometry.plane import about_z
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.structure import AROUND, parts, turned
@@ -229,8 +230,7 @@ def _record(body: Drawn, gear: DeformedGear, times: np.ndarray, window: tuple[fl
     """Give a body its recorded motion around the window instead of loads."""
     first = max(int(np.searchsorted(times, window[0])) - 1, 0)
     chosen = range(first, min(int(np.searchsorted(times, window[1])) + 1, times.size))
-    c, s = math.cos(gear.angle), math.sin(gear.angle)
-    back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])  # from the axes of the stage to the body's
+    back = about_z(gear.angle)  # of row vectors, from the axes of the stage to the body's
     points, quads = gear.surface
     body.points, body.teeth = points @ back, gear.body.toothed.teeth
     body.quads, body.ahead = _first_sector(len(points), quads, body.teeth)

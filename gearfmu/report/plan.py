@@ -21,9 +21,7 @@ HEADER = ("effect", "error if dropped, budgets", "saves", "verdict", "why")
 
 def plan_sections(plan: Mapping[str, Any] | None) -> list[str]:
     """A section for every segment of the plan; none for a run without one."""
-    if not plan:
-        return []
-    return [_section(segment, plan) for segment in plan["segments"]]
+    return [_section(segment, plan) for segment in plan["segments"]] if plan else []
 
 
 def _section(segment: Mapping[str, Any], plan: Mapping[str, Any]) -> str:

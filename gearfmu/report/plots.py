@@ -30,7 +30,8 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     slips = [name for name in trace.channels if name.endswith(".slip")]
     if not clutch and not others:
         return None
-    locked = tuple(_locked(trace))
+    states = [trace[name].astype(bool) for name in trace.channels if name.endswith(LOCKED)]
+    locked = tuple(Span(*ends, "locked") for state in states for ends in spans(trace.time, state))
     rows = ((clutch, "torque in N·m", 190), (others, "torque in N·m", 190), (slips, "slip in rad/s", 130))
     panels = [
         Panel(label, channels(trace, names), spans=locked, height=height) for names, label, height in rows if names
@@ -185,12 +186,6 @@ def distinct(trace: Trace, names: Iterable[str]) -> list[str]:
     for name in names:
         found.setdefault(trace[name].tobytes(), name)
     return list(found.values())
-
-
-def _locked(trace: Trace) -> list[Span]:
-    """Where a clutch is locked."""
-    names = [name for name in trace.channels if name.endswith(LOCKED)]
-    return [Span(*ends, "locked") for name in names for ends in spans(trace.time, trace[name].astype(bool))]
 
 
 def _contact(time: np.ndarray, state: np.ndarray) -> list[Span]:

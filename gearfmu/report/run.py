@@ -15,7 +15,7 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.report import signals
 from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.results import dynamic_factors, key_results
-from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
+from gearfmu.report.runup import LEAST_LOAD, RunUp, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.stage import assemble
 from gearfmu.stage.run.deformation import Deformation
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
@@ -26,7 +26,6 @@ from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import Meshing
 
-LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
 POSITIONS, POSITIONS_OF_SET = 24, 16  # over a pitch: a set solves all its meshes at each
 PERIODS, PERIODS_OF_SET = 6, 8  # of a mesh, seen in detail
 
@@ -149,8 +148,8 @@ class Run:
         """The run-up within the window, that of a pair or train with its resonances where the stage is at hand; None
         where no shaft gathers speed (or loses it) steadily."""
         if self.planets is not None:
-            return run_up_of_set(self.trace, self.planets, self.window)
-        found = run_up_of_meshes(self.trace, self.known, self.window) if self.known else None
+            return run_up_of_set(self.part, self.planets)
+        found = run_up_of_meshes(self.part, self.known) if self.known else None
         first = next(iter(self.known), "")
         if found is None or self.stage is None or f"{first}.force" not in found.signals:
             return found

@@ -15,7 +15,7 @@ from gearfmu.modes.linear import stage_modes
 from gearfmu.report import metrics
 from gearfmu.report.campbell import loud
 from gearfmu.report.kinds import ACCELERATIONS, FORCES, SENSOR, Kind, averaging, loudest_sensors
-from gearfmu.report.signals import GEAR_SPEED, PlanetSet, Window, bearings, on_mounts, recorded
+from gearfmu.report.signals import GEAR_SPEED, PlanetSet, bearings, on_mounts, recorded
 from gearfmu.stage import assemble
 from gearfmu.stage.run.limits import place_of
 from gearfmu.stage.run.touching import GEAR_PHI
@@ -30,7 +30,7 @@ SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
 SET_ORDERS, PAIR_ORDERS, TRAIN_ORDERS = 3, 6, 4  # mesh orders shown
 TRAIN_BEARINGS = 2  # directions of bearings shown
-LEAST_LOAD = 0.01  # of torque_max: below it flanks may part, and there is nothing to linearise
+LEAST_LOAD = 0.01  # of torque_max: below it flanks may part, and there is neither a cycle nor a linear stage
 MODES = 30  # of the linearised stage, the lowest
 
 
@@ -133,9 +133,10 @@ class RunUp:
         }
 
 
-def run_up_of_set(trace: Trace, own: PlanetSet, window: Window) -> RunUp | None:
-    """The run-up of a set within `window`; None where its carrier does not gather speed (or lose it) steadily."""
-    part, names = trace.window(window.start, window.end), (own.meshing.rotor, own.carrier)
+def run_up_of_set(part: Trace, own: PlanetSet) -> RunUp | None:
+    """The run-up of a set in a part of its trace; None where its carrier does not gather speed (or lose it)
+    steadily."""
+    names = own.meshing.rotor, own.carrier
     if any(f"{name}{GEAR_SPEED}" not in part for name in names) or f"{own.carrier}{GEAR_PHI}" not in part:
         return None
     speeds = {name: part[f"{name}{GEAR_SPEED}"] for name in names}
@@ -149,10 +150,10 @@ def run_up_of_set(trace: Trace, own: PlanetSet, window: Window) -> RunUp | None:
     return RunUp(part, own.carrier, turning, {"": each}, signals) if signals else None
 
 
-def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window) -> RunUp | None:
-    """The run-up of a pair or a train within `window`, by gear A of its first engagement; None where that does not
-    gather speed (or lose it) steadily, or where gears ride on a carrier."""
-    part, rotors = trace.window(window.start, window.end), [meshing.rotor for meshing in known.values()]
+def run_up_of_meshes(part: Trace, known: Mapping[str, Meshing]) -> RunUp | None:
+    """The run-up of a pair or a train in a part of its trace, by gear A of its first engagement; None where that does
+    not gather speed (or lose it) steadily, or where gears ride on a carrier."""
+    rotors = [meshing.rotor for meshing in known.values()]
     carried = any(meshing.carrier is not None for meshing in known.values())
     if carried or any(f"{gear}{GEAR_PHI}" not in part for gear in rotors):
         return None

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gearfmu.geometry.plane import direction
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.planetary import CarrierBody
 from gearfmu.stagefile.tables.bodies import ShaftBody
@@ -39,9 +40,7 @@ def turned(profile: Profile) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     the first sector by its points; whether each point is the next sector's."""
     radius, z = np.array(profile, dtype=float).T
     angle = np.repeat(np.arange(AROUND) * 2 * np.pi / AROUND, radius.size)
-    points = np.stack(
-        [np.cos(angle) * np.tile(radius, AROUND), np.sin(angle) * np.tile(radius, AROUND), np.tile(z, AROUND)], axis=1
-    )
+    points = np.column_stack([direction(angle) * np.tile(radius, AROUND)[:, None], np.tile(z, AROUND)])
     first = np.arange(radius.size - 1)
     quads = np.stack([first, first + 1, first + 1, first], axis=1)
     ahead = np.tile(np.array([0, 0, 1, 1], np.int8), (radius.size - 1, 1))

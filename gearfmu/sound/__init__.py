@@ -1,8 +1,8 @@
 """Radiated sound: skin of a body, boundary elements, radiation matrix, sound power, third octaves."""
 
 from gearfmu.sound.boundary import memory_needed
-from gearfmu.sound.levels import BANDS, a_weighting, bands_of, level, midbands, nominal, third_octaves, weighted
-from gearfmu.sound.power import WIDTH, Segments, SoundPower, power_of, radiated, segments
+from gearfmu.sound.levels import BANDS, a_weighting, bands_of, level, midbands, nominal, third_octaves
+from gearfmu.sound.power import WIDTH, SoundPower, power_of, radiated, segments
 from gearfmu.sound.radiation import Radiation, radiation
 from gearfmu.sound.skin import Skin, SoundError, envelope, refined, skin_of
 
@@ -10,7 +10,6 @@ __all__ = [
     "BANDS",
     "WIDTH",
     "Radiation",
-    "Segments",
     "Skin",
     "SoundError",
     "SoundPower",
@@ -28,5 +27,4 @@ __all__ = [
     "segments",
     "skin_of",
     "third_octaves",
-    "weighted",
 ]

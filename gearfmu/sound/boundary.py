@@ -160,10 +160,7 @@ def _static(
         distance = np.einsum("xtk,tk->xt", away[a], outward)
         around = far[a] + far[b]
         single += distance * np.log((around + length) / np.maximum(around - length, 1e-12 * length))
-    return (
-        np.add.reduceat(single, first, axis=1) / (4 * np.pi),
-        np.add.reduceat(-angle, first, axis=1) / (4 * np.pi),
-    )
+    return np.add.reduceat(single, first, axis=1) / (4 * np.pi), np.add.reduceat(-angle, first, axis=1) / (4 * np.pi)
 
 
 def solid_angles(corners: np.ndarray, normals: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

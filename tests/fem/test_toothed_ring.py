@@ -23,7 +23,7 @@ WIDTH, RIM = 8e-3, 40e-3
 def toothed(z: int, module: float) -> InternalGearGeometry:
     r = module * z / 2
     return InternalGearGeometry(
-        z, module, math.radians(20), 0.0, r - 0.8 * module, r + 1.25 * module, RIM, 0.04 * module, 0.25 * module
+        z, module, math.radians(20), 0.0, r - 0.8 * module, 0.04 * module, r + 1.25 * module, RIM, 0.25 * module
     )
 
 

@@ -172,7 +172,7 @@ def test_many_rings_mesh_well(z, x, tip, fillet, rim, scale):
     m, r = 2e-3, 1e-3 * z
     r_f = r + m * (x + 1.25)
     ring = InternalGearGeometry(
-        z, m, math.radians(20), x, r + m * (x - tip), r_f, r_f + rim * m, 0.04 * m, fillet * m
+        z, m, math.radians(20), x, r + m * (x - tip), 0.04 * m, r_f, r_f + rim * m, fillet * m
     )  # fmt: skip
     if ring.s_tip <= 0 or ring.fillet_centre[1] <= 0 or ring.tip_land_half_angle < 0:
         event("no such ring")

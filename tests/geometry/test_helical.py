@@ -41,7 +41,7 @@ def test_reference_diameters_and_overlap_as_published() -> None:
     """ISO/TR 6336-30 states d = 141.340 and 856.354 mm and ε_β = 1.083."""
     assert 2e3 * FIRST.r == pytest.approx(141.340, abs=6e-4)
     assert 2e3 * SECOND.r == pytest.approx(856.354, abs=1e-3)
-    assert EXAMPLE.overlap_ratio(0.1) == pytest.approx(1.083, abs=6e-4)
+    assert EXAMPLE.gears[0].overlap_ratio(0.1) == pytest.approx(1.083, abs=6e-4)
     assert without_backlash(EXAMPLE) == pytest.approx(0.5, abs=5e-6)
 
 

@@ -10,10 +10,9 @@ from small import COUNT, frequencies, pinion, pinion_modes, set_body
 from gearfmu.errors import BodyError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes
+from gearfmu.modes.bodies import as_stored, body_modes, mounted_ring_modes, whole_modes
 from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.shapes import MOST, energy_shares, harmonic_shares
-from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.toothed import toothed_full_order
 from gearfmu.stagefile.forms.expand import rewritten
 from gearfmu.stagefile.stage import load_stage

@@ -12,7 +12,7 @@ import pytest
 from kinds import KINDS, Kind, every
 from said import Said
 
-from gearfmu import report
+from gearfmu.report import html as report
 from gearfmu.stage.run.trace import Trace
 
 ALL = every(full=("helical", "train", "helical_set"))

@@ -12,9 +12,9 @@ from test_set_report import set_run
 
 import gearfmu as gf
 from evidence.pictures.browser import Browser
-from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.femesh.mesh import rotated
+from gearfmu.report import html as report
 from gearfmu.report.moving import _unit_loads, moving_view
 from gearfmu.stage.assembly.observed import gear_bodies
 from gearfmu.stage.run.trace import Trace

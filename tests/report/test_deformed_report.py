@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gearfmu import report
 from gearfmu.body import load_bodies
+from gearfmu.report import html as report
 from gearfmu.stage.run.deformation import Deformation, GearMotion
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stagefile.stage import load_stage

@@ -11,9 +11,9 @@ import pytest
 from verbs import call
 
 import gearfmu as gf
-from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report import housing
+from gearfmu.report import html as report
 from gearfmu.report.choice import turning
 from gearfmu.report.metrics import MetricsError, undo_mean
 from gearfmu.report.run import Run

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfmu import report
+from gearfmu.report import html as report
 from gearfmu.report.names import plain
 from gearfmu.report.packed import BYTE_LEVELS, BYTE_MISSING, COLUMNS, EXACT, LEVELS, MISSING, MOST, Pack, reduced
 from gearfmu.stage.run.trace import Channel, Trace

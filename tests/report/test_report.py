@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.commands.runs import finish
+from gearfmu.report import html as report
 from gearfmu.report import levels
 from gearfmu.report.plots import distinct
 from gearfmu.report.results import key_results, strict

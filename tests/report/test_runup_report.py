@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu import report
 from gearfmu.body import load_bodies
+from gearfmu.report import html as report
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.runup import Turning, resonances, run_up_of_meshes, run_up_of_set
-from gearfmu.report.signals import Window, known_meshings, planet_set
+from gearfmu.report.signals import known_meshings, planet_set
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.run.trace import Channel, Trace
 from gearfmu.stagefile.stage import load_stage
@@ -65,7 +65,6 @@ def sweep(speed: np.ndarray = SPEED, angle: np.ndarray = ANGLE) -> Trace:
 
 
 def test_a_run_up_is_one_whose_carrier_gathers_speed() -> None:
-    whole = Window(0.0, DURATION, "here")
     for trace, is_one in (
         (sweep(), True),
         (sweep(SPEED[::-1], ANGLE[-1] - ANGLE[::-1]), True),
@@ -73,7 +72,7 @@ def test_a_run_up_is_one_whose_carrier_gathers_speed() -> None:
         (sweep(150.0 + 80.0 * np.sin(9.0 * TIME), 150.0 * TIME - 80.0 / 9.0 * np.cos(9.0 * TIME)), False),
     ):
         own = planet_set(trace, known_meshings(trace))
-        found = run_up_of_set(trace, own, whole)
+        found = run_up_of_set(trace, own)
         assert (found is not None) is is_one
         if found is not None:
             assert found.each == 54 and list(found.signals) == [
@@ -116,7 +115,7 @@ def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path
     assert not {"spectrum", "spectrogram"} & made
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "speed of the pinion in rpm" in text and "mesh orders k × 16" in text and "planets" not in text
-    own = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
+    own = run_up_of_meshes(trace, known_meshings(trace))
     assert own is not None and list(own.signals) == ["bearing.pinion.fy", "mesh.force"] and own.resonances == ()
     found = own.orders["mesh.force"]
     peak = found.speed[np.argmax(found.amplitude[:, found.order == 16.0].ravel())]
@@ -132,7 +131,7 @@ def test_a_run_up_shows_the_orders_of_the_loudest_direction_of_every_sensor() ->
     loud = np.diff(speed, prepend=speed[0]) / STEP
     sensors = {f"sensor.lid.a{axis}": Channel(share * loud, "m/s2") for axis, share in (("x", 0.1), ("z", 1.0))}
     housed = Trace(TIME, trace.channels | sensors, trace.meta)
-    own = run_up_of_meshes(housed, known_meshings(housed), Window(0.0, DURATION, "here"))
+    own = run_up_of_meshes(housed, known_meshings(housed))
     assert own is not None and list(own.signals)[-1] == "sensor.lid.az" and "sensor.lid.ax" not in own.signals
     signal, found = own.signals["sensor.lid.az"], own.orders["sensor.lid.az"]
     assert signal.kind.label == "dB re 1 µm/s²"
@@ -163,7 +162,7 @@ def test_a_swinging_speed_neither_hides_the_run_up_nor_makes_orders_of_its_own(t
     """An order of constant amplitude keeps its line; over the recorded angle it would have others 16 orders away."""
     trace = pair_sweep(0.3)
     trace = replace(trace, channels=trace.channels | {"mesh.force": Channel(np.cos(96.0 * ANGLE), "N")})
-    own = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
+    own = run_up_of_meshes(trace, known_meshings(trace))
     assert own is not None
     found = own.orders["mesh.force"]
     assert found.amplitude[:, found.order == 48.0].ravel() == pytest.approx(np.sqrt(0.5), rel=1e-2)
@@ -183,7 +182,7 @@ def test_orders_are_loudest_where_they_meet_the_linearised_stage() -> None:
     start, end, duration = 3500 * np.pi / 30, 6000 * np.pi / 30, 0.3
     drive = Steady(model, start, 150.0, (end - start) / duration)
     trace = simulate(model, drive, duration, 40e-6, {"level": 1.0})
-    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.02, duration, "settled"))
+    run = run_up_of_meshes(trace.window(0.02, duration), known_meshings(trace))
     assert run is not None
     found = run.orders["bearing.wheel.fy"]
     near = np.abs(found.order - 32.0) < 0.6
@@ -224,7 +223,7 @@ def train_sweep() -> Trace:
 
 def test_the_run_up_of_a_train_has_the_orders_of_every_mesh(tmp_path: Path) -> None:
     trace = train_sweep()
-    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
+    run = run_up_of_meshes(trace, known_meshings(trace))
     assert run is not None and run.shaft == "input"
     assert run.families == pytest.approx({"stage1": 25.0, "stage2": 25 * 19 / 61}, rel=1e-9)
     assert run.others == pytest.approx({"intermediate": 25 / 61, "output": 25 * 19 / 61 / 73}, rel=1e-9)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearfmu import report
+from gearfmu.report import html as report
 from gearfmu.report import plots
 from gearfmu.report.chart import Chart
 from gearfmu.report.heading import of_set, phasing, planet_phases

@@ -42,7 +42,7 @@ def _radii(shapes: Mapping[str, Any]) -> dict[str, dict[str, float]]:
 
 def _derived_helix(spec: StageSpec, pair: PairGeometry) -> dict[str, Any]:
     """What a helical pair has besides: angles of the transverse section, overlap of the common face width."""
-    overlap = pair.overlap_ratio(common_width(spec.gears))
+    overlap = pair.gears[0].overlap_ratio(common_width(spec.gears))
     return {
         "transverse_pressure_angle_deg": math.degrees(pair.gears[0].alpha_t),
         "base_helix_angle_deg": math.degrees(pair.gears[0].beta_b),
