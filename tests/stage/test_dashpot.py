@@ -1,6 +1,6 @@
-"""The path that a contact's dashpot is parallel to (docs/theory.md, 2.5), read from the kernel. The constant of dashpots
-belongs to the modes that are stored: with half of them the path is longer, and `same_loss` says with which constant the
-mesh loses the same."""
+"""The path that a contact's dashpot is parallel to (docs/theory.md, 2.5), read from the kernel. The constant of
+dashpots belongs to the modes that are stored: with half of them the path is longer, and `same_loss` says with which
+constant the mesh loses the same."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from driven import begun
+from driven import begun, give, stepped
 from flat import FlatBody, FlatContact, flat_blob
 
 from gearfmu.body import Body
@@ -36,12 +36,9 @@ def test_a_free_body_moves_by_the_integral_of_the_torque(integrator: float) -> N
         flat_blob("plates", [body, body], FlatContact(gap=1.0)), {"h": h, "level": 3.0, "integrator": integrator}
     )
     kernel.initialize()
-    pushed = 0.0
-    for i, force in enumerate(np.random.default_rng(1).normal(0.0, 300.0, 50)):
-        kernel.set("left.tau", force)
-        kernel.step(i * h, h)
-        pushed += force * h
-        assert kernel.get("left.gear.w") * mass == pytest.approx(pushed, abs=1e-9)
+    force = np.random.default_rng(1).normal(0.0, 300.0, 50)
+    speed = stepped(kernel, len(force), h, "left.gear.w", before=lambda i: kernel.set("left.tau", force[i]))[:, 0]
+    assert speed * mass == pytest.approx(np.cumsum(force) * h, abs=1e-9)
 
 
 # ---- energy ----------------------------------------------------------------------------------------------------------
@@ -53,11 +50,7 @@ def test_energy_is_kept_under_torques_that_jump(pair: StageModel, level: float) 
     h = 5e-6
     loads = {"pinion.tau": TORQUE, "wheel.tau": TORQUE * RATIO}
     kernel = begun(pair.kernel(level=level, h=h, **CONSERVING), loads)
-    left, stored = [], []
-    for i, factor in enumerate(np.random.default_rng(3).uniform(0.5, 1.5, 1000)):
-        kernel.set("pinion.tau", TORQUE * factor)
-        kernel.set("wheel.tau", TORQUE * RATIO * factor)
-        kernel.step(i * h, h)
-        left.append(kernel.get("energy.residual"))
-        stored.append(kernel.get("energy.stored"))
+    factors = np.random.default_rng(3).uniform(0.5, 1.5, 1000)
+    jump = lambda i: give(kernel, {name: load * factors[i] for name, load in loads.items()})  # noqa: E731
+    left, stored = stepped(kernel, len(factors), h, "energy.residual", "energy.stored", before=jump).T
     assert np.ptp(left) < 1e-6 * max(stored) and kernel.get("solver.retried_steps") == 0

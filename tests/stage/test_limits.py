@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driven import begun, give
+from driven import begun, give, stepped
 from golden_stages import FRICTION, STEP, stages
 from inner import Inner
 
@@ -79,10 +79,8 @@ def test_speeds_that_come_after_the_start_are_told(relieved: StageModel) -> None
             give(kernel, drive(0.0))
         kernel.initialize(0.0)
         assert int(kernel.get("solver.status")) & JUMP == 0
-        for n in range(20):
-            give(kernel, drive(n * 1e-4))
-            kernel.step(n * 1e-4, 1e-4)
-            peak[late] = max(peak.get(late, 0.0), kernel.get("mesh.force_max"))
+        follow = lambda n, kernel=kernel: give(kernel, drive(n * 1e-4))  # noqa: E731
+        peak[late] = stepped(kernel, 20, 1e-4, "mesh.force_max", before=follow).max()
         words = status_words(int(kernel.get("solver.status")))
         assert any("set speeds before the initialisation ends" in word for word in words) is late
     assert peak[True] > 2 * peak[False]
@@ -168,8 +166,8 @@ def test_too_large_a_step_is_refused_with_the_step_to_use(relieved: StageModel) 
 
 # ---- a stage that no step suits --------------------------------------------------------------------------------------
 # Few modes and much contact damping leave hardly any compliance that a force of alternating sign meets. The default is
-# the step nearest to the limit, and the run stays stable. One that fell through all tried steps to the shortest, whose γ
-# is 0, gained with friction a thousand times its energy within 0.1 ms.
+# the step nearest to the limit, and the run stays stable. One that fell through all tried steps to the shortest, whose
+# γ is 0, gained with friction a thousand times its energy within 0.1 ms.
 TRIED = (7.5e-6, 5e-6, 2.5e-6, 1e-6, 0.5e-6)  # s
 STABLE = 1e-3  # of the energy that dampers took; the run at the shortest step left 0.6 of what was stored
 
@@ -191,8 +189,6 @@ def test_few_modes_much_damping_and_friction_stay_stable() -> None:
     stage = stages()["helical"]
     kernel = stage.kernel(FAST | FRICTION, None)
     kernel.initialize()
-    for i in range(stage.steps):
-        stage.drive(kernel, i)
-        kernel.step(i * STEP, STEP)
+    stepped(kernel, stage.steps, STEP, before=lambda i: stage.drive(kernel, i))
     assert kernel.get("solver.retried_steps") == 0
     assert abs(kernel.get("energy.residual")) < STABLE * kernel.get("energy.dissipated")

@@ -178,11 +178,8 @@ def test_a_torque_that_changes_leaves_no_step_unsolved(level: float) -> None:
     """100 N·m at rest, growing at every communication step: contacts hardly move and could not repay what is missing
     when engagements recall each other's deflection under the new torque instead of the old one (40 steps of 180)."""
     kernel = model(PlanetSet(), damped=True).kernel(level=level, h=20e-6 / 3)
-    kernel.set("sun.tau", -25.0)
-    kernel.initialize()
-    for i in range(60):
-        kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2)
-        kernel.step(i * 2e-5, 2e-5)
+    begun(kernel, {"sun.tau": -25.0})
+    stepped(kernel, 60, 2e-5, before=lambda i: kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2))
     assert kernel.get("solver.retried_steps") == 0 and kernel.get("solver.iterations") < 50 * kernel.get("solver.steps")
 
 

@@ -1,5 +1,5 @@
-"""Trains at rest: ratio and torque through the meshes, phases of the teeth by the closed form at the places of the axes,
-and what is refused."""
+"""Trains at rest: ratio and torque through the meshes, phases of the teeth by the closed form at the places of the
+axes, and what is refused."""
 
 from __future__ import annotations
 
