@@ -6,20 +6,17 @@ import numpy as np
 import pytest
 from driven import begun, give, stepped
 
-from gearfmu.body import load_bodies
+import gearfmu as gf
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
-from gearfmu.stage import assemble
 from gearfmu.stage.run.steady import Steady
-from gearfmu.stagefile.stage import load_stage
 
 STEP, BEFORE, AFTER = 20e-6, 250, 250  # s; communication steps
 
 
 @pytest.fixture(scope="module")
 def drive() -> Steady:
-    spec = load_stage("fzg_c/stage_relief")
-    return Steady(assemble(spec, load_bodies(spec)), 209.4, 250.0)
+    return Steady(gf.assemble("fzg_c/stage_relief"), 209.4, 250.0)
 
 
 def halfway(drive: Steady, **parameters: float) -> Kernel:
