@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from driven import stepped
-from flat import FlatBody, FlatContact, flat_blob
+from driven import begun, stepped
+from flat import FlatContact, flat_blob, rigid_block
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly.blob import read_blob, write_blob
@@ -20,9 +20,7 @@ PERIOD = 2 * PLAY / SPEED + 2 * math.pi * math.sqrt(MASS / K)  # there and back:
 
 def plate(play: float, h: float, c: float = 0.0, **parameters: float) -> Kernel:
     """A rigid body on a spring with play, another that it never meets."""
-    none = np.zeros(0)
-    body = FlatBody(MASS, none, none, np.zeros((1, 0)), np.array([[0.0]]))
-    sections = dict(read_blob(flat_blob("plates", [body, body], FlatContact(gap=1.0))))
+    sections = dict(read_blob(flat_blob("plates", [rigid_block(MASS)] * 2, FlatContact(gap=1.0))))
     sections["port_kinds"] = np.array([[0, 0, 0], [1, 1, 0]], np.int32)
     sections["ports"] = np.array([[K, c, 1.0, 1.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0, 1.0, 0.0]])
     if play:
@@ -32,9 +30,7 @@ def plate(play: float, h: float, c: float = 0.0, **parameters: float) -> Kernel:
 
 def bounced(h: float, end: float, c: float = 0.0, play: float = PLAY, **parameters: float) -> np.ndarray:
     """Place (m) and speed (m/s) of the body after every step, (n, 2): thrown from the middle, its outer end held."""
-    kernel = plate(play, h, c, **parameters)
-    kernel.set("left.w", SPEED)
-    kernel.initialize()
+    kernel = begun(plate(play, h, c, **parameters), {"left.w": SPEED})
     kernel.set("left.w", 0.0)
     return stepped(kernel, round(end / h), h, "left.gear.phi", "left.gear.w")
 
@@ -79,7 +75,5 @@ def test_a_damper_takes_energy_only_while_a_side_is_closed() -> None:
 
 
 def test_an_outer_end_within_the_play_carries_no_torque() -> None:
-    kernel = plate(PLAY, 5e-6)
-    kernel.set("left.phi", 0.4 * PLAY)
-    kernel.initialize()
+    kernel = begun(plate(PLAY, 5e-6), {"left.phi": 0.4 * PLAY})
     assert kernel.get("left.tau") == 0.0 and abs(kernel.get("left.gear.phi") - 0.4 * PLAY) <= 0.5 * PLAY

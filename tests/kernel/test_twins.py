@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from driven import stepped
-from golden_models import golden_model
+from golden_stages import golden_model
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly import blob as blobs

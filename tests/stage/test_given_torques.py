@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from driven import begun, give, stepped
-from flat import FlatBody, FlatContact, flat_blob
+from flat import FlatContact, flat_blob, rigid_block
 
 from gearfmu.body import Body
 from gearfmu.kernel import Kernel
@@ -30,11 +30,9 @@ def pair(relief_spec: Stage, bodies: list[Body]) -> StageModel:
 @pytest.mark.parametrize("integrator", [DG4, EM, RK45, CENTRAL])
 def test_a_free_body_moves_by_the_integral_of_the_torque(integrator: float) -> None:
     """m v = Σ F h after every step, for forces that change at random from step to step."""
-    none, rows, h, mass = np.zeros(0), np.zeros((1, 0)), 1e-5, 100.0
-    body = FlatBody(mass, none, none, rows, np.array([[0.0]]))
-    kernel = Kernel(
-        flat_blob("plates", [body, body], FlatContact(gap=1.0)), {"h": h, "level": 3.0, "integrator": integrator}
-    )
+    h, mass = 1e-5, 100.0
+    plates = flat_blob("plates", [rigid_block(mass)] * 2, FlatContact(gap=1.0))
+    kernel = Kernel(plates, {"h": h, "level": 3.0, "integrator": integrator})
     kernel.initialize()
     force = np.random.default_rng(1).normal(0.0, 300.0, 50)
     speed = stepped(kernel, len(force), h, "left.gear.w", before=lambda i: kernel.set("left.tau", force[i]))[:, 0]
