@@ -17,7 +17,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob, write_blob
 from gearfmu.stage.run.te import statics_of
-from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
 
@@ -31,12 +31,9 @@ UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 def free(spec: Stage, bodies: list[Body], bearing_damping: float) -> StageModel:
     """Both shafts free, torque ports; bearings with the damping ratio given."""
-    gears = tuple(
-        gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})})
-        for gear in spec.written.gears
-    )
-    ports = {gear.name: PortSpec(kind="torque") for gear in spec.written.gears}
-    return assemble(rewritten(spec, gears=gears, ports=ports), bodies)
+    supports = tuple(support.model_copy(update={"damping_ratio": bearing_damping}) for support in spec.supports)
+    free = with_ports(spec, dict.fromkeys(spec.ports, PortSpec(kind="torque")))
+    return assemble(free.model_copy(update={"supports": supports}), bodies)
 
 
 def rattle(

@@ -17,8 +17,8 @@ from evidence.energy.free import Energies, energies
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
 from evidence.stability.planetary import ALL_MESHES, TORQUE, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.stage import StageModel, assemble
-from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stage import StageModel
+from tests.relations.kinds import assembled
 
 H, STEPS = 5e-6, 400
 CONSERVING = {
@@ -82,18 +82,11 @@ def standing_and_turning(quick: Mapping[float, Sequence[str]], names: Iterable[s
 def model(chosen: PlanetSet, damped: bool = False) -> StageModel:
     """The set, by default without the dashpots of its supports."""
     spec = set_spec(chosen)
+    bodies = spec.by_name(set_bodies())
     if not damped:
-        form = spec.written
-        calm = {
-            name: getattr(form, name).model_copy(update={part: _calm(getattr(getattr(form, name), part))})
-            for name, part in (("sun", "bearing"), ("planet", "bearing"), ("carrier", "bearing"), ("ring", "mounts"))
-        }
-        spec = rewritten(spec, **calm)
-    return assemble(spec, set_bodies())
-
-
-def _calm(held: Any) -> Any:
-    return held.model_copy(update={"damping_ratio": 0.0})
+        calm = tuple(support.model_copy(update={"damping_ratio": 0.0}) for support in spec.supports)
+        spec = spec.model_copy(update={"supports": calm})
+    return assembled(spec, bodies)
 
 
 def started(
