@@ -41,6 +41,11 @@ class FlatBody:
         object.__setattr__(self, "residual", stored - (self.rows / self.omega**2) @ self.rows.T)
 
 
+def rigid_block(mass: float, compliance: float = 0.0) -> FlatBody:
+    """Without modes; compliance: of its face, m/N."""
+    return FlatBody(mass, np.zeros(0), np.zeros(0), np.zeros((1, 0)), np.array([[compliance]]))
+
+
 def _single(values: np.ndarray) -> np.ndarray:
     return np.asarray(values, np.float32).astype(float)
 

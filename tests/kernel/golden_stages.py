@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import lzma
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, lru_cache, partial
 from pathlib import Path
 
 import numpy as np
-from golden_models import golden_model
 from small_model import pair_blob, with_nodes
 
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
 from gearfmu.stage.assembly.blob import read_blob, write_blob
 
+MODELS = Path(__file__).parents[1] / "reference" / "golden_models"
 STEP = 2e-5  # s, communication step
 RIGID, FAST, STANDARD, FULL, PAPER, EXPLICIT = map(float, range(6))
 DG4, EM, RK45, CENTRAL = map(float, range(4))
@@ -89,6 +90,12 @@ def _closing(kernel: Kernel, i: int) -> None:
 def _kernel(blob: bytes, library: Path | None) -> Kernel:
     """Memory of a set is hundreds of megabytes: it is taken once for all runs of a model."""
     return Kernel(blob, None, library)
+
+
+@cache
+def golden_model(name: str) -> bytes:
+    """Blob of a stored model."""
+    return lzma.decompress((MODELS / f"{name}.gkb.xz").read_bytes())
 
 
 @cache

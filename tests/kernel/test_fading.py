@@ -8,6 +8,7 @@ import platform
 
 import numpy as np
 import pytest
+from driven import begun, give
 from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
@@ -21,11 +22,8 @@ def fading(level: float, speed: float) -> Kernel:
     """A pair that springs apart: under torque at the start, which ends with the first step."""
     speeds = {"pinion.w_start": speed, "wheel.w_start": -speed * 16 / 24}
     kernel = Kernel(pair_blob(("torque", "torque")), {"level": level, "h": 5e-6, "backlash": 2e-3, **speeds})
-    for port, torque in (("pinion", 2.0), ("wheel", 3.0)):
-        kernel.set(f"{port}.tau", torque)
-    kernel.initialize()
-    for port in kernel.ports:
-        kernel.set(f"{port}.tau", 0.0)
+    begun(kernel, {"pinion.tau": 2.0, "wheel.tau": 3.0})
+    give(kernel, {"pinion.tau": 0.0, "wheel.tau": 0.0})
     return kernel
 
 

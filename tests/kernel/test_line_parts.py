@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from golden_models import golden_model
-from golden_stages import RIGID, Record, stages
+from golden_stages import RIGID, Record, golden_model, stages
 from golden_stages import _run as run
 from inner import Inner
 from scipy.integrate import quad

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from driven import begun, give, stepped
 from small_model import pair_blob
 
 from gearfmu.errors import ModelError, SimulationError
@@ -15,10 +16,7 @@ NAMES = ("mesh.force", "mesh.te", "energy.work", "solver.steps")
 
 
 def started(**parameters: float) -> Kernel:
-    kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1.0, **parameters})
-    kernel.set("pinion.phi", 6e-3)
-    kernel.initialize()
-    return kernel
+    return begun(Kernel(pair_blob(("spring", "spring")), {"level": 1.0, **parameters}), {"pinion.phi": 6e-3})
 
 
 def given(steps: int) -> dict[str, np.ndarray]:
@@ -31,17 +29,13 @@ def given(steps: int) -> dict[str, np.ndarray]:
 
 
 def test_rows_are_those_of_single_steps() -> None:
-    one, kernel, inputs, wanted = started(), started(), given(STEPS), []
-    record = Recording(one, NAMES, STEPS, H)
+    one, kernel, inputs = started(), started(), given(STEPS)
+    record, wanted = Recording(one, NAMES, STEPS, H), [kernel.get(name) for name in NAMES]
     for first, last in ((0, 1), (1, 30), (30, STEPS)):
         record.advance(last - first, {name: values[first:last] for name, values in inputs.items()})
-    wanted.append([kernel.get(name) for name in NAMES])
-    for i in range(STEPS):
-        for name, values in inputs.items():
-            kernel.set(name, float(values[i]))
-        kernel.step(i * H, H)
-        wanted.append([kernel.get(name) for name in NAMES])
-    assert record.done == STEPS and np.array_equal(record.rows, np.array(wanted)) and np.ptp(record.rows[:, 0]) > 0
+    told = lambda i: give(kernel, {name: float(values[i]) for name, values in inputs.items()})  # noqa: E731
+    wanted = np.vstack([wanted, stepped(kernel, STEPS, H, *NAMES, before=told)])
+    assert record.done == STEPS and np.array_equal(record.rows, wanted) and np.ptp(record.rows[:, 0]) > 0
 
 
 def test_a_refused_input_is_named_and_what_was_made_is_kept() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from driven import give
 from small_model import pair_blob
 
 from gearfmu.errors import SimulationError
@@ -20,26 +21,20 @@ def forces(start: float, times: np.ndarray) -> list[bytes]:
     """Mesh force and state time after every step from times[i] to times[i + 1]; inputs depend on the number of the
     step alone."""
     kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1})
-    kernel.set("pinion.w", 100.0)
-    kernel.set("wheel.w", -100.0 * 16 / 24)
+    give(kernel, {"pinion.w": 100.0, "wheel.w": -100.0 * 16 / 24})
     kernel.initialize(start)
     found = []
     for i in range(times.size - 1):
-        kernel.set("pinion.phi", 5e-3 + 100.0 * i * H)
-        kernel.set("wheel.phi", 4e-3 - 100.0 * 16 / 24 * i * H)
+        give(kernel, {"pinion.phi": 5e-3 + 100.0 * i * H, "wheel.phi": 4e-3 - 100.0 * 16 / 24 * i * H})
         kernel.step(times[i], times[i + 1] - times[i])
-        found.append(np.array([kernel.get("mesh.force"), kernel.get("mesh.te"), kernel.get("solver.steps")]).tobytes())
+        found.append(np.array([kernel.get(name) for name in ("mesh.force", "mesh.te", "solver.steps")]).tobytes())
     return found
 
 
 @pytest.mark.parametrize("start", [0.0, 3.7, 1000.0])
 def test_accumulated_times_give_the_bits_of_counted_ones(start: float) -> None:
     counted = start + H * np.arange(STEPS + 1)
-    accumulated = np.empty(STEPS + 1)
-    time = start
-    for i in range(STEPS + 1):
-        accumulated[i] = time
-        time += H
+    accumulated = np.cumsum([start, *[H] * STEPS])
     assert start == 0.0 or not np.array_equal(np.diff(accumulated), np.full(STEPS, H))
     first = accumulated[1] - accumulated[0]
     counted[1:] = counted[0] + first * np.arange(1, STEPS + 1)
@@ -54,8 +49,7 @@ def test_angles_are_taken_but_for_whole_turns(reference: float) -> None:
 
     def outputs(wrap: Callable[[float], float], saved: int) -> np.ndarray:
         kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1, "phi_reference": reference})
-        kernel.set("pinion.w", 100.0)
-        kernel.set("wheel.w", -100.0 * 16 / 24)
+        give(kernel, {"pinion.w": 100.0, "wheel.w": -100.0 * 16 / 24})
         rows = []
         for i in range(STEPS):
             kernel.set("pinion.phi", wrap(1e-3 + 2e-3 * min(1.0, i / 100) + 100.0 * i * H))

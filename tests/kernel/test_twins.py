@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from driven import stepped
-from golden_models import golden_model
+from driven import begun, stepped
+from golden_stages import golden_model
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage.assembly import blob as blobs
@@ -42,8 +42,7 @@ def moved(blob: bytes) -> bytes:
 
 
 def state_after_steps(blob: bytes, level: float, friction: float) -> bytes:
-    kernel = Kernel(blob, {"level": level, "slices": 1.0, "effect.friction": friction})
-    kernel.initialize()
+    kernel = begun(Kernel(blob, {"level": level, "slices": 1.0, "effect.friction": friction}), {})
     stepped(kernel, 3, STEP)
     return kernel.save()
 

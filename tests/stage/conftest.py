@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import gearfmu as gf
 from evidence.energy.free import FreePair, free_pair
 from gearfmu.body import Body, load_bodies
 from gearfmu.geometry import PairGeometry
@@ -52,22 +53,17 @@ def relieved_free(relief_spec: Stage, bodies: list[Body]) -> FreePair:
 
 @pytest.fixture(scope="session")
 def helical() -> StageModel:
-    return shipped("helical_demo")
+    return gf.assemble("helical_demo")
 
 
 @pytest.fixture(scope="session")
 def planetary() -> StageModel:
-    return shipped("planetary54")
+    return gf.assemble("planetary54")
 
 
 @pytest.fixture(scope="session")
 def two_stage() -> StageModel:
-    return shipped("two_stage")
-
-
-def shipped(name: str) -> StageModel:
-    stage = load_stage(name)
-    return assemble(stage, load_bodies(stage))
+    return gf.assemble("two_stage")
 
 
 @pytest.fixture(scope="session")

@@ -7,13 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from flank_rows import flank_rows, flank_supports
 
 from gearfmu.body import Body
 from gearfmu.geometry import GearGeometry
 from gearfmu.stage.assembly.ground_part import GroundPart, read_tables
 from gearfmu.stage.assembly.groups import SPIN, Group, Layout, node_directions
-from gearfmu.stage.assembly.teeth import OFFSETS, resampling
+from gearfmu.stage.assembly.teeth import OFFSETS, products, resampling
+
+
+def flank_rows(group: Group, body: int) -> np.ndarray:
+    """(3, 2, P, A, n): e, as c₀, c_c, c_s."""
+    flank, freedoms = group.layout.bodies[body].flank, group.layout.freedoms(body)
+    elastic = group.shapes[group.at[body]][len(freedoms) :]
+    by_supports = products(flank_supports(group, body) @ group.kappa, group.support_rows.T)
+    return products(flank.patterns, elastic.T) - by_supports
+
+
+def flank_supports(group: Group, body: int) -> np.ndarray:
+    """(3, 2, P, A, s): C_fs."""
+    return products(group.layout.bodies[body].flank.node, node_directions(group.layout, body))
+
 
 Place = tuple[int, int, int]  # body, node, direction
 FlankLoad = tuple[int, int, int, int]  # tooth, flank, roll, width function

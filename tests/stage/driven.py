@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -21,10 +21,14 @@ def give(kernel: Kernel, inputs: Mapping[str, float]) -> None:
         kernel.set(name, value)
 
 
-def stepped(kernel: Kernel, count: int, h: float, *names: str) -> np.ndarray:
-    """(count, names): outputs after each of so many communication steps of h (s) under inputs that stay."""
+def stepped(
+    kernel: Kernel, count: int, h: float, *names: str, before: Callable[[int], object] = lambda i: None
+) -> np.ndarray:
+    """(count, names): outputs after each of so many communication steps of h (s), under inputs that stay or that
+    `before` sets, called with the number of the step."""
     found, start = np.empty((count, len(names))), kernel.time
     for i in range(count):
+        before(i)
         kernel.step(start + i * h, h)
         found[i] = [kernel.get(name) for name in names]
     return found

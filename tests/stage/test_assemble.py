@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dense import flank_rows, flank_supports
 from flank_reader import full_tables
-from flank_rows import flank_rows, flank_supports
 
 from gearfmu.body import load_bodies
 from gearfmu.stage import assemble

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 from driven import give, stepped
-from flat import FlatBody, FlatContact, flat_blob
+from flat import FlatContact, flat_blob, rigid_block
 from scipy.integrate import solve_ivp
 
 from evidence.energy.free import FreePair, Rattle, energies, started
@@ -40,15 +40,12 @@ def film_resistance(gap: float, viscosity: float, roughness: float, radius: floa
 
 def falling(h: float, integrator: float, settings: Mapping[str, float], compliance: float = 0.0) -> Kernel:
     """Two free bodies that approach under LOAD."""
-    none, rows = np.zeros(0), np.zeros((1, 0))
-    body = FlatBody(2 * MASS, none, none, rows, np.array([[compliance]]))
     kernel = Kernel(
-        flat_blob("plates", [body, body], FlatContact(gap=START)),
+        flat_blob("plates", [rigid_block(2 * MASS, compliance)] * 2, FlatContact(gap=START)),
         {"left.w_start": SPEED, "h": h, "level": 3.0, "integrator": integrator, **settings},
     )
     kernel.initialize()
-    kernel.set("left.tau", LOAD)
-    kernel.set("right.tau", -LOAD)
+    give(kernel, {"left.tau": LOAD, "right.tau": -LOAD})
     return kernel
 
 

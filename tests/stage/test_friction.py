@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import begun, give, stepped
 from scipy.optimize import brentq
 
 import gearfmu as gf
@@ -115,7 +116,7 @@ def swing(
     spec: Stage,
     blob: bytes,
     kernel: Kernel,
-    act: Callable[[], None],
+    act: Callable[[int], None],
     potential: Callable[[float], float],
     steps: int,
 ) -> tuple[float, float]:
@@ -128,12 +129,7 @@ def swing(
     r_a, r_b = (gear.r_b for gear in geometry.gears)
     block = dict(r_a=r_a, r_b=r_b, s_a=s_a, s_b=s_b, mu=MU, tau=torque)
     expected = turning_points(block, potential, kernel.get("pinion.gear.phi"))
-    seen = []
-    for i in range(steps):
-        act()
-        kernel.step(i * h, h)
-        seen.append([kernel.get(name) for name in ("pinion.gear.phi", "mesh.friction_loss")])
-    phi, lost = np.array(seen).T
+    phi, lost = stepped(kernel, steps, h, "pinion.gear.phi", "mesh.friction_loss", before=act).T
     assert kernel.get("mesh.pairs") == 1 and len(expected) > 10 and kernel.get("solver.retried_steps") == 0
     first, late = abs(expected[1] - expected[0]), -steps // 10
     found = [*extremes(phi, 0.005 * first)[: len(expected) - 2], phi[late:].mean()]
@@ -150,12 +146,10 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
     stiffness, outer = 2e3, -8e-3
     blob = swinging(spec, bodies, PortSpec(kind="spring", k=stiffness, c=0.0))
     kernel = Kernel(blob, {**FROZEN, "friction_coefficient": MU, "h": 1e-5, "integrator": integrator})
-    kernel.set("wheel.tau", 30.0)
-    kernel.initialize()
+    begun(kernel, {"wheel.tau": 30.0})
 
-    def turn() -> None:
-        kernel.set("pinion.phi", outer)
-        kernel.set("pinion.w", 0.0)
+    def turn(_: int) -> None:
+        give(kernel, {"pinion.phi": outer, "pinion.w": 0.0})
 
     error, slipped = swing(spec, blob, kernel, turn, lambda angle: 0.5 * stiffness * (angle - outer) ** 2, 10000)
     assert error < 5e-3 and abs(slipped) < 1e-5
@@ -163,18 +157,16 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
 
 def pendulum(
     spec: Stage, bodies: list[Body], torque: float, mu: float = MU
-) -> tuple[bytes, Kernel, Callable[[], None], float]:
+) -> tuple[bytes, Kernel, Callable[[int], None], float]:
     """Blob and kernel of the block with a weight on an arm that turns 60 times as far as the pinion; what sets its
     torque for the angle in the middle of the next step; the angle where it hangs."""
     blob = swinging(spec, bodies, PortSpec(kind="torque"))
     kernel = Kernel(blob, {**FROZEN, "friction_coefficient": mu, "h": FALL_STEP})
     r_a, r_b = (gear.r_b for gear in spec.written.geometry.gears)
-    kernel.set("wheel.tau", torque)
-    kernel.set("pinion.tau", torque * r_a / r_b)
-    kernel.initialize()
+    begun(kernel, {"wheel.tau": torque, "pinion.tau": torque * r_a / r_b})
     hangs = kernel.get("pinion.gear.phi") + 5e-4
 
-    def fall() -> None:
+    def fall(_: int) -> None:
         angle = kernel.get("pinion.gear.phi") + 0.5 * FALL_STEP * kernel.get("pinion.gear.w")
         kernel.set("pinion.tau", -WEIGHT * TIMES * math.sin(TIMES * (angle - hangs)))
 
@@ -194,20 +186,14 @@ def test_a_flank_that_is_grazed_and_rubs_is_solved(spec: Stage, bodies: list[Bod
     """The first swing leaves and grazes the flank again and again. For the scalar that gives the invariant's jump back
     friction then changes sides for ever: the step goes without the jump."""
     _, kernel, fall, _ = pendulum(spec, bodies, 7.5 * (1 + 3e-3 * more))
-    flights = 0
-    for i in range(200):
-        fall()
-        kernel.step(i * FALL_STEP, FALL_STEP)
-        flights += kernel.get("mesh.force") == 0.0
-    assert kernel.get("solver.retried_steps") == 0 and flights > 20
+    force = stepped(kernel, 200, FALL_STEP, "mesh.force", before=fall)
+    assert kernel.get("solver.retried_steps") == 0 and np.sum(force == 0.0) > 20
 
 
 def test_friction_that_finds_no_side_is_told(spec: Stage, bodies: list[Body]) -> None:
     """One step of this swing has none even without the scalar. A scalar that was found afterwards hid it."""
     _, kernel, fall, _ = pendulum(spec, bodies, 7.5 * 1.003, 0.1)
-    for i in range(1200):
-        fall()
-        kernel.step(i * FALL_STEP, FALL_STEP)
+    stepped(kernel, 1200, FALL_STEP, before=fall)
     assert kernel.get("solver.retried_steps") == 1 and int(kernel.get("solver.status")) & 4
 
 
@@ -216,15 +202,10 @@ def test_below_the_limit_of_friction_nothing_moves(spec: Stage, bodies: list[Bod
     blob = swinging(spec, bodies, PortSpec(kind="spring", k=2e4, c=0.0))
     frozen = {**CONSERVING, **RIGID, "effect.bearings": 0.0}
     kernel = Kernel(blob, {**frozen, "friction_coefficient": 0.3})
-    kernel.set("wheel.tau", 300.0)
-    kernel.initialize()
-    kernel.set("pinion.phi", -0.1e-3)
-    kernel.set("pinion.w", 0.0)
+    begun(kernel, {"wheel.tau": 300.0})
+    give(kernel, {"pinion.phi": -0.1e-3, "pinion.w": 0.0})
     s_a, s_b = rolls(blob, kernel, spec.written.geometry.alpha_wt)
-    slid = []
-    for i in range(100):
-        kernel.step(i * 1e-3, 1e-3)
-        slid.append(s_a * kernel.get("pinion.gear.phi") + s_b * kernel.get("wheel.gear.phi"))
+    slid = stepped(kernel, 100, 1e-3, "pinion.gear.phi", "wheel.gear.phi") @ (s_a, s_b)
     free, lost = 0.1e-3 * s_a, kernel.get("mesh.friction_loss")
     drift = abs(np.mean(slid[50:]) - np.mean(slid[:50]))
     assert abs(lost) < 1e-12 and drift < 2e-4 * free  # it yields and rings, undamped

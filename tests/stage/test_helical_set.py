@@ -98,7 +98,6 @@ def test_a_pin_carries_the_moment_that_tilts_its_planet(name: str) -> None:
         about_tangent = moment @ [-math.sin(angle), math.cos(angle)]
         about_radius = moment @ [math.cos(angle), math.sin(angle)]
         z_s, z_r = (centroid(kernel, f"{gear}_planet{k + 1}") for gear in ("sun", "ring"))
-        print(about_tangent / by_hand, about_radius / by_hand, 1e3 * z_s, 1e3 * z_r)
         assert about_tangent == pytest.approx(by_hand + force * math.tan(alpha) * (z_s - z_r), abs=tangent * by_hand)
         assert about_radius == pytest.approx(force * (z_s + z_r), abs=radius * by_hand)
 
@@ -131,5 +130,4 @@ def test_overlap_smooths_the_transmission_error() -> None:
     found, spur = (
         loaded_te(replace(rigid, helix_angle=beta).model(), [TORQUE], 6, **FOUNDATION) for beta in (BETA, 0.0)
     )
-    print(np.ptp(found.te), np.ptp(spur.te))
     assert np.ptp(found.te) < 0.15 * np.ptp(spur.te)

@@ -53,7 +53,7 @@ def housed() -> StageModel:
 
 @cache
 def shipped() -> StageModel:
-    return assemble(stage(), load_bodies(stage()))
+    return gf.assemble("two_stage/stage_housed")
 
 
 @cache

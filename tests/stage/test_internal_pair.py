@@ -1,5 +1,6 @@
 """A pinion in a ring on fixed axes: unloaded geometry against two involutes, the bodies on paper, and the table
-of an independent finite-element program. Balance: tests/relations."""
+of an independent finite-element program; helical: the path of contact of the section, hands that do not fit.
+Balance: tests/relations. What helical teeth carry: test_helical_set.py."""
 
 from __future__ import annotations
 
@@ -227,3 +228,34 @@ def test_loaded_te_against_an_independent_program(tmp_path: Path) -> None:
     for here, theirs in zip(1e6 * ours.te[:, ::2], table.values(), strict=True):
         assert here.mean() == pytest.approx(np.mean(theirs), rel=0.03)
         assert np.allclose(here, theirs, rtol=0.03) and np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.05)
+
+
+# ---- helical ---------------------------------------------------------------------------------------------------------
+WIDTH, MODULE, ANGLE = 20e-3, 2.5e-3, math.radians(20)  # m, m, rad: of the section
+WHOLE = math.atan(math.pi * MODULE / WIDTH)  # rad: overlap ratio one
+
+
+def stage_at(beta: float) -> Stage:
+    """The spur pair with a helix of the same transverse section."""
+    spur, cosine = load_stage(STAGE), math.cos(beta)
+    angles = {"normal_module": MODULE * cosine, "pressure_angle": math.atan(math.tan(ANGLE) * cosine)}
+    bodies = {name: gear.model_copy(update=angles | {"helix_angle": beta}) for name, gear in spur.bodies.items()}
+    return spur.model_copy(update={"bodies": bodies})
+
+
+def test_a_helix_of_the_same_transverse_section_has_the_same_path_of_contact() -> None:
+    meshes = [mesh_shape(stage, stage.engagements[0]) for stage in (stage_at(WHOLE), stage_at(0.0))]
+    helical, spur = (mesh.path for mesh in meshes)
+    assert helical == pytest.approx(spur, rel=1e-12)
+    assert meshes[0].base_pitch == pytest.approx(meshes[1].base_pitch, rel=1e-12)
+    assert meshes[0].gears[0].overlap_ratio(WIDTH) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_ring_of_the_other_hand_is_refused(tmp_path: Path) -> None:
+    text = STAGE.read_text(encoding="utf-8")
+    twisted = tmp_path / "stage.toml"
+    twisted.write_text(
+        text.replace("profile_shift = 0.0", 'profile_shift = 0.0\nhelix_angle = "20 deg"'), encoding="utf-8"
+    )
+    with pytest.raises(SpecError, match="bodies.ring.helix_angle.*one hand: write 20 deg"):
+        load_stage(twisted)

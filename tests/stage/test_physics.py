@@ -1,9 +1,12 @@
 """Physics of the shipped pair: free rattle keeps its energy and its backlash, coast flanks and bearings that are
-off, bad values refused. Other effects: test_effects.py."""
+off, bad values refused. An effect that is off is not there: whatever its data say, not one bit of the run changes; on,
+they matter. Other effects: test_effects.py."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +15,9 @@ from gearfmu.body import Body
 from gearfmu.errors import SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
+from gearfmu.stage.assembly.blob import GEAR_NUMBERS, read_blob, write_blob
 from gearfmu.stage.run.te import statics_of
-from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stagefile.forms.expand import with_ports
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.tables.connections import PortSpec
 
@@ -27,12 +31,9 @@ UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 def free(spec: Stage, bodies: list[Body], bearing_damping: float) -> StageModel:
     """Both shafts free, torque ports; bearings with the damping ratio given."""
-    gears = tuple(
-        gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})})
-        for gear in spec.written.gears
-    )
-    ports = {gear.name: PortSpec(kind="torque") for gear in spec.written.gears}
-    return assemble(rewritten(spec, gears=gears, ports=ports), bodies)
+    supports = tuple(support.model_copy(update={"damping_ratio": bearing_damping}) for support in spec.supports)
+    free = with_ports(spec, dict.fromkeys(spec.ports, PortSpec(kind="torque")))
+    return assemble(free.model_copy(update={"supports": supports}), bodies)
 
 
 def rattle(
@@ -125,3 +126,78 @@ def ended(plain: StageModel, angle: float) -> str:
     assert outcome in {"ok", "penetration", "diverged", "energy"}
     assert all(math.isfinite(kernel.get(name)) for name in kernel.variables)
     return outcome
+
+
+# ---- an effect that is off is not there ------------------------------------------------------------------------------
+DURATION = 4e-3
+GEARS = (0, 1)
+ENGAGEMENT_NUMBERS = ("x_a", "y_a", "x_b", "y_b", "backlash", "nominal_backlash", "damping")  # the first ones
+Sections = dict[str, np.ndarray]
+
+
+def of_gears(name: str, factor: float) -> Callable[[Sections], None]:
+    def change(sections: Sections) -> None:
+        for g in GEARS:
+            sections[f"gear{g}"][GEAR_NUMBERS.index(name)] *= factor
+
+    return change
+
+
+def of_pair(name: str, factor: float) -> Callable[[Sections], None]:
+    def change(sections: Sections) -> None:
+        sections["engagement"][ENGAGEMENT_NUMBERS.index(name)] *= factor
+
+    return change
+
+
+def of_sections(factor: float, *names: str) -> Callable[[Sections], None]:
+    def change(sections: Sections) -> None:
+        for name in names:
+            sections[name][:] *= factor
+
+    return change
+
+
+def of_supports(sections: Sections) -> None:
+    """What only a stage on its bearings has: the set that is not held."""
+    for name in ("omega_ground0", "damper0", "kappa0", "support_compliance0"):
+        sections[name][:] *= 0.3
+
+
+DATA = {
+    "effect.elastic": of_sections(1.2, "residual_own0", "residual_own1"),
+    "effect.tip_relief": of_gears("relief", 2.0),
+    "effect.tip_contact": of_gears("tip_edge", 1.001),  # more would leave a step between flank and edge
+    "effect.contact_damping": of_pair("damping", 5.0),
+    "effect.coast_flank": of_pair("backlash", 0.5),
+    "effect.bearings": of_supports,
+    "effect.modal_damping": of_sections(20, "zeta0", "zeta1", "zeta_ground0"),
+}
+
+
+def with_data(model: StageModel, change: Callable[[Sections], None]) -> StageModel:
+    sections = {name: np.array(value) if isinstance(value, np.ndarray) else value
+                for name, value in read_blob(model.blob).items()}  # fmt: skip
+    change(sections)
+    return replace(model, blob=write_blob(sections))
+
+
+def swinging(time: float) -> dict[str, float]:
+    """The pinion's shaft end turns and swings by ±10 mrad: the load reverses through the backlash."""
+    phi = 210.0 * time + 0.01 * math.sin(2 * math.pi * 500 * time + 0.5)
+    return {"pinion.phi": phi, "pinion.w": 210.0, "wheel.phi": -140.0 * time, "wheel.w": -140.0}
+
+
+def bits(model: StageModel, effect: str, on: bool) -> bytes:
+    trace = simulate(model, swinging, DURATION, H, {"level": 1, effect: float(on)})
+    assert trace.meta["outcome"] == "completed" and np.abs(trace["mesh.force"]).max() > 2000
+    return trace["mesh.te"].tobytes() + trace["mesh.force"].tobytes()
+
+
+@pytest.mark.parametrize("effect", DATA)
+def test_data_of_an_effect_count_when_it_is_on_and_only_then(relieved: StageModel, effect: str) -> None:
+    if effect == "effect.tip_contact":  # relieved tips do not touch
+        relieved = with_data(relieved, of_gears("relief", 0.0))
+    other = with_data(relieved, DATA[effect])
+    assert bits(relieved, effect, on=False) == bits(other, effect, on=False)
+    assert bits(relieved, effect, on=True) != bits(other, effect, on=True)

@@ -10,15 +10,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from driven import begun, stepped
 
+from evidence.energy.free import Energies, energies
 from evidence.energy.kernel_variants import WITHOUT_ETA, variant
 from evidence.stability.planetary import ALL_MESHES, TORQUE, PlanetSet, set_bodies, set_spec
 from gearfmu.kernel import Kernel
-from gearfmu.stage import StageModel, assemble
-from gearfmu.stagefile.forms.expand import rewritten
+from gearfmu.stage import StageModel
+from tests.relations.kinds import assembled
 
 H, STEPS = 5e-6, 400
 CONSERVING = {
@@ -78,33 +78,15 @@ def standing_and_turning(quick: Mapping[float, Sequence[str]], names: Iterable[s
     ]
 
 
-@dataclass(frozen=True)
-class Found:
-    """drift: largest change of stored energy − work + dissipation, growth: largest growth of stored energy − work in
-    one step, both over the energy at the start; changes: steps in which other tooth pairs carry."""
-
-    drift: float
-    growth: float
-    changes: int
-    retried_steps: float
-
-
 @lru_cache(maxsize=2)
 def model(chosen: PlanetSet, damped: bool = False) -> StageModel:
     """The set, by default without the dashpots of its supports."""
     spec = set_spec(chosen)
+    bodies = spec.by_name(set_bodies())
     if not damped:
-        form = spec.written
-        calm = {
-            name: getattr(form, name).model_copy(update={part: _calm(getattr(getattr(form, name), part))})
-            for name, part in (("sun", "bearing"), ("planet", "bearing"), ("carrier", "bearing"), ("ring", "mounts"))
-        }
-        spec = rewritten(spec, **calm)
-    return assemble(spec, set_bodies())
-
-
-def _calm(held: Any) -> Any:
-    return held.model_copy(update={"damping_ratio": 0.0})
+        calm = tuple(support.model_copy(update={"damping_ratio": 0.0}) for support in spec.supports)
+        spec = spec.model_copy(update={"supports": calm})
+    return assembled(spec, bodies)
 
 
 def started(
@@ -122,24 +104,16 @@ def started(
     return begun(kernel, {"carrier.tau": case.torque, "sun.tau": -case.torque / 4, **speeds})
 
 
-def energies(kernel: Kernel, steps: int, h: float) -> Found:
-    """Energy of a started kernel over internal steps h (s)."""
-    names = ["energy.stored", "energy.work", "energy.dissipated", *(f"{mesh}.pairs" for mesh in ALL_MESHES)]
-    rows = stepped(kernel, steps, h, *names)
-    total = rows[:, 0] - rows[:, 1]
-    return Found(
-        float(np.ptp(total + rows[:, 2]) / rows[0, 0]),
-        float(np.diff(total).max() / rows[0, 0]),
-        int(np.any(np.diff(rows[:, 3:], axis=0) != 0, axis=1).sum()),
-        kernel.get("solver.retried_steps"),
-    )
+def of_set(kernel: Kernel, steps: int = STEPS) -> Energies:
+    """Energy of a started kernel over its internal steps."""
+    return energies(kernel, H, steps * H, [f"{mesh}.pairs" for mesh in ALL_MESHES])
 
 
 @pytest.mark.parametrize(("name", "carrier"), standing_and_turning(QUICK, CASES))
 def test_invariant_holds(name: str, carrier: float) -> None:
     """T1 to T6. States in single precision: 6e-7 of what is stored at the start; where the carrier turns that is mostly
     its rotation, 20 J, of which 3e-7 are left: coupled engagements balance theirs to 1e-6."""
-    found = energies(started(CASES[name], carrier), STEPS, H)
+    found = of_set(started(CASES[name], carrier))
     assert found.drift < (2e-6 if carrier == STANDING else 1e-6)
     assert found.changes >= CASES[name].changes and found.retried_steps == 0
 
@@ -148,7 +122,7 @@ def test_invariant_holds(name: str, carrier: float) -> None:
 @pytest.mark.parametrize("carrier", [STANDING, TURNING])
 @pytest.mark.parametrize("name", CASES)
 def test_invariant_holds_in_double(double_library: Path, name: str, carrier: float) -> None:
-    found = energies(started(CASES[name], carrier, library=double_library), STEPS, H)
+    found = of_set(started(CASES[name], carrier, library=double_library))
     assert found.drift < 1e-8 and found.retried_steps == 0
 
 
@@ -156,7 +130,7 @@ def test_invariant_holds_in_double(double_library: Path, name: str, carrier: flo
 @pytest.mark.parametrize(("edits", "name"), [(FEW_PASSES, "T3 struck under 600 N·m"), (WITHOUT_ETA, "T1 one slice")])
 def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: str) -> None:
     """T7: a single pass over the eight engagements. T8: without the scalar."""
-    found = energies(started(CASES[name], STANDING, library=variant(tmp_path, "control", edits)), STEPS, H)
+    found = of_set(started(CASES[name], STANDING, library=variant(tmp_path, "control", edits)))
     assert found.drift > 1e-4
 
 
@@ -169,7 +143,7 @@ def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: 
 )
 def test_damping_never_adds(name: str, carrier: float) -> None:
     """T9: contact dashpots, modal damping and the dashpots of all supports."""
-    found = energies(started(CASES[name], carrier, DAMPED, damped=True), STEPS, H)
+    found = of_set(started(CASES[name], carrier, DAMPED, damped=True))
     assert found.growth < (2e-5 if carrier == STANDING else 1e-7)
 
 
@@ -178,11 +152,8 @@ def test_a_torque_that_changes_leaves_no_step_unsolved(level: float) -> None:
     """100 N·m at rest, growing at every communication step: contacts hardly move and could not repay what is missing
     when engagements recall each other's deflection under the new torque instead of the old one (40 steps of 180)."""
     kernel = model(PlanetSet(), damped=True).kernel(level=level, h=20e-6 / 3)
-    kernel.set("sun.tau", -25.0)
-    kernel.initialize()
-    for i in range(60):
-        kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2)
-        kernel.step(i * 2e-5, 2e-5)
+    begun(kernel, {"sun.tau": -25.0})
+    stepped(kernel, 60, 2e-5, before=lambda i: kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2))
     assert kernel.get("solver.retried_steps") == 0 and kernel.get("solver.iterations") < 50 * kernel.get("solver.steps")
 
 
@@ -192,5 +163,5 @@ def test_a_pair_that_enters_in_penetration_leaves_no_step_unsolved() -> None:
     case = Case(torque=100.0, knock=(0.0, 0.0), backlash=-20e-6)
     everything = {name: 1.0 for name in CONSERVING if name.startswith("effect.")}
     kernel = started(case, TURNING, everything, damped=True)
-    found = energies(kernel, 300, H)
+    found = of_set(kernel, 300)
     assert found.retried_steps == 0 and found.changes > 10

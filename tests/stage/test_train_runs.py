@@ -1,9 +1,11 @@
-"""Trains at rest: ratio and torque through the meshes, and what is refused."""
+"""Trains at rest: ratio and torque through the meshes, phases of the teeth by the closed form at the places of the
+axes, and what is refused."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,10 @@ from driven import begun
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.stage.assembly.meshes import tooth_phases
 from gearfmu.stage.run.steady import LoadCase, steady_run
 from gearfmu.stage.run.te import statics_of
-from gearfmu.stagefile.forms.general import Stage
+from gearfmu.stagefile.forms.general import RotorSpec, Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
 from gearfmu.stagefile.forms.turning import shafts_of
 from gearfmu.stagefile.reading.base import read_toml
@@ -135,3 +138,34 @@ def toml(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(toml, value)) + "]"
     return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+# ---- phases ----------------------------------------------------------------------------------------------------------
+def test_teeth_touch_in_every_engagement_at_angle_zero(two_stage: StageModel) -> None:
+    """Drive gap of tooth 0 on tooth 0 is nothing, or a whole number of pitches."""
+    train = two_stage.stage
+    phases = tooth_phases(train)
+    for mesh in train.engagements:
+        pair = mesh_shape(train, mesh)
+        a, b = pair.gears
+        (x, y), (u, v) = (train.rotors[train.rotor_of(gear)].axis for gear in mesh.gears)
+        t = math.atan2(v - y, u - x) - pair.alpha_wt
+        roll_a = a.r_b * (phases[mesh.gears[0]] + a.psi_b - t)
+        roll_b = b.r_b * (phases[mesh.gears[1]] + b.psi_b - t - math.pi)
+        assert math.remainder(pair.length - roll_a - roll_b, pair.base_pitch) == pytest.approx(0, abs=1e-12)
+
+
+def test_a_ring_of_gears_whose_axes_do_not_fit_is_refused(two_stage: StageModel) -> None:
+    """Three gears in a triangle, each with each: only certain places of the axes fit the teeth."""
+    axes = {"pinion1": (0.0, 0.0), "wheel1": (0.1, 0.0), "third": (0.05, 0.14)}
+    train = two_stage.stage
+    mesh, bodies = train.engagements[0], train.bodies
+    triangle = {
+        "bodies": bodies | {"third": bodies["wheel1"].model_copy(update={"name": "third"})},
+        "rotors": {name: RotorSpec(axis=axis, bodies={name: 0.0}) for name, axis in axes.items()},
+        "engagements": tuple(
+            mesh.model_copy(update={"name": "-".join(gears), "gears": gears}) for gears in combinations(axes, 2)
+        ),
+    }
+    with pytest.raises(ModelError, match="move an axis"):
+        tooth_phases(train.model_copy(update=triangle))
