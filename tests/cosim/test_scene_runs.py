@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from gearfmu import cosim
+from gearfmu import cosim, fmu
 from gearfmu.cosim.accuracy import Window, coupling_errors, rms
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.kernel_unit import Source
-from gearfmu.cosim.scene_run import run_once, stage_model, verified
+from gearfmu.cosim.scene_run import run_once, stage_model, summary, verified
 from gearfmu.errors import FmuError, ModelError
 from gearfmu.scenefile.scene import SceneSpec, load_scene
 from gearfmu.stage.run.trace import Trace
@@ -64,6 +64,23 @@ def test_coupling_error_does_not_count_the_internal_step():
     plain = coupling_errors(own.trace, halved.trace, 2, Window(0.0, steady=False))["pinion.tau"].relative
     estimate = verified(rig, source, own)["pinion.tau"].relative
     assert estimate < 2e-3 and estimate < 0.1 * plain
+
+
+def test_a_scene_switches_effects(tmp_path):
+    """Bearings off: no bore moves; through FMU and kernel alike."""
+    held = scene("pair_loaded", 2e-3, level="fast", **{"effects.bearings": False, "effects.coast_flank": True})
+    model = stage_model(held)
+    sources = Source(model), Source(model, fmu.export(model, tmp_path / "pair.fmu"))
+    traces = [run_once(held, source).trace for source in sources]
+    for trace in traces:
+        assert np.all(trace["pinion.gear.y"] == 0) and np.all(trace["bearing.pinion.fy"] != 0)
+        assert np.array_equal(trace["mesh.te"], traces[0]["mesh.te"])
+
+
+def test_the_summary_says_what_was_off():
+    held = scene("pair_loaded", 2e-3, level="fast", **{"effects.tip_contact": False, "effects.hertz": True})
+    source = Source(stage_model(held))
+    assert summary(held, source, run_once(held, source), None)["effects_off"] == ["tip_contact"]
 
 
 @pytest.mark.parametrize("unit", ["kernel", "fmu"])

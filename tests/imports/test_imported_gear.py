@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from decks import write_deck
+from gearfmu.body.imported import imported_full_order
 from gears import hex20_deck, pinion, stage, tetrahedra, without, write_matrices
 from scipy.spatial import cKDTree
 
 from gearfmu.body import Body, reduce_body
-from gearfmu.body.imported import imported_full_order
 from gearfmu.body.layout import value_of
 from gearfmu.femesh.quality import write_vtu
 from gearfmu.reduction.full_order import FullOrder

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 from numpy.polynomial.legendre import Legendre
+from turned_rows import on_tooth
 
 from gearfmu.body import Body
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
@@ -132,9 +133,8 @@ def gear_part(stage: Stage, body: Body, touches: Sequence[tuple[Load, Touch, int
     teeth = [t.teeth[side] for _, t, side in touches]
     modal, rigid = [turn @ body.rows[:, chosen]], [np.eye(6)]
     for (load, t, side), place, tooth, weight in zip(touches, places, teeth, weights, strict=True):
-        table = body.flank.rows[load.flank][:, degrees][..., chosen]
-        row = np.einsum("r,a,ran->n", place, weight, table)
-        modal.append(on_tooth(row, body, chosen, tooth)[None])
+        row = np.einsum("r,a,ran->n", place, weight, body.flank.rows[load.flank][:, degrees])
+        modal.append(on_tooth(body.flank, row[None], tooth, body.flank.teeth)[:, chosen])
         rigid.append(t.rigid[side][None])
     rows, omega = np.vstack(modal), 2 * np.pi * body.frequency[chosen]
     static = np.zeros((6 + len(touches),) * 2)
@@ -162,16 +162,6 @@ def weights_between(edges: np.ndarray, degrees: np.ndarray) -> np.ndarray:
         integral = Legendre.basis(int(a)).integ()(edges)
         columns.append((2 * a + 1) * np.diff(integral) / np.diff(edges))
     return np.stack(columns, axis=1)
-
-
-def on_tooth(row: np.ndarray, body: Body, chosen: np.ndarray, tooth: int) -> np.ndarray:
-    """Row (n,) of tooth 0 on another tooth (docs/theory.md eq. 3)."""
-    theta = 2 * np.pi * body.flank.diameter[chosen] * tooth / body.flank.teeth
-    first, second = np.flatnonzero(body.flank.part[chosen] == 1), np.flatnonzero(body.flank.part[chosen] == 2)
-    result = row * np.cos(theta)
-    result[first] -= row[second] * np.sin(theta[first])
-    result[second] += row[first] * np.sin(theta[first])
-    return result
 
 
 def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:

@@ -14,7 +14,6 @@ from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import Size
-from gearfmu.reduction.moments import Size
 from gearfmu.reduction.oscillators import oscillators
 
 SPRING, PENALTY, SPEED = 3e8, 1e9, 0.5  # N/m, N/m, m/s

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from refused import problems
+from broken import problems
 
 from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError, SpecError
