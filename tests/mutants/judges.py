@@ -18,7 +18,7 @@ from copies import KEPT, ROOT, Copy
 MAP = KEPT / "map"
 FOLDERS = "geometry relations kernel stagefile femesh fem cosim reduction body modes planning stage report rexs".split()
 FOLDERS += "study imports . sweeps bearing fmu sound stability".split()
-STORED = "test_golden", "test_quoted", "test_evidence"  # answers of our own: no judges
+STORED = "test_golden", "test_evidence"  # answers of our own: no judges
 OF_TEXTS = "test_said_twice test_builds test_build_without_compiler test_fuzz test_docs test_packages"
 OF_TEXTS += " test_notebooks test_examples test_chain test_mutants test_interrupted"
 MOST = 6  # modules of the map that are heard before those that it does not know

@@ -120,7 +120,7 @@ def test_a_set_with_a_sun_of_seventeen_teeth_and_a_sharp_hob_is_valid(tmp_path: 
     assert made.sun.rack.fillet_radius == 0.25 and made.sun.profile_shift == 0
 
 
-# ---- JSON ------------------------------------------------------------------------------------------------------------
+# ---- JSON: components, relations and load cases as in XML, written here after the public schema ----------------------
 def in_json(source: Path) -> dict[str, Any]:
     """A file in XML as the tables of one in JSON: identifiers are integers, a value has its type as key."""
     root = ElementTree.parse(source).getroot()
