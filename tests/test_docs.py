@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
 import re
+import runpy
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
 
 import prose
 import pytest
+import setuptools
 
 from evidence.pages import variables
 from evidence.pages.effects import effects_page
-from gearfmu import cli
+from gearfmu import cli, report
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "reduced_models").rglob("*.md")])
@@ -179,3 +186,65 @@ def test_pages_are_those_of_the_tables() -> None:
     rows = variables.rows()
     assert len(rows) == len(re.findall(r"GK_(?:REAL|INTEGER|BOOLEAN|ENUM), GK_", source)), "every row is read"
     assert all(row.description and row.exists in variables.WHEN for row in rows)
+
+
+# ---- the site --------------------------------------------------------------------------------------------------------
+SITE_LINK = re.compile(r'<(\w+)\b([^>]*?)\b(?:href|src)="?([^" >]+)')
+NOT_FETCHED = ("canonical", "prev", "next")
+
+
+@pytest.mark.full
+@pytest.mark.needs("material")
+def test_links_of_the_site_lead_to_a_place_in_it_and_nothing_is_fetched_from_elsewhere(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    pages = {page: page.read_text(encoding="utf-8") for page in tmp_path.rglob("*.html") if page.name != "404.html"}
+    assert len(pages) > 25
+    wrong = []
+    for page, text in pages.items():
+        for tag, before, link in SITE_LINK.findall(text):
+            parts = urlsplit(link)
+            outside = bool(parts.scheme) or link.startswith("//")
+            target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+            target = target / "index.html" if target.is_dir() else target
+            anchor = f'id="{unquote(parts.fragment)}"' if parts.fragment and target in pages else ""
+            if outside and tag != "a" and not any(f'rel="{word}"' in before for word in NOT_FETCHED):
+                wrong.append(f"{page.name} fetches {link}")
+            if not outside and (not target.is_file() or anchor not in pages.get(target, "")):
+                wrong.append(f"{page.name}: {link}")
+    assert not wrong
+
+
+# ---- the page of the package -----------------------------------------------------------------------------------------
+PACKAGE_LINK = re.compile(r"(!?)\[[^\[\]]*\]\(([^)\s]+)\)")
+
+
+def test_links_of_the_package_page_are_addresses_of_files_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(setuptools, "setup", given.update)
+    runpy.run_path(str(ROOT / "setup.py"))
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    source, version = (re.search(rf'^{key} = "(.+)"$', project, re.M) for key in ("Source", "version"))
+    assert source and version
+    ours, theirs = (ROOT / "README.md").read_text(encoding="utf-8"), given["long_description"]
+    assert PACKAGE_LINK.sub("", ours) == PACKAGE_LINK.sub("", theirs), "nothing else of the page changes"
+    links = PACKAGE_LINK.findall(theirs)
+    assert len(links) == len(PACKAGE_LINK.findall(ours)) > 40 and all("://" in link for _, link in links)
+    for mark, link in links:
+        if not link.startswith(source[1]):
+            continue
+        kind = "raw" if mark else "blob"
+        place = re.fullmatch(rf"{re.escape(source[1])}/{kind}/v{re.escape(version[1])}/([^#?]+)([#?].*)?", link)
+        assert place and (ROOT / place[1]).exists(), link
+
+
+def test_plotly_is_needed_to_build_and_not_to_run() -> None:
+    """61 MB of which reports carry one file; its licence lies beside it."""
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    needed = project.partition("\ndependencies = [")[2].partition("\n]")[0]
+    assert "plotly" not in needed and "plotly" in project.partition("\n[project]")[0]
+    web = Path(report.__file__).with_name("web")
+    assert (web / "plotly.min.js").stat().st_size > 1e6
+    assert "MIT" in (web / "plotly.LICENSE").read_text(encoding="utf-8")

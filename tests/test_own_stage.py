@@ -126,3 +126,23 @@ def test_scenes_load_the_tutorials_pair_within_its_torque_max() -> None:
     assert f"the scene puts {rig.torque:g} N·m on the pinion" in text and f"{most:g} N·m here" in text
     asked = re.search(r'--fmu my_pair.fmu --torque "(\d+) N\*m"', text)
     assert asked is not None and float(asked[1]) <= most
+
+
+# ---- deck and section of docs/howto-import.md ------------------------------------------------------------------------
+DECK = ROOT / "examples" / "imported_pinion" / "pinion.inp"
+
+
+def test_the_deck_of_the_page_is_the_one_that_mesh_writes(tmp_path: Path) -> None:
+    command = re.search(r"`gearfmu (mesh fzg_c .*?)`", (ROOT / "docs" / "howto-import.md").read_text(encoding="utf-8"))[
+        1
+    ]
+    assert call(*command.split(), "--out", tmp_path)[0] == 0
+    assert (tmp_path / "pinion.inp").read_text(encoding="utf-8") == DECK.read_text(encoding="utf-8")
+
+
+def test_import_prints_the_section(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = call("import", DECK, "fzg_c", "pinion", "--length", "1 mm", "--bore", "BORE")
+    assert code == 0 and '[gears.pinion.import]\nfile = "pinion.inp"\nlength = "1 mm"\nbore = "BORE"' in out
+    assert re.search(r"base_radius_m +0\.0338289", out) and re.search(r"method +cyclic", out)
+    assert not list(tmp_path.iterdir())

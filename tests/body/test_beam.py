@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from timoshenko import free_bending
+from blocks import free_bending
 
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft, rigid_mass
 

@@ -13,8 +13,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 from blocks import STEEL, box
-from line_by_line import direct
-from small_body import averaging
+from small_body import averaging, direct
 
 from gearfmu.body import Body, bodies, load_body, sound
 from gearfmu.body.body import How

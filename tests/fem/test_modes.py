@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from blocks import STEEL, box, free_body, grid_mesh, ring, ring_sector
-from timoshenko import free_bending
+from blocks import STEEL, box, free_bending, free_body, grid_mesh, ring, ring_sector
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20

@@ -11,7 +11,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -105,23 +104,7 @@ def test_a_container_makes_an_fmi_3_unit_with_the_same_bits(tmp_path):
     assert two["mesh.force"][-1] > 1000 and two.tobytes() == container.tobytes()
 
 
-def fmpy_command(_: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
-    return [sys.executable, "-m", "fmpy", "simulate", str(fmu), "--stop-time", str(STEPS * H), "--step-size", str(H),
-            "--output-interval", str(H), "--input-file", str(inputs), "--output-file", str(out)]  # fmt: skip
-
-
-def fmusim_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
-    outputs = [word for name in NAMES for word in ("--output-variable", name)]
-    return [program, "--interface-type", "cs", "--stop-time", str(STEPS * H), "--output-interval", str(H),
-            "--input-file", str(inputs), "--output-file", str(out), *outputs, str(fmu)]  # fmt: skip
-
-
-def fmucheck_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
-    return [program, "-k", "cs", "-h", str(H), "-s", str(STEPS * H), "-n", "0", "-i", str(inputs), "-o", str(out),
-            str(fmu)]  # fmt: skip
-
-
-def omsimulator_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
+def omsimulator_script(fmu: Path, inputs: Path, out: Path) -> Path:
     """A Lua script: the pair in a weakly coupled system, its inputs from a table beside it."""
     script = out.with_suffix(".lua")
     wires = "".join(f'oms_addConnection("m.root.t.{n}", "m.root.stage.{n}")\n' for n in inputs_at(0))
@@ -133,14 +116,29 @@ def omsimulator_command(program: str, fmu: Path, inputs: Path, out: Path) -> lis
         'oms_terminate("m")\noms_delete("m")\n',
         encoding="utf-8",
     )
-    return [program, str(script)]
+    return script
 
 
-PROGRAMS: dict[str, tuple[str, Callable[[str, Path, Path, Path], list[str]], str]] = {
-    "fmpy": ("python", fmpy_command, ""),
-    "fmusim": ("FMUSIM", fmusim_command, "a release of github.com/modelica/Reference-FMUs has it"),
-    "fmuCheck": ("FMUCHECK", fmucheck_command, "github.com/modelica-tools/FMUComplianceChecker has it"),
-    "OMSimulator": ("OMSIMULATOR", omsimulator_command, "openmodelica.org has it"),
+PROGRAMS = {  # environment variable, words of the command, where to get the program
+    "fmpy": (
+        "",
+        "-m fmpy simulate {fmu} --stop-time {stop} --step-size {h} --output-interval {h} --input-file {inputs} "
+        "--output-file {out}",
+        "",
+    ),
+    "fmusim": (
+        "FMUSIM",
+        "--interface-type cs --stop-time {stop} --output-interval {h} --input-file {inputs} --output-file {out} "
+        + "".join(f"--output-variable {name} " for name in NAMES)
+        + "{fmu}",
+        "a release of github.com/modelica/Reference-FMUs has it",
+    ),
+    "fmuCheck": (
+        "FMUCHECK",
+        "-k cs -h {h} -s {stop} -n 0 -i {inputs} -o {out} {fmu}",
+        "github.com/modelica-tools/FMUComplianceChecker has it",
+    ),
+    "OMSimulator": ("OMSIMULATOR", "{script}", "openmodelica.org has it"),
 }
 
 
@@ -148,7 +146,7 @@ PROGRAMS: dict[str, tuple[str, Callable[[str, Path, Path, Path], list[str]], str
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_programs_give_the_numbers_of_fmpy(name, native, unpacked, tmp_path):
     """Inputs from a table, outputs as a table: within 1e-9 of the largest value of each output."""
-    variable, command, source = PROGRAMS[name]
+    variable, words, source = PROGRAMS[name]
     program = sys.executable if name == "fmpy" else os.environ.get(variable) or shutil.which(name)
     if program is None:
         pytest.skip(f"needs the program {name} on PATH, or its path in {variable}: {source}")
@@ -157,7 +155,10 @@ def test_programs_give_the_numbers_of_fmpy(name, native, unpacked, tmp_path):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["time", *inputs_at(0)])
         writer.writerows([k * H, *inputs_at(k).values()] for k in range(STEPS + 1))
-    done = subprocess.run(command(program, native, inputs, out), capture_output=True, text=True, cwd=tmp_path)
+    script = omsimulator_script(native, inputs, out)
+    values = {"fmu": native, "inputs": inputs, "out": out, "script": script, "h": H, "stop": STEPS * H}
+    command = [program, *(word.format(**values) for word in words.split())]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     table = np.genfromtxt(out, delimiter=",", names=True, deletechars="", dtype=float)
     columns = [next(c for c in table.dtype.names if c.strip('"').endswith(n)) for n in NAMES]

@@ -18,7 +18,7 @@ from gearfmu.body import reduce_body
 from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.mesh import FeMesh, rotated
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.stagefile.forms.general import Stage
 from gearfmu.stagefile.forms.shapes import carrier_geometry
@@ -81,11 +81,9 @@ RING = '[ring.import]\nfile = "ring.inp"\nlength = "1 mm"\n'
 
 
 def toothed_deck(folder: Path, name: str, mesh: FeMesh, angle: float = 0.0) -> Path:
-    c, s = np.cos(angle), np.sin(angle)
-    points = 1e3 * mesh.nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     folder.mkdir(parents=True, exist_ok=True)
     sets = {key.upper(): nodes for key, nodes in mesh.sets.items()}
-    return write_deck(folder / f"{name}.inp", points, {"hexahedron20": mesh.elements}, sets)
+    return write_deck(folder / f"{name}.inp", 1e3 * rotated(mesh.nodes, angle), {"hexahedron20": mesh.elements}, sets)
 
 
 @pytest.mark.parametrize(
@@ -125,8 +123,7 @@ def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> 
 
 
 def turned(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return carrier_parts()[0].nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return rotated(carrier_parts()[0].nodes, angle)
 
 
 @pytest.mark.parametrize(

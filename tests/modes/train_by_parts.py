@@ -17,10 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 from numpy.polynomial.legendre import Legendre
+from turned_rows import on_tooth
 
 from gearfmu.body import Body
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.plane import about_z
 from gearfmu.stage.assembly.teeth import resampling
 from gearfmu.stagefile.forms.general import EngagementSpec, Stage
 from gearfmu.stagefile.forms.shapes import mesh_shape
@@ -93,18 +95,13 @@ def touch(stage: Stage, mesh: EngagementSpec, load: Load, turned: tuple[float, f
     foot = a.r_b * np.array([math.cos(pair.alpha_wt), -sense * math.sin(pair.alpha_wt)])
     point = np.append(foot + (middle + slope * touching) * normal, touching)
     n = np.append(normal * math.cos(a.beta_b), -sense * math.sin(a.beta_b))
-    turn = np.kron(np.eye(2), _about_z(gamma))
+    turn = np.kron(np.eye(2), about_z(gamma))
     rigid = [turn @ np.concatenate([n, np.cross(point - (x, 0, 0), n)]) for x in (0, pair.a)]
     curvature = math.cos(a.beta_b) * (1 / (middle + slope * touching) + 1 / (across - slope * touching))
     length = float(np.diff(left)[0]) / math.cos(a.beta_b)
     law = _tangent(stage, mesh, curvature, load.force / length) / length
     rolls = (middle + slope * touching, across - slope * touching)
     return Touch(rolls, law, zero, (load.tooth, other), (rigid[0], -rigid[1]), 2 * left / width)
-
-
-def _about_z(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 def _tangent(stage: Stage, mesh: EngagementSpec, curvature: float, line: float) -> float:
@@ -126,21 +123,20 @@ def gear_part(stage: Stage, body: Body, touches: Sequence[tuple[Load, Touch, int
     seen |= (np.abs(body.rows) > UNSEEN * np.abs(body.rows).max(axis=1, keepdims=True)).any(axis=0)
     second = np.flatnonzero(body.flank.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
-    chosen, degrees, turn = np.flatnonzero(seen), np.arange(count), np.kron(np.eye(2), _about_z(zero))
+    chosen, degrees, turn = np.flatnonzero(seen), np.arange(count), np.kron(np.eye(2), about_z(zero))
     weights = [weights_between(t.part, degrees)[0] for _, t, _ in touches]
     places = [resampling(body.flank.roll, t.rolls[side], t.rolls[side], 1)[0] for _, t, side in touches]
     teeth = [t.teeth[side] for _, t, side in touches]
     modal, rigid = [turn @ body.rows[:, chosen]], [np.eye(6)]
     for (load, t, side), place, tooth, weight in zip(touches, places, teeth, weights, strict=True):
-        table = body.flank.rows[load.flank][:, degrees][..., chosen]
-        row = np.einsum("r,a,ran->n", place, weight, table)
-        modal.append(on_tooth(row, body, chosen, tooth)[None])
+        row = np.einsum("r,a,ran->n", place, weight, body.flank.rows[load.flank][:, degrees])
+        modal.append(on_tooth(body.flank, row[None], tooth, body.flank.teeth)[:, chosen])
         rigid.append(t.rigid[side][None])
     rows, omega = np.vstack(modal), 2 * np.pi * body.frequency[chosen]
     static = np.zeros((6 + len(touches),) * 2)
     static[:6, :6] = turn @ body.static @ turn.T
     for i, (load, _, _) in enumerate(touches):
-        own = np.kron(np.eye(2), _about_z(zero + 2 * math.pi * teeth[i] / body.flank.teeth))
+        own = np.kron(np.eye(2), about_z(zero + 2 * math.pi * teeth[i] / body.flank.teeth))
         to_bore = np.einsum("r,a,rak->k", places[i], weights[i], body.flank.node[load.flank][:, degrees])
         static[6 + i, :6] = static[:6, 6 + i] = own @ to_bore
         for j, (other, _, _) in enumerate(touches):
@@ -162,16 +158,6 @@ def weights_between(edges: np.ndarray, degrees: np.ndarray) -> np.ndarray:
         integral = Legendre.basis(int(a)).integ()(edges)
         columns.append((2 * a + 1) * np.diff(integral) / np.diff(edges))
     return np.stack(columns, axis=1)
-
-
-def on_tooth(row: np.ndarray, body: Body, chosen: np.ndarray, tooth: int) -> np.ndarray:
-    """Row (n,) of tooth 0 on another tooth (docs/theory.md eq. 3)."""
-    theta = 2 * np.pi * body.flank.diameter[chosen] * tooth / body.flank.teeth
-    first, second = np.flatnonzero(body.flank.part[chosen] == 1), np.flatnonzero(body.flank.part[chosen] == 2)
-    result = row * np.cos(theta)
-    result[first] -= row[second] * np.sin(theta[first])
-    result[second] += row[first] * np.sin(theta[first])
-    return result
 
 
 def shaft_part(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> Part:

@@ -5,7 +5,6 @@
     python tests/mutants [--jobs 2]                judges those without verdict; a row is written as it comes
     python tests/mutants --again PATTERN           judges anew those whose file or text matches
     python tests/mutants --again OPEN              judges anew what survived before, with a larger --seconds
-    python tests/mutants --check                   tests that caught a defect must pass without it
 
 Golden runs and stored tables do not judge: the physics must see a defect. A survivor's verdict (equivalent, harmless,
 hole) and its reason are written into the table by hand. Exit code 1 where fewer than 85 % of the defects that change
@@ -94,20 +93,11 @@ def judge_all(wanted: Sequence[int], jobs: int, seconds: float) -> None:
         list(pool.map(one, wanted))
 
 
-def unsound() -> list[str]:
-    """Tests that caught a defect and fail without it too: each runs alone with what it needs on the sound checkout."""
-    tests = sorted({row.caught_by for row in read() if row.verdict == CAUGHT and "::" in row.caught_by})
-    copy = Copy("copy0")
-    copy.build()
-    return [test for test in tests if copy.run([test], SECONDS).failed]
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--map", action="store_true")
     parser.add_argument("--draw", type=int, default=0)
     parser.add_argument("--seed", type=int, default=43)
-    parser.add_argument("--check", action="store_true")
     parser.add_argument("--again", default="")
     parser.add_argument("--seconds", type=float, default=SECONDS)
     parser.add_argument("--jobs", type=int, default=1)
@@ -116,19 +106,11 @@ def main() -> int:
         make_map()
     if given.draw:
         draw(given.draw, given.seed)
-    if given.check:
-        print("\n".join(wrong := unsound()) or "every test that caught a defect passes without it")
-        return int(bool(wrong))
     if given.map or given.draw:
         return 0
     rows = read()
-    wanted = [k for k, r in enumerate(rows) if not r.verdict]
-    if given.again:
-        wanted = [
-            k
-            for k, r in enumerate(rows)
-            if re.search(given.again, f"{r.file}:{r.line} {r.before} {r.after} {r.verdict.upper()}")
-        ]
+    texts = [f"{r.file}:{r.line} {r.before} {r.after} {r.verdict.upper()}" for r in rows]
+    wanted = [k for k, r in enumerate(rows) if (re.search(given.again, texts[k]) if given.again else not r.verdict)]
     if wanted and not known():
         parser.error("nobody knows which tests run which lines: --map first")
     judge_all(wanted, given.jobs, given.seconds)

@@ -24,11 +24,10 @@ PATIENCE = 7200.0  # s of the clock for one run of tests, on a machine with othe
 
 @dataclass(frozen=True)
 class Run:
-    """Outcome of tests: the first that failed ("" for none), processor seconds, whether all ran, and lines that ran."""
+    """Outcome of tests: the first that failed ("" for none), processor seconds, and lines that ran."""
 
     failed: str
     seconds: float
-    whole: bool
     lines: dict[str, list[int]] = field(default_factory=dict)
 
 
@@ -78,7 +77,7 @@ class Copy:
         failed = found.get("failed", "")
         if not failed and process.returncode not in (0, 1, 2, 5):  # ended by a signal, or no test began
             failed = found.get("at", "") or "import: " + (text.strip() or "nothing").splitlines()[-1][:100]
-        return Run(failed, found.get("seconds", 0.0), found.get("whole", False), found.get("lines", {}))
+        return Run(failed, found.get("seconds", 0.0), found.get("lines", {}))
 
     @contextmanager
     def planted(self, defect: Defect) -> Iterator[bool]:
@@ -115,7 +114,7 @@ class Copy:
             for old in self.objects.glob("*.gcda"):
                 old.unlink()
             run = self.run([name], seconds, coverage=True)
-            yield name, replace(run, whole=True, lines=run.lines | self._lines_of_c())
+            yield name, replace(run, lines=run.lines | self._lines_of_c())
 
     def _lines_of_c(self) -> dict[str, list[int]]:
         """Lines of C sources that ran under coverage since the counts were last removed, by file."""

@@ -18,9 +18,9 @@ from copies import KEPT, ROOT, Copy
 MAP = KEPT / "map"
 FOLDERS = "geometry relations kernel stagefile femesh fem cosim reduction body modes planning stage report rexs".split()
 FOLDERS += "study imports . sweeps bearing fmu sound stability".split()
-STORED = "test_golden", "test_quoted", "test_evidence"  # answers of our own: no judges
+STORED = "test_golden", "test_evidence"  # answers of our own: no judges
 OF_TEXTS = "test_said_twice test_builds test_fuzz test_docs test_packages"
-OF_TEXTS += " test_site test_notebooks test_examples test_chain test_mutants test_interrupted"
+OF_TEXTS += " test_notebooks test_examples test_chain test_mutants test_interrupted"
 MOST = 6  # modules of the map that are heard before those that it does not know
 SECONDS = 2.0  # processor time that a module has to show which lines it runs
 

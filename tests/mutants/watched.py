@@ -69,7 +69,7 @@ class Watch:
     """The plugin of one session."""
 
     def __init__(self) -> None:
-        self.failed, self.at, self.whole, self.cover = "", "", True, None
+        self.failed, self.at, self.cover = "", "", None
         self.limit, self.before = float(os.environ.get(SECONDS, "1e9")), 0.0
         if COVERAGE:
             import coverage
@@ -89,7 +89,7 @@ class Watch:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
         if used() - self.before > self.limit:
-            self.whole, item.session.shouldstop = False, "time"
+            item.session.shouldstop = "time"
             return True
         self.at = item.nodeid
         self.write()
@@ -113,7 +113,6 @@ class Watch:
         result: dict[str, Any] = {
             "failed": self.failed,
             "at": self.at,
-            "whole": self.whole,
             "seconds": used() - self.before,
         }
         if self.cover and not self.at:

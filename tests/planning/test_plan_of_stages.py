@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from rigid_set import RigidSet
 from small_stage import body
 
 import gearfmu as gf
+from gearfmu import cli
 from gearfmu.planning.book import Plan
 from gearfmu.planning.choice import FULL_STEP_OF_SETS, space
 from gearfmu.planning.make import Job, make
@@ -69,3 +71,40 @@ def test_a_plan_keeps_a_housing_and_says_why() -> None:
     (own,) = [knob for knob in housed if knob.name == "housing"]
     assert own.kept == "without it sensors and mounts have no signal"
     assert {knob.name for knob in housed} - {knob.name for knob in train} == {"housing"}
+
+
+# ---- the two questions of docs/howto-plan.md, asked on the command line ----------------------------------------------
+BAND = ("--band", "500 Hz", "5 kHz")
+
+
+def told(folder: Path, monkeypatch: pytest.MonkeyPatch, *words: str) -> Plan:
+    monkeypatch.setenv("GEARFMU_CACHE", str(folder))
+    path = folder / "plan.toml"
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["plan", *words, *BAND, "--out", str(path)])
+    assert not ended.value.code
+    return Plan.load(path)
+
+
+def test_may_i_leave_the_coast_flank_out_under_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = ("--output", "te", "--output", "bearing.pinion.fx", "--budget", "1 dB", "--may-drop", "coast_flank")
+    (part,) = told(tmp_path, monkeypatch, "pair_loaded", *asked).segments
+    (line,) = [line for line in part.lines if line.effect == "coast_flank"]
+    assert part.kept and line.verdict == "off" and line.error < 1e-6
+
+
+@pytest.mark.full
+def test_may_i_leave_the_coast_flank_out_where_the_clutch_is_dumped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = ("--step", "20 us", "--output", "te", "--output", "bearing.pinion.fx", "--budget", "1 dB")
+    plan = told(tmp_path, monkeypatch, "clutch_dump", *asked, "--may-drop", "coast_flank")
+    verdicts = [line.verdict for part in plan.segments for line in part.lines if line.effect == "coast_flank"]
+    assert verdicts[0] == verdicts[-1] == "on" and "off" in verdicts
+
+
+def test_which_level_for_a_fifth_of_a_decibel_at_the_bearing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (part,) = told(tmp_path, monkeypatch, "pair_loaded", "--output", "bearing.pinion.fx", "--budget", "0.2 dB").segments
+    assert part.kept and part.choice.level == "fast" and part.choice.slices == 1
+    assert {line.effect: line.verdict for line in part.lines}["step"] == "10 µs"
+    assert part.error_default < 1.0 < part.price_default / part.price

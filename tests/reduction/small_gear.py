@@ -15,6 +15,7 @@ from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows
 from gearfmu.femesh.sector import gear_sector
 from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.couplings import Elements
 from gearfmu.reduction.cyclic.flank import Points, ToothFlank
 from gearfmu.reduction.cyclic.sector import SectorBody
@@ -74,7 +75,7 @@ class Whole:
         """(m, 3N): all loads of a tooth, as those of tooth 0 in the sector (`load_matrix`), turned."""
         mesh, rows = self.sector.mesh, self.sector.load_matrix.toarray()
         result = np.zeros((len(rows), len(self.elements.nodes), 3))
-        local = rows.reshape(len(rows), -1, 3) @ turn(tooth, mesh.teeth).T
+        local = rows.reshape(len(rows), -1, 3) @ about_z(2 * np.pi * tooth / mesh.teeth).T
         np.add.at(result, (slice(None), mesh.sector_nodes(tooth)), local)
         return result.reshape(len(rows), -1)
 
@@ -89,9 +90,3 @@ def whole(sector: SectorBody) -> Whole:
     full = sector.mesh.full()
     elements = Elements(full.nodes, full.elements, *hex20.assemble(full.nodes, full.elements, sector.material))
     return Whole(sector, elements, free_body(elements.stiffness, elements.mass, full.nodes, full.elements))
-
-
-def turn(tooth: int, teeth: int) -> np.ndarray:
-    """(3, 3): vectors in the frame of a sector → in the body's frame."""
-    angle = 2 * np.pi * tooth / teeth
-    return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from line_by_line import direct
-from small_body import mounted, small, tiny
+from small_body import direct, mounted, small, tiny
 
 from gearfmu.errors import BodyError
 from gearfmu.reduction.elastic import Elastic, elastic

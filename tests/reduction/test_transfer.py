@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from line_by_line import direct
-from small_body import mounted, small
+from small_body import direct, mounted, small
 
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.moments import Size

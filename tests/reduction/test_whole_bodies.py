@@ -15,11 +15,12 @@ import small_gear
 import small_ring
 from blocks import COUNT, modes_of
 from sections import section
-from small_gear import BETA, GEAR, WIDTH, Whole, turn, whole
+from small_gear import BETA, GEAR, WIDTH, Whole, whole
 from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.geometry.gear import GearGeometry, InternalGearGeometry
+from gearfmu.geometry.plane import about_z
 from gearfmu.reduction.couplings import Elements, averaging
 from gearfmu.reduction.cyclic.flank import flank_loads
 from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
@@ -162,7 +163,7 @@ def test_pictures_are_the_static_displacement_of_every_sector() -> None:
     full = SPUR.whole.free.flexibility(SPUR.whole.loads(0)[[0, 5]].T)
     for tooth in (0, 3, 11):
         for load in (0, 1):
-            mine = SPUR.statics.pictures[load, tooth].reshape(-1, 3) @ turn(tooth, GEAR.z).T
+            mine = SPUR.statics.pictures[load, tooth].reshape(-1, 3) @ about_z(2 * np.pi * tooth / GEAR.z).T
             theirs = full[:, load].reshape(-1, 3)[SPUR.sector.mesh.sector_nodes(tooth)]
             assert np.abs(mine - theirs).max() < 1e-9 * np.abs(full).max()
 

@@ -13,7 +13,14 @@ from kinds import KINDS, Kind, every
 from said import Said
 
 from gearfmu.report import html as report
-from gearfmu.stage.run.trace import Trace
+from gearfmu.report import plots
+from gearfmu.report.chart import Chart
+from gearfmu.report.heading import of_set, phasing, planet_phases
+from gearfmu.report.planets import LEAST_SPAN, planets, sharing
+from gearfmu.report.run import Run
+from gearfmu.report.signals import known_meshings, planet_set
+from gearfmu.stage.run.trace import Channel, Trace
+from gearfmu.stagefile.stage import load_stage
 
 ALL = every(full=("helical", "train", "helical_set"))
 OF_STATICS = ("mesh_cycle", "contact")  # quasi-static, or of finite elements: not of the trace
@@ -195,3 +202,69 @@ def test_flanks_are_named_by_the_load(name: str, scale: float, tmp_path: Path) -
     coast = [value for key, value in found.results.items() if key.endswith("coast_contact_percent")]
     assert len(coast) == len(found.meshes) and coast == [0.0 if scale > 0 else 100.0] * len(coast)
     assert ("Coast flanks carry in" in found.text) == (scale < 0)
+
+
+# ---- planetary sets --------------------------------------------------------------------------------------------------
+def test_a_set_has_no_chart_of_forces_that_cancel_and_a_line_for_shares_that_differ_by_rounding(tmp_path: Path) -> None:
+    """Bearing forces of 1e-5 of the mesh force have no chart, no level and no tile. A pair is no set."""
+    trace = trace_of(KINDS["set"], 1.0)
+    quiet = Channel(1e-5 * trace["sun_planet1.force"], "N")
+    still = {name: quiet for name in trace.channels if re.fullmatch(r"bearing\.\w+\.[fm].*", name)}
+    trace = Trace(trace.time, {**trace.channels, **still}, trace.meta)
+    report.write(trace, trace.meta, tmp_path)
+    assert "alternating bearing force" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    figures = "axial energy pin planets set_force set_force_detail set_speed sharing spectrum torque".split()
+    assert sorted(path.stem for path in (tmp_path / "data").glob("*.csv")) == figures, "no bearing"
+    header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "bearing" not in header and "sun_planet1" in header
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None
+    alike = {f"{central}_{planet}.{end}": trace.channels[f"sun_planet1.{end}"]
+             for central in own.meshes for planet in own.planets for end in ("force", "force_mean")}  # fmt: skip
+    for chart in (sharing, planets):
+        plot = chart(Run(Trace(trace.time, {**trace.channels, **alike}, trace.meta), {}), own)
+        assert isinstance(plot.picture, Chart)
+        limits = [panel.limits or (0.0, 0.0) for panel in plot.picture.panels if "share" in panel.label]
+        assert limits and all(high - low == pytest.approx(LEAST_SPAN) for low, high in limits)
+    pair = Trace(trace.time, trace.channels, trace.meta | {"meshes": {"sun_planet1": ["sun", 18]}})
+    assert planet_set(pair, known_meshings(pair)) is None
+
+
+def test_energy_that_the_balance_leaves_is_told_of_what_passed_through() -> None:
+    """1.02 J of twice 600 N·m × 85 rad/s × 0.2 s."""
+    time = np.linspace(0.0, 0.2, 101)
+    energies = {name: 0.0 * time for name in ("work", "stored", "dissipated")} | {"residual": 5.1 * time}
+    channels = {f"energy.{name}": Channel(values, "J") for name, values in energies.items()}
+    for name, torque, speed in (("carrier", 600.0, 85.0), ("sun", -150.0, 340.0)):
+        channels[f"drive.{name}.tau"] = Channel(np.full(time.size, torque), "N.m")
+        channels[f"drive.{name}.work"] = Channel(torque * speed * time, "J")
+    plot = plots.energy(Trace(time, channels, {}))
+    assert plot is not None and "5.0e-05 of the energy" in plot.caption
+    assert "drive.carrier.work_[J]" in plot.columns
+
+
+@pytest.mark.parametrize(
+    ("teeth", "places", "words"),
+    [
+        (24, (0, 1, 2, 3), "in phase"),  # 24/4 is whole
+        (18, (0, 1, 2, 3), "counter-phased"),  # 4½: every second planet half a pitch behind
+        (26, (0, 1, 2, 3), "counter-phased"),
+        (25, (0, 1, 2, 3), "sequentially phased"),  # 6¼
+        (26, (0, 4 / 3, 8 / 3), "sequentially phased"),  # 8⅔
+        (25, (0, 0.96, 2, 2.96), "counter-phased"),  # in opposite pairs: 0, 6, 12½, 18½
+        (25, (0, 1, 2), "unequally phased"),  # 0, 6¼, 12½: first harmonics do not cancel
+    ],
+)
+def test_phasing_of_planets_by_hand(teeth: int, places: tuple[float, ...], words: str) -> None:
+    """Teeth of the sun times the place of each planet (here in quarters of a turn), in pitches behind the first."""
+    phases = [(teeth * place / 4) % 1.0 for place in places]
+    assert phasing(phases) == words
+
+
+@pytest.mark.parametrize(("file", "words"), [("planetary54", "counter-phased"), ("helical_set", "sequentially phased")])
+def test_phasing_is_a_key_number_of_a_set(file: str, words: str) -> None:
+    stage = load_stage(file)
+    found = planet_phases(stage, [name for name in stage.rotors if name.startswith("planet")], ["sun", "ring"])
+    assert {phasing(own) for own in found.values()} == {words}
+    told = dict(of_set(Run(trace_of(KINDS["set"], 1.0), {}, load_stage("planetary54"))))
+    assert told["Planets at the sun"] == told["Planets at the ring"] == "counter-phased (0, ½, 0, ½ of a pitch)"

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_set_report import set_run
 
 import gearfmu as gf
 from evidence.pictures.browser import Browser
@@ -61,7 +60,7 @@ def test_nothing_hangs_over_the_edge(page: Path, tmp_path: Path, width: int) -> 
 
 
 def of_set(trace: Trace, folder: Path) -> Path:
-    own = set_run()
+    own = gf.simulate("planetary54", "600 N*m", "85 rad/s", duration="10 ms", level="fast")
     return report.write(own, own.meta, folder)
 
 

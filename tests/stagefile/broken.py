@@ -13,12 +13,13 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 
 from gearfmu.body import load_bodies
 from gearfmu.cosim.scene_run import in_drivetrain
-from gearfmu.errors import GearfmuError
+from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.files import seal
 from gearfmu.scenefile.scene import SHIPPED, load_scene, shipped_scenes
 from gearfmu.stage import assemble
@@ -128,6 +129,16 @@ def message(name: str, folder: Path) -> list[str]:
         shipped = str(find_stage("fzg_c").parents[1])
         return re.sub(r"0x[0-9a-f]+", "0x…", said.replace(shipped, "shipped")).splitlines()
     return []
+
+
+def problems(changes: dict[str, Any], stage: Path | str = "fzg_c") -> dict[str, Problem]:
+    """All that is wrong with a stage after these changes, by field; none where the stage loads."""
+    try:
+        load_stage(stage, changes)
+    except SpecError as error:
+        assert str(error) == "\n".join(map(str, error.problems))
+        return {problem.field: problem for problem in error.problems}
+    return {}
 
 
 if __name__ == "__main__":

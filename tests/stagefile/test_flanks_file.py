@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refused import problems
+from broken import problems
 
 from gearfmu.stagefile.proposals.new import new_stage
 from gearfmu.stagefile.reading.files import find_stage

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from broken import problems
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refused import problems
 
 from gearfmu.errors import SpecError
 from gearfmu.stagefile.checks.gears import at_most
