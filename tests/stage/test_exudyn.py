@@ -89,11 +89,13 @@ def make_rotor() -> Rotor:
     flank = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, gear.face_width, gear.body.strip_half_width)
     mesh = gear_sector(shape, gear.face_width, COARSE)
     body = SectorBody(mesh, gear.material, flank, Points(flank.chebyshev_rolls(3), 1))
-    modes = elastic_modes(body, MODES)
+    modes = elastic_modes(body, MODES, sample=sp.eye_array(len(mesh.nodes), format="csr"))
+    assert modes.surface is not None
     index = [mesh.sector_nodes(tooth) for tooth in range(mesh.teeth)]
     shapes = []
     for k in np.flatnonzero(modes.part != 2):
-        shapes += list(unfolded(modes.shapes[k], modes.nodal_diameter[k], index))
+        field = modes.surface[k] + 1j * modes.surface[k + 1] if modes.part[k] else modes.surface[k]
+        shapes += list(unfolded(field.ravel(), modes.nodal_diameter[k], index))
     full = mesh.full()
     bore, z = full.sets["bore"], full.nodes[full.sets["bore"], 2]
     ends = tuple(bore[np.abs(z - side * gear.face_width / 2) < 1e-9] for side in (-1, 1))
