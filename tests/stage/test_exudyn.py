@@ -18,6 +18,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
 from gearfmu.body.body import Node
 from gearfmu.femesh.sector import gear_sector
