@@ -63,8 +63,8 @@ OVER = ["--over", "torque=10:300:200 N*m", "--over", "positions=4"]
     ("words", "file", "sign"),  # the file that shows that it is at work, and what that holds then
     [
         (["reduce", "tiny"], "told", "reducing"),
-        (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", ""),
-        pytest.param(["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", "", marks=pytest.mark.full),
+        (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl", "\n"),
+        pytest.param(["study", "pair_loaded", "--quick", "--out", "out"], "study.csv", "\n", marks=pytest.mark.full),
     ],
     ids=["reduce", "sweep", "study"],
 )
