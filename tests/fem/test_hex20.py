@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, rigid_modes
+from gearfmu.reduction.couplings import Elements, averaging
 
 
 def distorted_box(amount: float, seed: int = 0):
@@ -96,6 +97,6 @@ def test_averaging_node_does_not_depend_on_the_mesh():
     means = []
     for nodes, elements in (even, (uneven, graded[1])):
         top = np.flatnonzero(nodes[:, 2] > 0.5 - 1e-9)
-        rows = averaging_rows(nodes, surface.faces_within(elements, top))
+        rows = averaging(Elements(nodes, elements, *hex20.assemble(nodes, elements, STEEL)), top, np.zeros(3))
         means.append(rows @ np.stack([nodes[:, 1] ** 2, nodes[:, 0], nodes[:, 1] * 0], axis=1).ravel())
     assert np.allclose(means[0], means[1], atol=1e-12)

@@ -13,7 +13,7 @@ from blocks import STEEL, box, free_bending, free_body, grid_mesh, ring, ring_se
 from gearfmu.errors import MeshError
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces
-from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.fem.lanczos import ModesError, lowest_modes
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "nafems_ring_test6.json").read_text())
 
@@ -97,6 +97,16 @@ def test_cuts_that_do_not_match_are_refused():
         sector_spaces(Sector(s.nodes, s.elements, *matrices, 6, s.cut_minus, s.cut_plus[::-1]))
     with pytest.raises(MeshError, match="must match"):
         sector_spaces(Sector(s.nodes, s.elements, *matrices, 6, s.cut_minus, s.cut_plus[1:]))
+
+
+def test_a_space_that_ends_before_its_modes_is_told():
+    """Two oscillators of three are started: what is asked beyond them is in no vector of the space."""
+    three = np.diag([4.0, 2.0, 1.0])
+    body = SimpleNamespace(size=3, elastic=3, dtype=float, mass=lambda v: v, flexibility=lambda load: three @ load)
+    start = np.array([[1.0], [1.0], [0.0]])
+    assert lowest_modes(body, 2, start=start)[0] == pytest.approx([0.25, 0.5])
+    with pytest.raises(ModesError, match="not all of 3 modes found: the Krylov space ends at 2 vectors"):
+        lowest_modes(body, 3, start=start)
 
 
 def test_inertia_relief_is_a_projection_and_leaves_no_rigid_motion():

@@ -28,9 +28,11 @@ KINDS = ("hexahedron20", "tetra10", "hexahedron")
 
 
 def nastran(path: Path, nodes: np.ndarray, kind: str, cells: np.ndarray) -> Path:
-    """A bulk data file in small fields, with SET 1 = the nodes at x = 0."""
+    """A bulk data file in small fields, with SET 1 = the nodes at x = 0, neighbours as a THRU b."""
     left = np.flatnonzero(nodes[:, 0] == 0) + 1
-    lines = [f"SET 1 = {', '.join(map(str, left[:8]))},", f"  {', '.join(map(str, left[8:]))}", "BEGIN BULK"]
+    runs = np.split(left, np.flatnonzero(np.diff(left) > 1) + 1)
+    items = [str(run[0]) if len(run) == 1 else f"{run[0]} THRU {run[-1]}" for run in runs]
+    lines = [f"SET 1 = {', '.join(items[:4])},", f"  {', '.join(items[4:])}", "BEGIN BULK"]
     lines += [f"GRID,{k},,{x:.9g},{y:.9g},{z:.9g}" for k, (x, y, z) in enumerate(np.round(nodes, 9), 1)]
     name = {"hexahedron20": "CHEXA", "tetra10": "CTETRA", "hexahedron": "CHEXA"}[kind]
     order = (

@@ -79,3 +79,12 @@ def test_a_step_that_is_not_at_the_present_time_is_refused_and_changes_nothing()
         with pytest.raises(SimulationError) as caught:
             kernel.step(time, step)
         assert caught.value.outcome == "bad_step" and kernel.save() == before
+
+
+@pytest.mark.parametrize("time", [math.nan, math.inf])
+def test_a_start_at_no_time_is_refused(time: float) -> None:
+    kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1})
+    with pytest.raises(SimulationError) as caught:
+        kernel.initialize(time)
+    assert caught.value.outcome == "bad_value"
+    kernel.initialize(0.0)

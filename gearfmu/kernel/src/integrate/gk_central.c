@@ -99,8 +99,7 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
     }
     approach(model, setup, work, data, h);
     if (!gk_rk45_evaluate(model, setup, work, data, 0, outer)) return GK_DIVERGED;
-    for (int e = 0; e < model->engagements; e++)
-        if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
+    if (gk_rk45_overlaps(model, work)) return GK_PENETRATION;
     arrive(model, setup, work, data, h);
     gk_rk45_squeeze(model, setup, work, data, h);
     for (int e = 0; e < model->engagements; e++) gk_memory_keep(setup, &work->engaged[e], data, e);

@@ -26,6 +26,8 @@ GK_HOT void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_
 GK_HOT void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
 GK_HOT void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
                             double step);
+/* teeth of any mesh overlap by more than means anything */
+GK_HOT int gk_rk45_overlaps(const gk_model *model, const gk_work *work);
 GK_HOT gk_step_function gk_rk45_step;
 /* gk_central.c */
 GK_HOT gk_step_function gk_central_step;

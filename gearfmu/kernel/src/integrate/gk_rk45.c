@@ -161,6 +161,13 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work
     return check == 0.0;
 }
 
+int gk_rk45_overlaps(const gk_model *model, const gk_work *work)
+{
+    int found = 0;
+    for (int e = 0; e < model->engagements; e++) found |= gk_engage_overlaps(model, work, e);
+    return found;
+}
+
 /* trial = state + h Σ weight_i stage_i over the first `count` stages */
 static void combine(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                     const double *weight, int count, double h)
@@ -254,7 +261,8 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 }
 
 /* Over h, in as many inner steps as the error control wants; outer ends move linearly between outer_before and outer. γ
- * has no meaning here. GK_OK, or GK_DIVERGED: inner steps of less than a picosecond, or more than TRIALS of them. */
+ * has no meaning here. GK_OK, GK_PENETRATION, or GK_DIVERGED: inner steps of less than a picosecond, or more than TRIALS
+ * of them. */
 gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                         double gamma)
 {
@@ -279,6 +287,7 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
         const double ratio = good ? error_ratio(model, setup, work, data, step) : 32.0;
         const double factor = gk_clamp(ratio > 0.0 ? 0.8 * gk_exp(-0.2 * gk_log(ratio)) : 5.0, 0.2, 5.0);
         if (ratio <= 1.0) {
+            if (gk_rk45_overlaps(model, work)) return GK_PENETRATION;
             keep(model, setup, work, data);
             gk_rk45_squeeze(model, setup, work, data, step);
             done = done + step >= h * (1.0 - 1e-12) ? h : done + step;
