@@ -54,8 +54,8 @@ typedef struct ground_part {
     const gk_side *side;
     int from, width, points, padded, count;      /* padded: points in whole quads; count: of what gaps and bores read */
     const double *by[2], *common[COMMON], *rows; /* rows: of the node in hand */
-    double *here, *next;          /* (width, padded + COMMON): rows of this node and of the next, by columns */
-    double *square[2], *mixed[2]; /* (points, padded + COMMON): here · here, here · next, each oscillator weighed */
+    double *columns;              /* (width, padded + COMMON): rows of a node by columns */
+    double *square[2], *mixed[2]; /* (points, padded + COMMON): node · node, node · next, each oscillator weighed */
 } ground_part;
 
 #ifndef GK_WIDE
@@ -63,7 +63,7 @@ size_t gk_moves_scratch(size_t points, size_t lanes, size_t ground)
 {
     GK_ASSERT(points > 0 && lanes > 0);
     const size_t columns = points + 4 + COMMON;
-    return 4 * points * lanes + 2 * ground * columns + 4 * points * columns;
+    return 4 * points * lanes + ground * columns + 4 * points * columns;
 }
 #endif
 
@@ -80,8 +80,7 @@ static ground_part part_of(const gk_model *model, const gk_setup *setup, const g
     const size_t columns = (size_t)columns_of(&p);
     p.by[0] = k->ground.mobility + p.from, p.by[1] = k->ground.kappa + p.from;
     p.count = common_rows(model, setup, side, p.common);
-    p.here = room, room += (size_t)p.width * columns;
-    p.next = room, room += (size_t)p.width * columns;
+    p.columns = room, room += (size_t)p.width * columns;
     for (int kind = 0; kind < 2; kind++) {
         p.square[kind] = room, room += (size_t)p.points * columns;
         p.mixed[kind] = room, room += (size_t)p.points * columns;
@@ -94,10 +93,11 @@ static const double *rows_of(const ground_part *p, int at)
     return p->side->ground + (size_t)at * (size_t)(p->points * p->width);
 }
 
-static void by_columns(const ground_part *p, int at, double *out)
+static void by_columns(const ground_part *p, int at)
 {
     const double *rows = rows_of(p, at);
     const int columns = columns_of(p);
+    double *out = p->columns;
     for (int k = 0; k < p->width; k++, out += columns) {
         memset(out + p->points, 0, (size_t)(columns - p->points) * sizeof *out);
         for (int i = 0; i < p->points; i++) out[i] = rows[i * p->width + k];
@@ -106,11 +106,11 @@ static void by_columns(const ground_part *p, int at, double *out)
 }
 
 /* `count` rows, from row i on, times a chunk of columns from j on, weighed by mobility and by κ */
-GK_INLINE void weigh_block(const ground_part *p, const double *columns, int i, int j, int count, double *const out[2])
+GK_INLINE void weigh_block(const ground_part *p, int i, int j, int count, double *const out[2])
 {
     const int n = p->width, stride = columns_of(p);
     gk_chunk sum[2][4] = {{{0}}};
-    const double *a = p->rows + (size_t)i * n, *b = columns + j;
+    const double *a = p->rows + (size_t)i * n, *b = p->columns + j;
     for (int k = 0; k < n; k++, b += stride) {
         const gk_chunk column = *(const gk_chunk *)b;
         const double mobility = p->by[0][k], kappa = p->by[1][k];
@@ -125,15 +125,15 @@ GK_INLINE void weigh_block(const ground_part *p, const double *columns, int i, i
 }
 
 /* rows of a node times columns, each row from its own column on where the product is symmetric, up to column `end` */
-static void weigh(const ground_part *p, const double *columns, int symmetric, double *const out[2])
+static void weigh(const ground_part *p, int symmetric, double *const out[2])
 {
     const int end = symmetric ? columns_of(p) : p->padded;
     int i = 0;
     for (; i + 4 <= p->points; i += 4)
-        for (int j = symmetric ? i : 0; j < end; j += GK_CHUNK) weigh_block(p, columns, i, j, 4, out);
+        for (int j = symmetric ? i : 0; j < end; j += GK_CHUNK) weigh_block(p, i, j, 4, out);
     for (; i < p->points; i++)
         for (int j = symmetric ? i / GK_CHUNK * GK_CHUNK : 0; j < end; j += GK_CHUNK)
-            weigh_block(p, columns, i, j, 1, out);
+            weigh_block(p, i, j, 1, out);
 }
 
 /* adds the ground group to the products of a node: rows with rows, and rows with what the gap reads as rigid motion */
@@ -163,17 +163,15 @@ static void add_ground_products(const gk_setup *setup, ground_part *p, gk_step_s
             for (int d = 0; d < p->count; d++)
                 table->own[kind][c][d] = weighed(p->common[c], p->common[d], p->by[kind], p->width);
     for (int c = 0; c < p->count; c++) table->share[c] = c < p->count - 1 ? 0.5 : 1.0;
-    by_columns(p, 0, p->here);
+    by_columns(p, 0);
     for (int at = 0; at <= p->side->nodes; at++) {
-        double *const was = p->here;
         p->rows = rows_of(p, at);
-        weigh(p, p->here, 1, p->square);
+        weigh(p, 1, p->square);
         if (at < p->side->nodes) {
-            by_columns(p, at + 1, p->next);
-            weigh(p, p->next, 0, p->mixed);
+            by_columns(p, at + 1);
+            weigh(p, 0, p->mixed);
         }
         add_ground_node(p, table, at, gk_common(setup));
-        p->here = p->next, p->next = was;
     }
 }
 
