@@ -54,7 +54,7 @@ typedef struct ground_part {
     const gk_side *side;
     int from, width, points, padded, count;      /* padded: points in whole quads; count: of what gaps and bores read */
     const double *by[2], *common[COMMON], *rows; /* rows: of the node in hand */
-    double *columns;              /* (width, padded + COMMON): rows of a node by columns */
+    double *columns;                             /* (width, padded + COMMON): rows of a node by columns */
     double *square[2], *mixed[2]; /* (points, padded + COMMON): node · node, node · next, each oscillator weighed */
 } ground_part;
 
@@ -132,8 +132,7 @@ static void weigh(const ground_part *p, int symmetric, double *const out[2])
     for (; i + 4 <= p->points; i += 4)
         for (int j = symmetric ? i : 0; j < end; j += GK_CHUNK) weigh_block(p, i, j, 4, out);
     for (; i < p->points; i++)
-        for (int j = symmetric ? i / GK_CHUNK * GK_CHUNK : 0; j < end; j += GK_CHUNK)
-            weigh_block(p, i, j, 1, out);
+        for (int j = symmetric ? i / GK_CHUNK * GK_CHUNK : 0; j < end; j += GK_CHUNK) weigh_block(p, i, j, 1, out);
 }
 
 /* adds the ground group to the products of a node: rows with rows, and rows with what the gap reads as rigid motion */
