@@ -261,8 +261,8 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 }
 
 /* Over h, in as many inner steps as the error control wants; outer ends move linearly between outer_before and outer. γ
- * has no meaning here. GK_OK, GK_PENETRATION, or GK_DIVERGED: inner steps of less than a picosecond, or more than TRIALS
- * of them. */
+ * has no meaning here. GK_OK, GK_PENETRATION, or GK_DIVERGED: inner steps of less than a picosecond, or more than
+ * TRIALS of them. */
 gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                         double gamma)
 {
