@@ -20,8 +20,6 @@ LANES = 16  # of the states of a gear group
 RATES = np.array([0.8, 0.8, -0.6, -0.6])  # of the gears' two pairs
 FREE = {"effect.modal_damping": 0.0, "effect.contact_damping": 0.0, "level": 3.0}
 VIBRATING = 1e-3  # m/s·√kg: some tenths of a micrometre
-
-
 FEW, MANY = 2, 20  # turning pairs; many of the same oscillators are turned together (gk_crowd.c)
 
 
@@ -121,13 +119,13 @@ def propagate(omega: np.ndarray, coupling: np.ndarray, speed: float, state: np.n
     return sl.expm(matrix * time) @ (scale * state) / scale
 
 
-@pytest.mark.parametrize("pairs", [FEW, MANY])
-def test_a_kicked_pair_whirls_as_its_linear_system(pairs: int) -> None:
-    """1 ms: another motion than a run without."""
+@pytest.mark.parametrize(("pairs", "least"), [(FEW, 0.2), (MANY, 0.15)], ids=[str(FEW), str(MANY)])
+def test_a_kicked_pair_whirls_as_its_linear_system(pairs: int, least: float) -> None:
+    """1 ms; a run that knows nothing of the whirl is off by more than `least`."""
     flight = Flight(pairs, h=2e-6)
     flight.go(50)
     with_it, without = flight.error(), flight.error(known=False)
-    assert max(with_it) < 2e-4 and min(without) > 0.1
+    assert max(with_it) < 2e-4 and min(without) > least
 
 
 @pytest.mark.parametrize("pairs", [FEW, MANY])

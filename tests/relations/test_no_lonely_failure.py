@@ -1,6 +1,7 @@
 """No lonely failure: where a load has an equilibrium, so have its neighbours, cold or from the last one; and a load
 without one loses no other. 200 loads and positions drawn over all kinds and, in the full run, over drawn stages. And a
-failure has its name: teeth that are thrown through each other end a run of every kind at every level.
+failure has its name: teeth thrown through each other end a run of every kind, rigid, elastic and explicit, and of a
+pair at level paper.
 
 Fault seen: at level paper they met, passed and flew on."""
 

@@ -54,7 +54,7 @@ typedef struct ground_part {
     const gk_side *side;
     int from, width, points, padded, count;      /* padded: points in whole quads; count: of what gaps and bores read */
     const double *by[2], *common[COMMON], *rows; /* rows: of the node in hand */
-    double *columns;                             /* (width, padded + COMMON): rows of a node by columns */
+    double *columns;              /* (width, padded + COMMON): rows by columns: of a node, then of the next */
     double *square[2], *mixed[2]; /* (points, padded + COMMON): node · node, node · next, each oscillator weighed */
 } ground_part;
 
